@@ -1,0 +1,52 @@
+# `make study` and `make test` are all a fresh machine needs besides make and Python >= 3.11.
+
+PYTHON ?= python3
+JOBS ?= 2
+BIN := .venv/bin
+READY := .venv/.installed
+
+.PHONY: study test check publish lint format bench report docs clean
+
+study: $(READY)
+	$(BIN)/snakemake -j$(JOBS)
+
+test: $(READY)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
+check: $(READY)
+	$(BIN)/snakemake -j$(JOBS) check
+
+publish: $(READY)
+	$(BIN)/snakemake -j$(JOBS) publish
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
+	$(BIN)/mypy
+
+format: $(READY)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	$(BIN)/snakefmt Snakefile workflow
+
+bench: $(READY)
+	$(BIN)/python -m benchmarks
+
+report: $(READY)
+	$(BIN)/snakemake -j$(JOBS) --report report.html
+
+# Config keys described from the schema; the tests fail if this is forgotten.
+docs: $(READY)
+	$(BIN)/python -m tests.generated_docs
+
+clean:
+	rm -rf .venv .snakemake results/targets results/measurements results/identifications \
+	  results/histories results/tables results/figures results/logs report.html
+
+$(READY): requirements.lock pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $(READY)

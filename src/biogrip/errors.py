@@ -1,0 +1,14 @@
+"""The one exception whose text is meant for the person at the keyboard."""
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BiogripError(Exception):
+    """Something the user can put right; its text says what was found and what is allowed."""
+
+
+def nearest(name: object, allowed: Iterable[str]) -> str:
+    """Return ``" Did you mean 'x'?"`` for the allowed name closest to `name`, else ``""``."""
+    close = get_close_matches(str(name), list(allowed), n=1, cutoff=0.5)
+    return f" Did you mean '{close[0]}'?" if close else ""
