@@ -1,0 +1,1 @@
+"""How the gripper turns while it squeezes a sample."""
