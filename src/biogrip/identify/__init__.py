@@ -1,0 +1,1 @@
+"""Finding the sample's parameters in a trace."""

@@ -1,0 +1,231 @@
+"""The paper's genetic algorithm (section 4), every reading of it a setting."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.identify.genome import Genome
+
+
+@dataclass(frozen=True)
+class GeneticSettings:
+    """How the population evolves.
+
+    Parameters
+    ----------
+    population
+        Individuals in a generation.
+    survivors
+        The best so many live on unchanged and are the parents.
+    mating
+        ``"pairs"``: the survivors form random disjoint pairs; ``"rank"``:
+        parents are drawn with a probability proportional to their rank.
+    first_cut, last_cut
+        Crossover point: the number of genes kept from the first parent is drawn
+        uniformly from this range; `last_cut` is at most the number of genes less one.
+    mutation_start
+        First generation in which children mutate.
+    mutation_probability
+        Share of children that mutate.
+    mutated_genes
+        Genes redrawn in a child that mutates.
+    patience
+        Stop after so many generations without a better best misfit.
+    min_generations, max_generations
+        Never stop before, always stop at.
+    """
+
+    population: int
+    survivors: int
+    mating: str
+    first_cut: int
+    last_cut: int
+    mutation_start: int
+    mutation_probability: float
+    mutated_genes: int
+    patience: int
+    min_generations: int
+    max_generations: int
+
+
+@dataclass(frozen=True)
+class History:
+    """What happened, generation by generation (the initial population is generation 0).
+
+    Parameters
+    ----------
+    best_misfit, median_misfit : (n_generations + 1,)
+        Misfit in rad of the best individual, and the median over the survivors.
+    best_parameters : (n_generations + 1, n_parameters)
+        Parameters of the best individual.
+    evaluations : (n_generations + 1,)
+        Misfits computed so far.
+    """
+
+    best_misfit: Array
+    median_misfit: Array
+    best_parameters: Array
+    evaluations: IntArray
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The answer of an identifier.
+
+    Parameters
+    ----------
+    parameters : (n_parameters,)
+        The best individual's.
+    misfit_rad
+        Its RMS misfit.
+    generations, evaluations
+        What it took.
+    stop_reason
+        ``"stalled"`` or ``"generation limit"``.
+    history
+        The way there.
+    """
+
+    parameters: Array
+    misfit_rad: float
+    generations: int
+    evaluations: int
+    stop_reason: str
+    history: History
+
+
+def genetic(
+    misfit: Callable[[Array], Array],
+    genome: Genome,
+    settings: GeneticSettings,
+    rng: np.random.Generator,
+) -> Identification:
+    """Identify a sample with the genetic algorithm.
+
+    Individuals are ranked on their misfit in single precision, ties broken by
+    the chromosome. Its 24 bits are far finer than noise can tell apart, and far
+    coarser than what differs between processors and BLAS libraries: the last
+    bits of a misfit cannot change which trajectory is taken.
+
+    Parameters
+    ----------
+    misfit
+        RMS misfit in rad of parameters of shape (n, n_parameters).
+    genome
+        What a chromosome may be.
+    settings
+        How the population evolves.
+    rng
+        The only source of randomness.
+    """
+    population = _rank(genome.draw(settings.population, rng), misfit, genome)
+    evaluations = settings.population
+    rows = [_record(population, settings, evaluations)]
+    generation = improved = 0
+    while True:
+        if generation >= settings.max_generations:
+            reason = "generation limit"
+            break
+        if generation >= settings.min_generations and generation - improved >= settings.patience:
+            reason = "stalled"
+            break
+        generation += 1
+        survivors = population.first(settings.survivors)
+        children = _cross(survivors.chromosomes, settings, rng)
+        if generation >= settings.mutation_start:
+            _mutate(children, genome, settings, rng)
+        evaluations += len(children)
+        best = population.ranking[0]
+        population = survivors.merged(_rank(children, misfit, genome))
+        if population.ranking[0] < best:
+            improved = generation
+        rows.append(_record(population, settings, evaluations))
+    chromosomes, best_misfit, median_misfit, counts = zip(*rows, strict=True)
+    history = History(
+        np.array(best_misfit),
+        np.array(median_misfit),
+        genome.decode(np.array(chromosomes)),
+        np.array(counts, dtype=np.int64),
+    )
+    return Identification(
+        history.best_parameters[-1],
+        float(history.best_misfit[-1]),
+        generation,
+        evaluations,
+        reason,
+        history,
+    )
+
+
+@dataclass(frozen=True)
+class _Population:
+    """Individuals, best first."""
+
+    chromosomes: IntArray
+    codes: IntArray
+    ranking: np.ndarray[tuple[int], np.dtype[np.float32]]
+
+    def first(self, count: int) -> "_Population":
+        return _Population(self.chromosomes[:count], self.codes[:count], self.ranking[:count])
+
+    def merged(self, other: "_Population") -> "_Population":
+        return _sorted(
+            np.concatenate((self.chromosomes, other.chromosomes)),
+            np.concatenate((self.codes, other.codes)),
+            np.concatenate((self.ranking, other.ranking)),
+        )
+
+
+def _rank(chromosomes: IntArray, misfit: Callable[[Array], Array], genome: Genome) -> _Population:
+    ranking = misfit(genome.decode(chromosomes)).astype(np.float32)
+    return _sorted(chromosomes, genome.code(chromosomes), ranking)
+
+
+def _sorted(chromosomes: IntArray, codes: IntArray, ranking: np.ndarray) -> _Population:
+    order = np.lexsort((codes, ranking))
+    return _Population(chromosomes[order], codes[order], ranking[order])
+
+
+def _record(
+    population: _Population, settings: GeneticSettings, evaluations: int
+) -> tuple[IntArray, float, float, int]:
+    ranking = population.ranking
+    median = float(ranking[settings.survivors // 2])
+    return population.chromosomes[0], float(ranking[0]), median, evaluations
+
+
+def _cross(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+    """Single-point crossover; both children of a pair are kept."""
+    wanted = settings.population - settings.survivors
+    pairs = -(-wanted // 2)
+    if settings.mating == "rank":
+        rank = np.arange(len(parents), 0, -1)
+        drawn = rng.choice(len(parents), size=(pairs, 2), p=rank / rank.sum())
+    else:
+        rounds = -(-2 * pairs // (len(parents) // 2 * 2))
+        shuffled = [rng.permutation(len(parents))[: len(parents) // 2 * 2] for _ in range(rounds)]
+        drawn = np.concatenate(shuffled)[: 2 * pairs].reshape(pairs, 2)
+    genes = parents.shape[1]
+    last = min(settings.last_cut, genes - 1)
+    cut = rng.integers(min(settings.first_cut, last), last, size=(pairs, 1), endpoint=True)
+    mother, father = parents[drawn[:, 0]], parents[drawn[:, 1]]
+    from_mother = np.arange(genes) < cut
+    children = np.concatenate(
+        (np.where(from_mother, mother, father), np.where(from_mother, father, mother))
+    )
+    return children[:wanted]
+
+
+def _mutate(
+    children: IntArray,
+    genome: Genome,
+    settings: GeneticSettings,
+    rng: np.random.Generator,
+) -> None:
+    """Redraw genes of some children in place."""
+    chosen = np.flatnonzero(rng.random(len(children)) < settings.mutation_probability)
+    for _ in range(settings.mutated_genes):
+        gene = rng.integers(genome.genes, size=len(chosen))
+        children[chosen, gene] = rng.integers(genome.low[gene], genome.high[gene], endpoint=True)

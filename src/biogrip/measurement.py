@@ -1,0 +1,59 @@
+"""What the instrument records: the rotation with noise on it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Noise added to the noise-free rotation.
+
+    Parameters
+    ----------
+    kind
+        ``"gaussian"`` or ``"uniform"``.
+    level
+        Standard deviation as a share of the reference, for either kind.
+    reference
+        ``"peak"``: the largest noise-free rotation; ``"signal"``: the
+        noise-free rotation at each instant.
+    """
+
+    kind: str
+    level: float
+    reference: str
+
+
+def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Array:
+    """Return a noisy copy of a trace.
+
+    Parameters
+    ----------
+    rotation_rad : (n_samples,)
+        Noise-free rotation.
+    noise
+        What to add.
+    rng
+        The stream to draw from.
+
+    Returns
+    -------
+    (n_samples,)
+    """
+    magnitude = np.abs(rotation_rad)
+    scale = magnitude if noise.reference == "signal" else magnitude.max()
+    if noise.kind == "uniform":
+        half_width = np.sqrt(3.0)
+        unit = rng.uniform(-half_width, half_width, size=len(rotation_rad))
+    else:
+        unit = rng.standard_normal(len(rotation_rad))
+    noisy: Array = rotation_rad + noise.level * scale * unit
+    return noisy
+
+
+def rms(values: Array) -> float:
+    """Root mean square over the samples."""
+    return float(np.sqrt(np.mean(np.square(values))))
