@@ -1,0 +1,174 @@
+"""The ``biogrip`` command: one subcommand per stage, the same that the workflow calls."""
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from biogrip import __version__
+from biogrip.errors import BiogripError
+
+# Imports of stages stay inside their command: a job pays only for what it uses.
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; return its exit status."""
+    options = _parser().parse_args(arguments)
+    try:
+        options.command(options)
+    except BiogripError as error:
+        print(f"biogrip: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="biogrip", description=__doc__)
+    parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
+    stages = parser.add_subparsers(required=True, metavar="STAGE")
+
+    target = _stage(stages, "target", _target, "simulate the noise-free response of a case")
+    _outputs(target, "output")
+
+    measurement = _stage(stages, "measurement", _measurement, "add noise to a target")
+    _seeds(measurement)
+    _inputs(measurement, "target")
+    _outputs(measurement, "output")
+
+    identification = _stage(
+        stages, "identification", _identification, "identify the sample in noisy traces"
+    )
+    _seeds(identification)
+    _inputs(identification, "measurements")
+    _outputs(identification, "output", "history")
+
+    collection = _stage(stages, "collection", _collection, "join the batches of a case")
+    _inputs(collection, "batches", "histories", many=True)
+    _outputs(collection, "output", "history")
+
+    table = _stage(stages, "table", _table, "write a table as CSV, Markdown, LaTeX and HTML")
+    table.add_argument("name", help="which table")
+    _inputs(table, "inputs", many=True)
+    _outputs(table, "output")
+
+    figure = _stage(stages, "figure", _figure, "draw a figure as PNG and PDF")
+    figure.add_argument("name", help="which figure")
+    _inputs(figure, "inputs", many=True)
+    _outputs(figure, "output")
+
+    compare = stages.add_parser("compare", help="compare regenerated tables with published ones")
+    compare.set_defaults(command=_compare)
+    compare.add_argument("published", type=Path, help="folder of published tables")
+    compare.add_argument("now", type=Path, help="folder of regenerated tables")
+
+    reference = stages.add_parser("reference", help="print the description of every config key")
+    reference.set_defaults(command=_reference)
+    reference.add_argument("config", type=Path, help="YAML file that gives the defaults")
+    return parser
+
+
+def _stage(stages: Any, name: str, command: Any, text: str) -> argparse.ArgumentParser:
+    parser: argparse.ArgumentParser = stages.add_parser(name, help=text, description=text)
+    parser.set_defaults(command=command)
+    parser.add_argument(
+        "--settings",
+        type=_settings,
+        required=True,
+        help="the config keys it uses, as JSON",
+    )
+    return parser
+
+
+def _settings(text: str) -> dict[str, Any]:
+    settings = json.loads(text)
+    if not isinstance(settings, dict):
+        raise ValueError(text)
+    return settings
+
+
+def _seeds(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--seeds", required=True, help="batch of seeds, e.g. seeds_0-24")
+
+
+def _inputs(parser: argparse.ArgumentParser, *names: str, many: bool = False) -> None:
+    for name in names:
+        if many:
+            parser.add_argument(f"--{name}", type=Path, nargs="*", default=[], help="input files")
+        else:
+            parser.add_argument(f"--{name}", type=Path, required=True, help="input file")
+
+
+def _outputs(parser: argparse.ArgumentParser, *names: str) -> None:
+    for name in names:
+        parser.add_argument(f"--{name}", type=Path, required=True, help="output file")
+
+
+def _batch(name: str) -> list[int]:
+    from biogrip.study.batches import parse_batch
+
+    batch = parse_batch(name)
+    if batch is None or batch.last < batch.first:
+        raise BiogripError(f"--seeds: found '{name}', allowed is seeds_FIRST-LAST.")
+    return batch.seeds
+
+
+def _target(options: argparse.Namespace) -> None:
+    from biogrip.stages import target
+
+    target.run(options.settings, options.output)
+
+
+def _measurement(options: argparse.Namespace) -> None:
+    from biogrip.stages import measurement
+
+    measurement.run(options.settings, _batch(options.seeds), options.target, options.output)
+
+
+def _identification(options: argparse.Namespace) -> None:
+    from biogrip.stages import identification
+
+    identification.run(
+        options.settings,
+        _batch(options.seeds),
+        options.measurements,
+        options.output,
+        options.history,
+    )
+
+
+def _collection(options: argparse.Namespace) -> None:
+    from biogrip.stages import collection
+
+    collection.run(
+        options.settings,
+        options.batches,
+        options.histories,
+        options.output,
+        options.history,
+    )
+
+
+def _table(options: argparse.Namespace) -> None:
+    from biogrip.tables import run
+
+    run(options.name, options.settings, options.inputs, options.output)
+
+
+def _figure(options: argparse.Namespace) -> None:
+    from biogrip.figures import run
+
+    run(options.name, options.settings, options.inputs, options.output)
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from biogrip.tables.comparison import compare
+
+    print(compare(options.published, options.now))
+
+
+def _reference(options: argparse.Namespace) -> None:
+    from biogrip.study.reference import reference
+
+    print(reference(options.config))

@@ -1,0 +1,61 @@
+"""Figure 8: how the best misfit falls from generation to generation."""
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from biogrip.figures.results import read_history
+from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
+from biogrip.tables.errors import at_noise_floor, read_identifications
+
+_TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+
+
+def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
+    """Draw by how much every seed's misfit exceeds its noise, and of the best.
+
+    Parameters
+    ----------
+    settings
+        ``title``, ``noise_floor_tolerance``, ``mutation_start``.
+    inputs
+        Identifications (CSV) and histories (Parquet) of the case.
+    """
+    found = read_identifications(inputs[0])
+    history = read_history(inputs[1])
+    noise = found.set_index("seed")["noise_rms_rad"]
+    unit = noise if (noise > 0).all() else noise * 0 + found["misfit_rad"].min()
+    best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
+    reached = at_noise_floor(found, settings["noise_floor_tolerance"])
+    drawn = figure(COLUMN_IN, 2.5)
+    axes = drawn.subplots()
+    for seed, rows in history.groupby("seed"):
+        excess = 100 * (rows["best_misfit_rad"] / unit[seed] - 1)
+        style: dict[str, Any] = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.7}
+        if seed == best:
+            style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+        axes.plot(rows["generation"], excess, **style)
+    axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=f"all {len(found)} seeds")
+    axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
+    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label="noise in the trace")
+    axes.axvline(settings["mutation_start"], color=TARGET, linestyle=":", linewidth=0.8)
+    axes.annotate(
+        "mutation starts",
+        (settings["mutation_start"], 0.62),
+        xycoords=("data", "axes fraction"),
+        xytext=(3, 0),
+        textcoords="offset points",
+        fontsize=7,
+    )
+    axes.set_yscale("symlog", linthresh=1, linscale=0.5)
+    axes.set_ylim(bottom=-0.8)
+    ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlim(0, history["generation"].max())
+    axes.set_xlabel("generation")
+    axes.set_ylabel("best misfit above noise (%)")
+    axes.set_title(f"{settings['title']}: {reached.sum():.0f} of {len(found)} at the noise floor")
+    axes.legend(loc="upper right")
+    return drawn

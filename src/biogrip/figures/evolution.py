@@ -1,0 +1,59 @@
+"""Figure 10: the best individual's parameters from generation to generation."""
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from biogrip.figures.results import SYMBOLS, read_history
+from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
+from biogrip.sample import MODELS
+from biogrip.tables.errors import read_identifications
+
+
+def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
+    """Draw every parameter's evolution for all seeds and for the best.
+
+    Parameters
+    ----------
+    settings
+        ``title``, ``model``, ``parameters``, ``published``.
+    inputs
+        Identifications (CSV) and histories (Parquet) of the case.
+    """
+    found = read_identifications(inputs[0])
+    history = read_history(inputs[1])
+    best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
+    parameters = MODELS[settings["model"]].parameters
+    identified = settings["published"].get("identified", {})
+    drawn = figure(PAGE_IN, 3.9)
+    grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
+    for axes, parameter in zip(grid, parameters, strict=False):
+        for seed, rows in history.groupby("seed"):
+            style = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.6}
+            if seed == best:
+                style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+            axes.step(rows["generation"], rows[parameter.column], where="post", **style)
+        if settings["parameters"][parameter.name] > 0:
+            axes.axhline(settings["parameters"][parameter.name], color=TARGET, linestyle="--")
+        if parameter.name in identified:
+            axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
+        axes.set_yscale("log")
+        axes.set_ylabel(f"{SYMBOLS[parameter.name]} ({parameter.unit})")
+        axes.set_xlim(0, history["generation"].max())
+    for axes in grid[-(len(grid) // 2) :]:
+        axes.set_xlabel("generation")
+    for axes in grid[len(parameters) :]:
+        axes.set_axis_off()
+    lines = [
+        grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
+        grid[0].plot([], [], color=FITTED)[0],
+        grid[0].plot([], [], color=TARGET, linestyle="--")[0],
+    ]
+    labels = [f"all {len(found)} seeds", f"seed {best}, lowest misfit", "target"]
+    if identified:
+        lines.append(grid[0].plot([], [], color=PAPER, linestyle=":")[0])
+        labels.append("identified in the paper")
+    drawn.legend(lines, labels, loc="outside upper center", ncols=4)
+    drawn.suptitle(settings["title"], x=0.01, ha="left", fontsize=8)
+    return drawn

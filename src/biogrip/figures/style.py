@@ -1,0 +1,67 @@
+"""One look for all figures: legible in a paper's column, safe for colour-blind eyes."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from biogrip.files import written_whole
+
+COLUMN_IN = 3.5
+PAGE_IN = 7.2
+
+# Okabe and Ito's palette.
+BLACK, GREY = "#000000", "#999999"
+BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
+PURPLE, SKY, YELLOW = "#CC79A7", "#56B4E9", "#E69F00"
+
+# What a colour means, everywhere.
+TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
+
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.titlelocation": "left",
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.formatter.use_mathtext": True,
+    "lines.linewidth": 1.2,
+    "legend.frameon": False,
+    "legend.fontsize": 7,
+    "legend.handlelength": 1.6,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "savefig.dpi": 200,
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw and save in the study's style."""
+    with mpl.rc_context(_STYLE):
+        yield
+
+
+def figure(width_in: float, height_in: float) -> Figure:
+    """Return an empty figure of a size in inches."""
+    return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def save(drawn: Figure, output: Path) -> None:
+    """Write a figure as PNG, and beside it as PDF, without dates."""
+    with written_whole(output) as scratch:
+        drawn.savefig(scratch, format="png", metadata={"Software": None})
+    with written_whole(output.with_suffix(".pdf")) as scratch:
+        drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
+
+
+def panel(axes: Axes, letter: str, title: str = "") -> None:
+    """Label a panel."""
+    axes.set_title(rf"$\bf{{{letter}}}$  {title}")

@@ -1,0 +1,68 @@
+"""Stage 4: the batches of a case put together, a row per seed."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from biogrip.errors import BiogripError
+from biogrip.files import written_whole
+from biogrip.identify.records import COLUMNS
+
+
+def run(
+    settings: dict[str, Any],
+    batches: list[Path],
+    histories: list[Path],
+    output: Path,
+    history: Path,
+) -> None:
+    """Join batches in the order of their seeds.
+
+    Parameters
+    ----------
+    settings
+        ``seeds``: how many seeds the study has; batches may hold more, left
+        from a larger study.
+    batches, histories
+        Files of the identification stage, in the order of their seeds.
+    output, history
+        The same for the whole case.
+
+    Raises
+    ------
+    BiogripError
+        If a seed is missing or comes twice.
+    """
+    rows = [row for batch in batches for row in _rows(batch) if int(row[2]) < settings["seeds"]]
+    if [int(row[2]) for row in rows] != list(range(settings["seeds"])):
+        names = ", ".join(str(batch) for batch in batches)
+        raise BiogripError(
+            f"{names}: do not hold each of the seeds 0 to {settings['seeds'] - 1} once. "
+            "Delete them and run again."
+        )
+    with written_whole(output) as scratch, scratch.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(rows)
+    with written_whole(history) as scratch:
+        schema = pq.read_schema(histories[0])
+        with pq.ParquetWriter(scratch, schema) as joined:
+            for batch in histories:
+                table = pq.read_table(batch)
+                joined.write_table(table.filter(pc.less(table["seed"], settings["seeds"])))
+
+
+def _rows(batch: Path) -> list[list[str]]:
+    try:
+        with batch.open(newline="") as stream:
+            header, *rows = csv.reader(stream)
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{batch}: cannot be read: {error}.") from error
+    if tuple(header) != COLUMNS:
+        raise BiogripError(
+            f"{batch}, line 1: found {', '.join(header)}; wanted {', '.join(COLUMNS)}."
+        )
+    return rows

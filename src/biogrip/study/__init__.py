@@ -1,0 +1,1 @@
+"""The study: what the config says, checked and typed."""

@@ -1,0 +1,152 @@
+"""The study as its config describes it."""
+
+import copy
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from biogrip.errors import BiogripError
+from biogrip.sample import MODELS, SampleModel
+from biogrip.study.source import read_places
+from biogrip.study.validation import OVERRIDABLE, check, with_numbers
+
+
+@dataclass(frozen=True)
+class Case:
+    """One sample of the study.
+
+    Parameters
+    ----------
+    name, title
+        Name in files; name in print.
+    model
+        Constitutive model.
+    parameters
+        True values by name, SI units.
+    blocks
+        The case's gripper, protocol, measurement, search_range and
+        genetic_algorithm, as plain config blocks.
+    published
+        What the paper reports, or nothing.
+    """
+
+    name: str
+    title: str
+    model: SampleModel
+    parameters: dict[str, float]
+    blocks: dict[str, dict[str, Any]]
+    published: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study.
+
+    Parameters
+    ----------
+    config
+        The whole config, for tables that show it.
+    cases
+        By name.
+    """
+
+    config: dict[str, Any]
+    cases: dict[str, Case]
+
+    @property
+    def seeds(self) -> int:
+        """Number of noisy traces a case."""
+        return int(self.config["seeds"])
+
+    @property
+    def batch_size(self) -> int:
+        """Number of seeds a job."""
+        return int(self.config["batch_size"])
+
+
+def load_study(
+    config: Mapping[str, Any],
+    files: Sequence[str | Path],
+    command_line: Iterable[Hashable] = (),
+) -> Study:
+    """Check and type a merged config.
+
+    Parameters
+    ----------
+    config
+        The config in force: all files, the later laid over the earlier.
+    files
+        The files it came from, to name lines in messages.
+    command_line
+        Top-level keys that were set on the command line.
+
+    Raises
+    ------
+    BiogripError
+        If anything in the config cannot be used.
+    """
+    places = read_places(files, command_line)
+    complete = _fill_in(with_numbers(config))
+    check(complete, places)
+    cases = {name: _case(name, block) for name, block in complete["cases"].items()}
+    return Study(complete, cases)
+
+
+def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
+    """Give every case the study's blocks under its own; drop cases set to nothing."""
+    cases = config.get("cases")
+    if not isinstance(cases, dict):
+        return config
+    filled = {}
+    for name, case in cases.items():
+        if case is None:
+            continue
+        if isinstance(case, dict):
+            case = dict(case)
+            for block in OVERRIDABLE:
+                if block in config:
+                    case[block] = _overlaid(config[block], case.get(block, {}))
+        filled[name] = case
+    return {**config, "cases": filled}
+
+
+def _overlaid(base: Any, over: Any) -> Any:
+    if isinstance(base, dict) and isinstance(over, dict):
+        merged = copy.deepcopy(base)
+        for key, value in over.items():
+            merged[key] = _overlaid(merged[key], value) if key in merged else value
+        return merged
+    return over
+
+
+def _case(name: str, block: dict[str, Any]) -> Case:
+    model = MODELS[block["sample"]["model"]]
+    return Case(
+        name=name,
+        title=block.get("title", name),
+        model=model,
+        parameters={symbol: float(block["sample"][symbol]) for symbol in model.names},
+        blocks={key: block[key] for key in OVERRIDABLE},
+        published=block.get("published", {}),
+    )
+
+
+def check_results_folder(folder: Path) -> None:
+    """Make the results folder and see that it can be written to.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot.
+    """
+    probe = folder / ".writable"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise BiogripError(
+            f"{folder}: results cannot be written here: {error.strerror}. Allowed is a folder "
+            "that you may write to, on a disk with space."
+        ) from error

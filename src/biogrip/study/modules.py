@@ -1,0 +1,57 @@
+"""Which source files a stage is made of, so that the workflow can track them.
+
+Snakemake does not follow imports. Here every ``import`` statement inside the
+package is followed, without running anything.
+"""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import biogrip
+
+_PACKAGE = Path(biogrip.__file__).parent
+
+
+def source_files(module: str) -> list[str]:
+    """Files of a module and of all package modules that it imports, sorted.
+
+    Parameters
+    ----------
+    module
+        For example ``"biogrip.stages.target"``.
+    """
+    seen: set[str] = set()
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += _imports(name)
+    return sorted(str(_file(name)) for name in seen)
+
+
+def _file(module: str) -> Path | None:
+    path = _PACKAGE.joinpath(*module.split(".")[1:])
+    for file in (path.with_suffix(".py"), path / "__init__.py"):
+        if file.is_file():
+            return file
+    return None
+
+
+@cache
+def _imports(module: str) -> list[str]:
+    file = _file(module)
+    assert file is not None
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            found.add(node.module)
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+    return [name for name in sorted(found) if _is_ours(name)]
+
+
+def _is_ours(name: str) -> bool:
+    return name.startswith("biogrip.") and _file(name) is not None

@@ -1,0 +1,265 @@
+"""Checks a study's config, and says what is wrong so that it can be put right."""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from functools import cache
+from importlib import resources
+from itertools import islice
+from typing import Any
+
+import yaml
+from jsonschema import Draft202012Validator
+from jsonschema.exceptions import ValidationError
+from jsonschema.validators import extend
+
+from biogrip.errors import BiogripError, nearest
+from biogrip.sample import MODELS
+from biogrip.study.source import ConfigFiles, KeyPath
+
+Problem = tuple[KeyPath, str]
+
+OVERRIDABLE = (
+    "gripper",
+    "protocol",
+    "measurement",
+    "search_range",
+    "genetic_algorithm",
+)
+"""Blocks that hold for all cases, and that a case may change for itself."""
+
+# YAML 1.1 reads 1e-3 as text, for want of a dot; people mean a number.
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
+_PROSE = {"title", "error_percent"}
+_SHOWN = 6
+
+_Validator = extend(
+    Draft202012Validator,
+    type_checker=Draft202012Validator.TYPE_CHECKER.redefine(
+        "integer",
+        lambda _, value: isinstance(value, int) and not isinstance(value, bool),
+    ),
+)
+_MOST_SAMPLES = 10_000_000
+
+
+@cache
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of a study."""
+    text = resources.files("biogrip.study").joinpath("schema.yaml").read_text(encoding="utf-8")
+    loaded: dict[str, Any] = yaml.safe_load(text)
+    return loaded
+
+
+def with_numbers(value: Any) -> Any:
+    """Return a copy of a config in which text like ``1e-3`` has become a number."""
+    if isinstance(value, Mapping):
+        return {k: v if k in _PROSE else with_numbers(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [with_numbers(item) for item in value]
+    if isinstance(value, str) and _NUMBER.fullmatch(value.strip()):
+        number = float(value)
+        return int(number) if number.is_integer() else number
+    return value
+
+
+def check(config: Mapping[str, Any], files: ConfigFiles) -> None:
+    """Check a complete config, in which every case has its blocks filled in.
+
+    Raises
+    ------
+    BiogripError
+        Names file, line and key of every problem (the first few, where there
+        are many), what was found and what is allowed.
+    """
+    problems = list(_schema_problems(config)) or list(_meaning_problems(config))
+    seen: dict[str, str] = {}
+    for path, text in problems:
+        # A block that a case inherits is wrong once, not once a case.
+        place = files.place(_origin(path, files))
+        seen.setdefault(f"{place}: {_dotted(_origin(path, files))}: {text}", place)
+    if seen:
+        shown = list(islice(seen, _SHOWN))
+        if len(seen) > _SHOWN:
+            shown.append(f"... and {len(seen) - _SHOWN} more.")
+        raise BiogripError("The study's configuration cannot be used.\n" + "\n".join(shown))
+
+
+def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
+    """Path of the study-wide key that a case inherits, or the path itself."""
+    inherits = len(path) > 2 and path[0] == "cases" and path[2] in OVERRIDABLE
+    own = any(path[:4] in lines for _, lines in files.lines)
+    return path[2:] if inherits and not own else path
+
+
+def _dotted(path: KeyPath) -> str:
+    text = ""
+    for part in path:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or "the file"
+
+
+def _schema_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
+    errors = _Validator(schema()).iter_errors(config)
+    for error in sorted(errors, key=lambda error: [str(part) for part in error.absolute_path]):
+        yield from _explain(tuple(error.absolute_path), error)
+    yield from _not_finite((), config)
+
+
+def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
+    found = error.instance
+    limit = error.validator_value
+    match error.validator:
+        case "additionalProperties":
+            allowed = list(error.schema["properties"])
+            for key in found:
+                if key not in allowed:
+                    hint = nearest(key, allowed)
+                    yield (
+                        (*path, key),
+                        f"unknown key.{hint} Allowed here: {', '.join(allowed)}.",
+                    )
+        case "required":
+            missing = next(key for key in limit if f"'{key}'" in error.message)
+            yield (*path, missing), "is missing and has no default."
+        case "propertyNames" | "pattern":
+            yield (
+                (*path, found),
+                "not a usable case name: a letter, then up to 63 letters, digits, '_' or '-' "
+                "(it names files).",
+            )
+        case "type":
+            wanted = {
+                "object": "a block of keys",
+                "array": "a list",
+                "string": "text",
+            }.get(limit, f"a{'n' if limit == 'integer' else ''} {limit}")
+            yield path, f"found {_shown(found)}, allowed is {wanted}."
+        case "enum":
+            hint = nearest(found, limit)
+            yield (
+                path,
+                f"found {_shown(found)}.{hint} Allowed: {', '.join(map(str, limit))}.",
+            )
+        case "minItems" | "maxItems":
+            bound = "at least" if error.validator == "minItems" else "at most"
+            yield (
+                path,
+                f"found a list of {len(found)}, allowed are {bound} {limit} items.",
+            )
+        case "minProperties":
+            yield path, "is empty; at least one is needed."
+        case "minLength" | "maxLength":
+            yield path, f"found {_shown(found)}, allowed are 1 to 60 characters."
+        case _:
+            yield path, f"found {_shown(found)}, allowed is {_range(error.schema)}."
+
+
+def _range(leaf: Mapping[str, Any]) -> str:
+    bounds = {
+        "exclusiveMinimum": "greater than",
+        "minimum": "at least",
+        "exclusiveMaximum": "less than",
+        "maximum": "at most",
+    }
+    unit = f" {leaf['unit']}" if "unit" in leaf else ""
+    return " and ".join(f"{word} {leaf[key]}" for key, word in bounds.items() if key in leaf) + unit
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return "nothing"
+    if isinstance(value, Mapping):
+        return "a block of keys"
+    if isinstance(value, list):
+        return "a list"
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _not_finite(path: KeyPath, value: Any) -> Iterator[Problem]:
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            yield from _not_finite((*path, key), inner)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _not_finite((*path, index), inner)
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield path, f"found {value}, allowed is a finite number."
+
+
+def _meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
+    """Problems that no schema of single keys can see."""
+    for name, case in config["cases"].items():
+        path = ("cases", name)
+        yield from _sample_problems((*path, "sample"), case["sample"])
+        yield from _genetic_problems((*path, "genetic_algorithm"), case["genetic_algorithm"])
+        yield from _range_problems((*path, "search_range"), case["search_range"])
+        yield from _sampling_problems(path, case)
+    for index, key in enumerate(config["reconstructed"]):
+        if not _exists(config, key):
+            yield (
+                ("reconstructed", index),
+                f"found '{key}', allowed is a key of this study.",
+            )
+
+
+def _sample_problems(path: KeyPath, sample: Mapping[str, Any]) -> Iterator[Problem]:
+    names = MODELS[sample["model"]].names
+    for name in sample:
+        if name != "model" and name not in names:
+            text = f"is no parameter of {sample['model']}, which has {', '.join(names)}."
+            yield (*path, name), text
+    for name in names:
+        if name not in sample:
+            yield (
+                (*path, name),
+                f"is missing: {sample['model']} needs {', '.join(names)}.",
+            )
+
+
+def _genetic_problems(path: KeyPath, settings: Mapping[str, Any]) -> Iterator[Problem]:
+    for low, high, below in (
+        ("survivors", "population", True),
+        ("first_cut", "last_cut", False),
+        ("min_generations", "max_generations", False),
+    ):
+        wrong = settings[low] >= settings[high] if below else settings[low] > settings[high]
+        if wrong:
+            word = "less than" if below else "at most"
+            text = f"found {settings[low]}, allowed is {word} {high}, which is {settings[high]}."
+            yield (*path, low), text
+
+
+def _range_problems(path: KeyPath, ranges: Mapping[str, Any]) -> Iterator[Problem]:
+    for name, genes in ranges.items():
+        for gene, (low, high) in genes.items():
+            if low > high:
+                yield (
+                    (*path, name, gene),
+                    f"found [{low}, {high}], allowed is [lowest, highest].",
+                )
+
+
+def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    phases = case["protocol"]["phases"]
+    if not any(phase["torque_Nm"] for phase in phases):
+        text = "no phase has a torque, so nothing would move; allowed is at least one above 0 N m."
+        yield (*path, "protocol", "phases"), text
+    samples = sum(phase["duration_s"] for phase in phases) * case["measurement"]["rate_Hz"] + 1
+    needed = len(MODELS[case["sample"]["model"]].names) + 1
+    if not needed <= samples <= _MOST_SAMPLES:
+        text = (
+            f"found {case['measurement']['rate_Hz']}, which gives {samples:.6g} samples over the "
+            f"protocol; allowed are {needed} to {_MOST_SAMPLES}."
+        )
+        yield (*path, "measurement", "rate_Hz"), text
+
+
+def _exists(config: Mapping[str, Any], key: str) -> bool:
+    block: Any = config
+    for part in key.split("."):
+        if not isinstance(block, Mapping) or part not in block:
+            return False
+        block = block[part]
+    return True

@@ -1,0 +1,96 @@
+"""How a table looks: the same numbers as CSV to compute with and as text to read."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+
+import pandas as pd
+
+from biogrip.files import write_text
+
+Cell = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column.
+
+    Parameters
+    ----------
+    name, heading
+        In the CSV; in print.
+    digits
+        Significant digits in print, for numbers.
+    """
+
+    name: str
+    heading: str
+    digits: int = 3
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table.
+
+    Parameters
+    ----------
+    caption
+        What it shows, in a sentence or two.
+    columns, rows
+        Its contents; None is an empty cell.
+    """
+
+    caption: str
+    columns: tuple[Column, ...]
+    rows: Sequence[tuple[Cell, ...]]
+
+
+def write(table: Table, output: Path) -> None:
+    """Write a table as CSV with six significant digits, and beside it .md, .tex and .html."""
+    names = [column.name for column in table.columns]
+    raw = pd.DataFrame([[_text(cell, 6) for cell in row] for row in table.rows], columns=names)
+    shown = pd.DataFrame(
+        [
+            [_text(cell, column.digits) for cell, column in zip(row, table.columns, strict=True)]
+            for row in table.rows
+        ],
+        columns=[column.heading for column in table.columns],
+    )
+    markdown = shown.to_markdown(index=False, disable_numparse=True)
+    latex = shown.to_latex(
+        index=False,
+        escape=True,
+        caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
+        label=f"tab:{output.stem}",
+        column_format="l" * len(names),
+    )
+    write_text(output, raw.to_csv(index=False, lineterminator="\n"))
+    write_text(output.with_suffix(".md"), f"{table.caption}\n\n{markdown}\n")
+    write_text(output.with_suffix(".tex"), latex)
+    write_text(output.with_suffix(".html"), _page(table.caption, shown))
+
+
+def _text(cell: Cell, digits: int) -> str:
+    if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+        return ""
+    if isinstance(cell, float):
+        # Print rounds what the CSV shows, so that no table disagrees with its own
+        # digits; adding zero turns -0 into 0.
+        shown = float(f"{cell:.6g}")
+        return f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
+    return str(cell)
+
+
+def _page(caption: str, shown: pd.DataFrame) -> str:
+    style = (
+        "body{font-family:sans-serif;margin:1.5em}table{border-collapse:collapse}"
+        "th,td{padding:.3em .7em;border-bottom:1px solid #ccc;text-align:left}"
+        "th{border-bottom:2px solid #333}p{max-width:60em}"
+    )
+    body = shown.to_html(index=False, border=0)
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><style>{style}</style>'
+        f"</head><body>\n<p>{escape(caption)}</p>\n{body}\n</body></html>\n"
+    )

@@ -1,0 +1,96 @@
+"""Targets and measurements as files."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.files import written_whole
+
+TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad")
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Noisy traces of one case.
+
+    Parameters
+    ----------
+    time_s : (n_samples,)
+        Uniform sampling instants.
+    target_rad : (n_samples,)
+        The trace without noise.
+    rotation_rad
+        The noisy trace of each seed, (n_samples,) each.
+    """
+
+    time_s: Array
+    target_rad: Array
+    rotation_rad: dict[int, Array]
+
+
+def write_target(path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array) -> None:
+    """Write a noise-free trace as CSV.
+
+    The rotation is written to nine significant digits: fewer than those in which
+    two processors differ, more than any instrument gives.
+    """
+    with written_whole(path) as scratch, scratch.open("w", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(TARGET_COLUMNS)
+        for t, torque, phi in zip(time_s, torque_Nm, rotation_rad, strict=True):
+            writer.writerow((f"{t:.10g}", f"{torque:.10g}", f"{phi:.8e}"))
+
+
+def read_target(path: Path) -> tuple[Array, Array, Array]:
+    """Read time, torque and rotation of a target written by `write_target`.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing or is no target.
+    """
+    try:
+        with path.open() as stream:
+            header = tuple(stream.readline().strip().split(","))
+            if header != TARGET_COLUMNS:
+                raise BiogripError(
+                    f"{path}, line 1: found the columns {', '.join(header)}; "
+                    f"a target has {', '.join(TARGET_COLUMNS)}."
+                )
+            time_s, torque, rotation = np.loadtxt(stream, delimiter=",", ndmin=2).T
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
+    return time_s, torque, rotation
+
+
+def write_measurements(path: Path, measurements: Measurements) -> None:
+    """Write noisy traces as Parquet: time_s, target_rad, then seed_0, seed_1, ..."""
+    columns = {"time_s": measurements.time_s, "target_rad": measurements.target_rad}
+    columns |= {f"seed_{seed}": trace for seed, trace in measurements.rotation_rad.items()}
+    with written_whole(path) as scratch:
+        pq.write_table(pa.table(columns), scratch, use_dictionary=False)
+
+
+def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
+    """Read noisy traces, of all seeds or of some.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing, damaged, or lacks a seed.
+    """
+    wanted = None if seeds is None else ["time_s", "target_rad", *(f"seed_{s}" for s in seeds)]
+    try:
+        table = pq.read_table(path, columns=wanted)
+        columns = {name: table[name].to_numpy() for name in wanted or table.column_names}
+        time_s, target = columns.pop("time_s"), columns.pop("target_rad")
+    except (OSError, KeyError, pa.ArrowInvalid) as error:
+        raise BiogripError(f"{path}: cannot be read as measurements: {error}.") from error
+    traces = {int(name.removeprefix("seed_")): trace for name, trace in columns.items()}
+    return Measurements(time_s, target, traces)
