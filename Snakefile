@@ -1,0 +1,30 @@
+"""The paper's numerical study, from targets to tables and figures."""
+
+from snakemake.utils import min_version
+
+min_version("9.10")
+
+
+report: "workflow/report/study.rst"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/traces.smk"
+include: "workflow/rules/identification.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/figures.smk"
+include: "workflow/rules/check.smk"
+
+
+rule all:
+    default_target: True
+    input:
+        targets=collect("results/targets/{case}.csv", case=CASES),
+        identifications=collect("results/identifications/{case}.csv", case=CASES),
+        tables=collect("results/tables/{table}.csv", table=TABLES),
+        figures=collect("results/figures/{figure}.png", figure=FIGURES),
+
+
+rule all_tables:
+    input:
+        collect("results/tables/{table}.csv", table=TABLES),

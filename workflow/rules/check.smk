@@ -1,0 +1,52 @@
+"""The published results: compared with the default study run afresh, or renewed from it."""
+
+PUBLISHED = Path(workflow.basedir) / "results" / "published"
+
+# The default study, whatever this run was configured with; nothing of it is kept.
+RUN_AFRESH = (
+    "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
+    "snakemake -j {threads} --snakefile {params.snakefile:q} "
+    '--directory "$scratch" --quiet progress rules -- {params.targets} >> {log:q} 2>&1'
+)
+
+
+# Its output is never kept: a check that was not run says nothing.
+rule check:
+    input:
+        published=PUBLISHED / "tables",
+        code=source_files("biogrip.tables.comparison"),
+    output:
+        touch(temp("results/logs/check.done")),
+    log:
+        "results/logs/check.log",
+    conda:
+        "../envs/biogrip.yaml"
+    threads: workflow.cores
+    params:
+        snakefile=workflow.main_snakefile,
+        targets="all_tables",
+    message:
+        "Running the default study afresh and comparing its tables with the published ones"
+    shell:
+        f"{RUN_AFRESH}; "
+        'biogrip compare {input.published:q} "$scratch/results/tables" 2>> {log:q} | tee -a {log:q}'
+
+
+rule publish:
+    output:
+        touch(temp("results/logs/publish.done")),
+    log:
+        "results/logs/publish.log",
+    conda:
+        "../envs/biogrip.yaml"
+    threads: workflow.cores
+    params:
+        snakefile=workflow.main_snakefile,
+        targets="all",
+        published=PUBLISHED,
+    message:
+        "Running the default study afresh and publishing its tables and figures"
+    shell:
+        f"{RUN_AFRESH}; "
+        "mkdir -p {params.published:q}; rm -rf {params.published:q}/*; "
+        'cp -r "$scratch/results/tables" "$scratch/results/figures" {params.published:q}'

@@ -1,0 +1,52 @@
+"""The study that all rules work on."""
+
+import shlex
+import sys
+from pathlib import Path
+
+from snakemake.settings.types import ExecMode
+
+from biogrip.errors import BiogripError
+from biogrip.study.config import check_results_folder, load_study
+from biogrip.study.locks import take_over_dead_run
+from biogrip.study.modules import source_files
+from biogrip.study.plan import Plan
+from biogrip.study.source import read_places
+
+DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
+
+# Rules find the biogrip command of the Python that runs Snakemake, activated or not.
+COMMANDS = shlex.quote(str(Path(sys.executable).parent))
+shell.prefix(f"set -euo pipefail; PATH={COMMANDS}:$PATH; ")
+
+# Leaving with the message alone keeps Snakemake's stack out of it.
+try:
+    read_places([DEFAULT_CONFIG])
+except BiogripError as error:
+    sys.exit(f"biogrip: {error}")
+
+
+configfile: DEFAULT_CONFIG
+
+
+try:
+    STUDY = load_study(
+        config,
+        files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
+        command_line=workflow.config_settings.config,
+    )
+    check_results_folder(Path("results"))
+except BiogripError as error:
+    sys.exit(f"biogrip: {error}")
+
+if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
+    take_over_dead_run(Path(".snakemake"))
+
+PLAN = Plan(STUDY, Path("results"))
+CASES = list(STUDY.cases)
+
+
+wildcard_constraints:
+    case="[A-Za-z][A-Za-z0-9_-]*",
+    batch=r"seeds_\d+-\d+",
+    method="[a-z_]+",

@@ -1,0 +1,48 @@
+"""The sample's parameters from each noisy trace."""
+
+
+rule identification:
+    input:
+        measurements="results/measurements/{case}/{batch}.parquet",
+        code=source_files("biogrip.stages.identification"),
+    output:
+        parameters="results/identifications/{case}/{method}/{batch}.csv",
+        history="results/histories/{case}/{method}/{batch}.parquet",
+    log:
+        "results/logs/identification/{case}/{method}/{batch}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.identification(wildcards.case),
+    message:
+        "Identifying {wildcards.case}, {wildcards.batch}"
+    shell:
+        "biogrip identification --settings {params.settings:q} --seeds {wildcards.batch} "
+        "--measurements {input.measurements:q} "
+        "--output {output.parameters:q} --history {output.history:q} 2> {log:q}"
+
+
+rule collection:
+    input:
+        batches=lambda wildcards: PLAN.batch_files(
+            "results/identifications/{case}/{method}/{batch}.csv", wildcards.case
+        ),
+        histories=lambda wildcards: PLAN.batch_files(
+            "results/histories/{case}/{method}/{batch}.parquet", wildcards.case
+        ),
+        code=source_files("biogrip.stages.collection"),
+    output:
+        parameters="results/identifications/{case}.csv",
+        history="results/histories/{case}.parquet",
+    log:
+        "results/logs/collection/{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.collection(),
+    message:
+        "Putting together the identifications of {wildcards.case}"
+    shell:
+        "biogrip collection --settings {params.settings:q} "
+        "--batches {input.batches:q} --histories {input.histories:q} "
+        "--output {output.parameters:q} --history {output.history:q} 2> {log:q}"

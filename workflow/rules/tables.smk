@@ -1,0 +1,151 @@
+"""Tables: the study's inputs, its errors, and the paper held against itself."""
+
+INPUT_TABLES = {
+    "gripper": ("gripper", "reconstructed"),
+    "actuator": ("actuator", "reconstructed"),
+    "gene_ranges": ("search_range", "reconstructed"),
+    "parameter_ranges": ("search_range",),
+}
+TABLES = [
+    *INPUT_TABLES,
+    *(f"errors_{case}" for case in CASES),
+    "errors",
+    "evidence",
+    "printed_values",
+]
+
+
+rule input_table:
+    input:
+        code=source_files("biogrip.tables.inputs"),
+    output:
+        csv="results/tables/{table}.csv",
+        text=multiext("results/tables/{table}", ".md", ".tex"),
+        html=report(
+            "results/tables/{table}.html",
+            caption="../report/input_table.rst",
+            category="Tables",
+            labels={"case": "all", "item": "input: {table}", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/{table}.log",
+    wildcard_constraints:
+        table="|".join(INPUT_TABLES),
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.blocks(*INPUT_TABLES[wildcards.table]),
+    message:
+        "Writing the table {wildcards.table}"
+    shell:
+        "biogrip table {wildcards.table} --settings {params.settings:q} "
+        "--output {output.csv:q} 2> {log:q}"
+
+
+rule error_table:
+    input:
+        identifications="results/identifications/{case}.csv",
+        code=source_files("biogrip.tables.errors"),
+    output:
+        csv="results/tables/errors_{case}.csv",
+        text=multiext("results/tables/errors_{case}", ".md", ".tex"),
+        html=report(
+            "results/tables/errors_{case}.html",
+            caption="../report/errors.rst",
+            category="Tables",
+            labels={"case": "{case}", "item": "errors", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/errors_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.errors(wildcards.case),
+    message:
+        "Writing the error table of {wildcards.case}"
+    shell:
+        "biogrip table errors --settings {params.settings:q} "
+        "--inputs {input.identifications:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule all_errors_table:
+    input:
+        tables=collect("results/tables/errors_{case}.csv", case=CASES),
+        code=source_files("biogrip.tables.all_errors"),
+    output:
+        csv="results/tables/errors.csv",
+        text=multiext("results/tables/errors", ".md", ".tex"),
+        html=report(
+            "results/tables/errors.html",
+            caption="../report/errors.rst",
+            category="Tables",
+            labels={"case": "all", "item": "errors", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/errors.log",
+    conda:
+        "../envs/biogrip.yaml"
+    message:
+        "Writing the error table of all cases"
+    shell:
+        "biogrip table all_errors --settings '{{}}' "
+        "--inputs {input.tables:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule evidence_table:
+    input:
+        identifications=collect("results/identifications/{case}.csv", case=CASES),
+        measurements=[
+            file
+            for case in CASES
+            for file in PLAN.batch_files(
+                "results/measurements/{case}/{batch}.parquet", case
+            )
+        ],
+        code=source_files("biogrip.tables.evidence"),
+    output:
+        csv="results/tables/evidence.csv",
+        text=multiext("results/tables/evidence", ".md", ".tex"),
+        html=report(
+            "results/tables/evidence.html",
+            caption="../report/evidence.rst",
+            category="Tables",
+            labels={"case": "all", "item": "evidence", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/evidence.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.evidence(),
+    message:
+        "Holding the paper's statements against the study"
+    shell:
+        "biogrip table evidence --settings {params.settings:q} "
+        "--inputs {input.identifications:q} {input.measurements:q} "
+        "--output {output.csv:q} 2> {log:q}"
+
+
+rule printed_values_table:
+    input:
+        code=source_files("biogrip.tables.printed_values"),
+    output:
+        csv="results/tables/printed_values.csv",
+        text=multiext("results/tables/printed_values", ".md", ".tex"),
+        html=report(
+            "results/tables/printed_values.html",
+            caption="../report/printed_values.rst",
+            category="Tables",
+            labels={"case": "all", "item": "printed values", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/printed_values.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.evidence(),
+    message:
+        "Checking the paper's printed values"
+    shell:
+        "biogrip table printed_values --settings {params.settings:q} "
+        "--output {output.csv:q} 2> {log:q}"

@@ -1,0 +1,37 @@
+"""Noise-free targets, and the same traces with noise."""
+
+
+rule target:
+    input:
+        code=source_files("biogrip.stages.target"),
+    output:
+        "results/targets/{case}.csv",
+    log:
+        "results/logs/target/{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.target(wildcards.case),
+    message:
+        "Simulating the response of {wildcards.case}"
+    shell:
+        "biogrip target --settings {params.settings:q} --output {output:q} 2> {log:q}"
+
+
+rule measurement:
+    input:
+        target="results/targets/{case}.csv",
+        code=source_files("biogrip.stages.measurement"),
+    output:
+        "results/measurements/{case}/{batch}.parquet",
+    log:
+        "results/logs/measurement/{case}/{batch}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.measurement(wildcards.case),
+    message:
+        "Adding noise to {wildcards.case}, {wildcards.batch}"
+    shell:
+        "biogrip measurement --settings {params.settings:q} --seeds {wildcards.batch} "
+        "--target {input.target:q} --output {output:q} 2> {log:q}"
