@@ -151,15 +151,15 @@ def _collection(options: argparse.Namespace) -> None:
 
 
 def _table(options: argparse.Namespace) -> None:
-    from biogrip.tables import run
+    from biogrip.stages import table
 
-    run(options.name, options.settings, options.inputs, options.output)
+    table.run(options.name, options.settings, options.inputs, options.output)
 
 
 def _figure(options: argparse.Namespace) -> None:
-    from biogrip.figures import run
+    from biogrip.stages import figure
 
-    run(options.name, options.settings, options.inputs, options.output)
+    figure.run(options.name, options.settings, options.inputs, options.output)
 
 
 def _compare(options: argparse.Namespace) -> None:

@@ -10,5 +10,5 @@ class BiogripError(Exception):
 
 def nearest(name: object, allowed: Iterable[str]) -> str:
     """Return ``" Did you mean 'x'?"`` for the allowed name closest to `name`, else ``""``."""
-    close = get_close_matches(str(name), list(allowed), n=1, cutoff=0.5)
+    close = get_close_matches(str(name), list(allowed), n=1, cutoff=0.4)
     return f" Did you mean '{close[0]}'?" if close else ""

@@ -97,17 +97,18 @@ def step_response(
 def rotation(response: StepResponse, steps: TorqueSteps, time_s: Array) -> Array:
     """Closing rotation of the left arm in rad, shape (n, n_times).
 
-    Steps superpose: phi(t) = sum_s dtau_s h(t - t_s), whatever the sampling.
+    Steps superpose: phi(t) = sum_s dtau_s h(t - t_s), whatever the sampling. A
+    step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses
+    no digits to the constant where a sample creeps far from its rest.
     """
     heights = drives(steps)
     phi = np.zeros((response.static.shape[0], len(time_s)))
     for start, height in zip(steps.time_s, heights.T, strict=True):
         after = time_s >= start
         elapsed = time_s[after] - start
-        decay = np.exp(response.rates[:, :, None] * elapsed)
+        change = np.expm1(response.rates[:, :, None] * elapsed)
         weights = np.einsum("ndj,d->nj", response.weights, height)
-        phi[:, after] += (response.static @ height)[:, None]
-        phi[:, after] += np.einsum("nj,njt->nt", weights, decay).real
+        phi[:, after] += np.einsum("nj,njt->nt", weights, change).real
     return phi
 
 

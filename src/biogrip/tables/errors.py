@@ -89,7 +89,7 @@ def read_identifications(path: Path) -> pd.DataFrame:
         If it is missing or is not one.
     """
     try:
-        frame = pd.read_csv(path, float_precision="round_trip")
+        frame = pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as identifications: {error}.") from error
     if tuple(frame.columns) != COLUMNS:

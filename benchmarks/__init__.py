@@ -1,0 +1,1 @@
+"""How fast the hot path is, against peers in the same run."""

@@ -1,0 +1,40 @@
+"""One identification, and how much of it is the misfit."""
+
+import time
+
+import numpy as np
+
+from benchmarks.setup import problem, seconds
+from biogrip.arrays import Array
+from biogrip.identify.genetic import genetic
+from biogrip.response.misfit import PopulationMisfit
+from biogrip.study import build
+
+
+def identification_rows() -> list[dict[str, str]]:
+    """Time an identification of a fixed seed whole, and its misfit calls within it."""
+    p = problem()
+    settings = build.genetic_settings(p.genetic)
+    misfit = PopulationMisfit(p.gripper, p.model, p.steps, 0.1, p.trace_rad)
+    spent: list[float] = []
+
+    def timed(parameters: Array) -> Array:
+        start = time.perf_counter()
+        found = misfit(parameters)
+        spent[-1] += time.perf_counter() - start
+        return found
+
+    def identify() -> None:
+        spent.append(0.0)
+        genetic(timed, p.genome, settings, np.random.default_rng(0))
+
+    whole = seconds(identify)
+    answer = genetic(misfit, p.genome, settings, np.random.default_rng(0))
+    return [
+        {
+            "time (ms)": f"{1e3 * whole:.3g}",
+            "generations": str(answer.generations),
+            "evaluations": str(answer.evaluations),
+            "share in the misfit": f"{100 * np.median(spent) / whole:.0f} %",
+        }
+    ]

@@ -1,0 +1,27 @@
+import pytest
+
+from biogrip.gripper import Arm, Gripper
+from biogrip.protocol import Phase, TorqueSteps, torque_steps
+
+
+@pytest.fixture(scope="session")
+def gripper() -> Gripper:
+    """The default study's gripper."""
+    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+    return Gripper(1.5e-3, 75.0, arm, arm)
+
+
+@pytest.fixture(scope="session")
+def unequal_gripper() -> Gripper:
+    return Gripper(1.5e-3, 75.0, Arm(1.0e-14, 3.3e-12, 4.4e-7), Arm(1.3e-14, 2.5e-12, 5.5e-7))
+
+
+@pytest.fixture(scope="session")
+def phases() -> tuple[Phase, ...]:
+    """The paper's protocol, Figure 3."""
+    return (Phase(200.0, 1.6e-9, 1.6e-9), Phase(200.0, 0.32e-9, 0.32e-9))
+
+
+@pytest.fixture(scope="session")
+def steps(phases: tuple[Phase, ...]) -> TorqueSteps:
+    return torque_steps(phases)

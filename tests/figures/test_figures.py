@@ -1,0 +1,63 @@
+"""Figures drawn from the committed study's settings, and read back from their axes."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+from matplotlib.figure import Figure
+
+from biogrip.figures import comb, linkage, torque
+from biogrip.figures.results import scale_of
+from biogrip.figures.style import save, styled
+
+CONFIG = Path(__file__).parents[2] / "config" / "config.yaml"
+SETTINGS: dict[str, Any] = yaml.safe_load(CONFIG.read_text())
+
+
+def drawn(module: Any) -> Figure:
+    with styled():
+        figure: Figure = module.draw(SETTINGS, [])
+    return figure
+
+
+def test_torque_shows_the_protocol_and_its_voltages() -> None:
+    left, right = drawn(torque).axes
+    assert (left.get_ylabel(), right.get_ylabel()) == ("torque (nN m)", "voltage (V)")
+    assert [text.get_text() for text in left.texts] == ["1.6 nN m", "0.32 nN m"]
+    assert [text.get_text() for text in right.texts] == ["16.3 V", "7.28 V"]
+
+
+def test_linkage_is_to_scale() -> None:
+    whole = drawn(linkage).axes[0]
+    arm = whole.lines[0].get_xydata()
+    assert np.hypot(*np.diff(np.asarray(arm), axis=0)[0]) == pytest.approx(1.5)
+    assert whole.get_aspect() == 1.0
+
+
+def test_comb_has_every_finger_where_it_is() -> None:
+    whole, _, curve = drawn(comb).axes
+    floating, fixed = whole.collections
+    assert len(floating.get_paths()) == len(fixed.get_paths()) == 66
+    outermost = max(np.hypot(*np.asarray(p.vertices).T).max() for p in fixed.get_paths())
+    # Outside the last finger is one more gap; arcs are splines, good to 2e-4.
+    assert outermost == pytest.approx(321 + 66 * 14 - 3, rel=3e-4)
+    assert re.search(r"\(V\)", curve.get_xlabel())
+
+
+def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        with styled():
+            save(torque.draw(SETTINGS, []), tmp_path / f"{name}.png")
+    for suffix in (".png", ".pdf"):
+        assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(2.0, (1.0, "rad")), (3e-3, (1e3, "mrad")), (3e-5, (1e6, "µrad")), (3e-8, (1e9, "nrad"))],
+)
+def test_prefixes(value: float, expected: tuple[float, str]) -> None:
+    assert scale_of(np.array([-value, 0.0]), "rad") == expected

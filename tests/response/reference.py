@@ -1,0 +1,61 @@
+"""An independent solution of the corrected linear model, with 50 digits.
+
+Nothing here is shared with the library: forces of springs and dampers are
+written down arm by arm, as in the corrected eqs. (4)-(6), and the five
+first-order equations solved through the eigenvectors of their matrix.
+"""
+
+import numpy as np
+from mpmath import mp, mpf
+
+from biogrip.arrays import Array
+from biogrip.gripper import Gripper
+from biogrip.protocol import TorqueSteps
+
+
+def rotation_50_digits(
+    gripper: Gripper, parameters: Array, steps: TorqueSteps, time_s: Array
+) -> Array:
+    """phi_2 of one sample (k, k_p, c, c_p) with inertia, shape (n_times,)."""
+    with mp.workdps(50):
+        k, k_p, c, c_p = (mpf(float(value)) for value in parameters)
+        b = mpf(gripper.arm_length_m) * mp.sin(mp.radians(mpf(gripper.reference_angle_deg)))
+        inertia, damping, stiffness = (
+            [mpf(getattr(arm, name)) for arm in (gripper.left, gripper.right)]
+            for name in ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
+        )
+        # State: phi_2, phi_4, their rates, and the node x between spring k and damper c.
+        # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
+        force = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k]
+        a = mp.zeros(5)
+        a[0, 2] = a[1, 3] = 1
+        for row, arm in ((2, 0), (3, 1)):
+            for column in range(5):
+                a[row, column] = -b * force[column] / inertia[arm]
+            a[row, arm] -= stiffness[arm] / inertia[arm]
+            a[row, 2 + arm] -= damping[arm] / inertia[arm]
+        # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
+        a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
+        rates, vectors = mp.eig(a)
+        phi = [mpf(0)] * len(time_s)
+        for start, left, right in zip(steps.time_s, steps.left_Nm, steps.right_Nm, strict=True):
+            load = mp.matrix(5, 1)
+            load[2], load[3] = mpf(float(left)) / inertia[0], mpf(float(right)) / inertia[1]
+            rest = mp.lu_solve(a, -load)
+            weights = mp.lu_solve(vectors, -rest)
+            for i, t in enumerate(time_s):
+                elapsed = mpf(float(t)) - mpf(float(start))
+                if elapsed >= 0:
+                    terms = (
+                        vectors[0, j] * weights[j] * mp.exp(rates[j] * elapsed) for j in range(5)
+                    )
+                    phi[i] += rest[0] + mp.re(mp.fsum(terms))
+        return np.array([float(value) for value in phi])
+
+
+def random_samples(count: int, seed: int) -> Array:
+    """Chromosomes drawn uniformly from the whole search range (k, k_p, c, c_p)."""
+    rng = np.random.default_rng(seed)
+    exponent = rng.integers([-3, -3, -4, -4], [8, 8, 5, 5], size=(count, 4), endpoint=True)
+    first, second = rng.integers(1, 9, size=(2, count, 4), endpoint=True)
+    return 10.0**exponent * (0.1 * first + 0.01 * second)

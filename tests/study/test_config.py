@@ -1,0 +1,164 @@
+import copy
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from biogrip.errors import BiogripError
+from biogrip.study.config import Study, check_results_folder, load_study
+
+DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
+DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
+
+
+def overlaid(base: Any, over: Any) -> Any:
+    """Lay a config over another, as Snakemake does."""
+    if isinstance(base, dict) and isinstance(over, dict):
+        return {**base, **{k: overlaid(base.get(k), v) for k, v in over.items()}}
+    return over
+
+
+def load(tmp_path: Path, text: str) -> Study:
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    merged = overlaid(yaml.safe_load(DEFAULT.read_text()), yaml.safe_load(text))
+    return load_study(merged, [DEFAULT, file])
+
+
+def test_the_default_study_holds_the_papers_targets() -> None:
+    study = load_study(yaml.safe_load(DEFAULT.read_text()), [DEFAULT])
+    targets = {name: case.parameters for name, case in study.cases.items()}
+    assert targets == {
+        "endothelial_cell": {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3},
+        "liquid_drop_1": {"k": 9.5, "k_p": 1e-4, "c": 10.0, "c_p": 1e-4},
+        "liquid_drop_2": {"k": 1.0, "k_p": 1e-4, "c": 10.0, "c_p": 1e-3},
+    }
+    assert study.seeds == 50
+
+
+def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) -> None:
+    study = load(
+        tmp_path,
+        """
+        seeds: 50
+        cases:
+          my_cell:
+            sample: {model: generalized_maxwell, k: 20.0, k_p: 5.0, c: 80.0, c_p: 1e-3}
+        """,
+    )
+    assert list(study.cases)[-1] == "my_cell"
+    case = study.cases["my_cell"]
+    assert case.parameters["c_p"] == 0.001
+    assert case.title == "my_cell"
+    assert case.blocks == study.cases["endothelial_cell"].blocks
+
+
+def test_text_numbers_work_for_whole_numbers_too(tmp_path: Path) -> None:
+    assert load(tmp_path, "seeds: 1e2").seeds == 100
+
+
+def test_a_case_may_change_a_block_for_itself(tmp_path: Path) -> None:
+    study = load(
+        tmp_path,
+        f"cases: {{soft: {{{DROP}, gripper: {{left: {{stiffness_Nm_per_rad: 1.0e-7}}}}}}}}",
+    )
+    arms = study.cases["soft"].blocks["gripper"]
+    assert arms["left"]["stiffness_Nm_per_rad"] == 1e-7
+    assert arms["right"]["stiffness_Nm_per_rad"] == 4.4e-7
+    other = study.cases["endothelial_cell"].blocks["gripper"]
+    assert other["left"]["stiffness_Nm_per_rad"] == 4.4e-7
+
+
+def test_a_case_set_to_nothing_is_dropped(tmp_path: Path) -> None:
+    study = load(tmp_path, f"cases: {{liquid_drop_1: null, drop: {{{DROP}}}}}")
+    assert list(study.cases) == ["endothelial_cell", "liquid_drop_2", "drop"]
+
+
+BAD = {
+    "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
+    "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",
+    "seeds: 0": r"my.yaml, line 1: seeds: found 0, allowed is at least 1",
+    "seeds: 2.5": r"seeds: found 2.5, allowed is an integer",
+    "seeds: true": r"seeds: found True, allowed is an integer",
+    "gripper:\n  left: {stiffness_Nm_per_rad: -4e-7}": r"my.yaml, line 2: "
+    r"gripper.left.stiffness_Nm_per_rad: found -4e-07, allowed is greater than 0 N m/rad",
+    "gripper: {arm_length_m: .inf}": r"gripper.arm_length_m: found inf, allowed is a finite number",
+    f"cases:\n  a/b: {{{DROP}}}": r"my.yaml, line 2: cases.a/b: not a usable case name",
+    f"cases:\n  ../x: {{{DROP}}}": r"my.yaml, line 2: cases.../x: not a usable case name",
+    "cases: {x: {sample: {model: liquid_dorp, k: 1, k_p: 1, c: 1}}}": r"x.sample.model: found "
+    r"'liquid_dorp'. Did you mean 'liquid_drop'\? Allowed: generalized_maxwell, liquid_drop",
+    "cases: {x: {sampel: {model: liquid_drop}}}": r"x.sampel: unknown key. Did you mean 'sample'",
+    "cases: {x: {sample: {model: liquid_drop, k: 1, k_p: 1}}}": r"cases.x.sample.c: is missing: "
+    r"liquid_drop needs k, k_p, c",
+    f"cases: {{x: {{{DROP[:-1]}, c_p: 1}}}}}}": r"x.sample.c_p: is no parameter of liquid_drop",
+    "cases: {x: {sample: {model: liquid_drop, k: -1, k_p: 1, c: 1}}}": r"x.sample.k: found -1, "
+    r"allowed is greater than 0 N/m",
+    "cases: {x: 3}": r"cases.x: found 3, allowed is a block of keys",
+    "protocol:\n  phases:\n    - {duration_s: -5, torque_Nm: 1e-9}": r"my.yaml, line 3: "
+    r"protocol.phases\[0\].duration_s: found -5, allowed is greater than 0 s",
+    "protocol: {phases: []}": r"protocol.phases: found a list of 0, allowed are at least 1",
+    "protocol: {phases: [{duration_s: 5, torque_Nm: 0}]}": r"phases: no phase has a torque",
+    "measurement: {rate_Hz: 1e-6}": r"measurement.rate_Hz: found 1e-06, which gives 1.0004 samples",
+    "measurement: {noise: {kind: pink}}": r"noise.kind: found 'pink'. Allowed: gaussian, uniform",
+    "genetic_algorithm: {survivors: 500}": r"survivors: found 500, allowed is less than population",
+    "search_range: {k: {exponent: [3, -3]}}": r"found \[3, -3\], allowed is \[lowest, highest\]",
+    "reconstructed: [gripper.lenght]": r"found 'gripper.lenght', allowed is a key of this study",
+    "cases: null": r"cases: found nothing, allowed is a block of keys",
+}
+
+
+@pytest.mark.parametrize("text", BAD, ids=lambda text: text.replace("\n", " ")[:40])
+def test_bad_config_is_explained(tmp_path: Path, text: str) -> None:
+    with pytest.raises(BiogripError) as caught:
+        load(tmp_path, text)
+    message = str(caught.value)
+    assert re.search(BAD[text], message), message
+    assert message.count("\n") < 10
+
+
+def test_a_wrong_inherited_block_is_reported_once(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError) as caught:
+        load(tmp_path, "gripper: {arm_length_m: -1}")
+    assert str(caught.value).count("arm_length_m") == 1
+
+
+def test_many_problems_are_cut_short(tmp_path: Path) -> None:
+    names = "\n".join(f"wrong_{i}: 1" for i in range(50))
+    with pytest.raises(BiogripError, match=r"and 44 more") as caught:
+        load(tmp_path, names)
+    assert str(caught.value).count("\n") < 20
+
+
+def test_a_block_without_default_must_be_there() -> None:
+    config = yaml.safe_load(DEFAULT.read_text())
+    short = copy.deepcopy(config)
+    del short["gripper"]["left"]["inertia_kgm2"]
+    with pytest.raises(BiogripError, match=r"gripper.left.inertia_kgm2: is missing"):
+        load_study(short, [])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("seeds: 1\nseeds: 2\n", "line 2: seeds is given twice, first in line 1"),
+        ("seeds: [1\n", "line 2: not valid YAML"),
+    ],
+)
+def test_files_that_are_no_good_yaml(tmp_path: Path, text: str, message: str) -> None:
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    with pytest.raises(BiogripError, match=re.escape(message)):
+        load_study({}, [file])
+
+
+def test_missing_config_file(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match=r"nowhere.yaml: cannot be read: No such file"):
+        load_study({}, [tmp_path / "nowhere.yaml"])
+
+
+def test_results_folder_must_be_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "results").write_text("")
+    with pytest.raises(BiogripError, match="results cannot be written here"):
+        check_results_folder(tmp_path / "results")

@@ -1,0 +1,84 @@
+import csv
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from biogrip.errors import BiogripError
+from biogrip.identify.records import COLUMNS
+from biogrip.stages import table
+from biogrip.tables.errors import errors
+from biogrip.tables.layout import Column, Table, write
+
+SETTINGS = {
+    "case": "drop",
+    "title": "A drop",
+    "model": "generalized_maxwell",
+    "parameters": {"k": 10.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0},
+    "published": {
+        "table": 9,
+        "identified": {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
+        "error_percent": {"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
+    },
+    "noise_floor_tolerance": 0.02,
+}
+
+
+@pytest.fixture
+def identifications(tmp_path: Path) -> Path:
+    """Eleven seeds: k = 5, 6, ... 15; c + c_p = 5 always; misfit lowest for seed 3."""
+    path = tmp_path / "drop.csv"
+    with path.open("w", newline="") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(COLUMNS)
+        for seed in range(11):
+            misfit = 1.0 if seed == 3 else 1.015 + 0.01 * (seed > 4)
+            row = ["drop", "genetic", seed, 5 + seed, 0.1, 5 - 0.1 * seed, 0.1 * seed]
+            writer.writerow([*row, misfit, 1.0, 60, 15500, "stalled"])
+    return path
+
+
+def test_error_table_is_the_arithmetic_it_says(identifications: Path) -> None:
+    made = errors(SETTINGS, [identifications])
+    names = [column.name for column in made.columns]
+    rows = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
+    assert list(rows) == ["k", "k_p", "c", "c_p", "c + c_p"]
+    k = rows["k"]
+    assert (k["best_seed"], k["best_identified"], k["best_error_percent"]) == (3, 8.0, 20.0)
+    assert (k["median_identified"], k["p05_identified"], k["p95_identified"]) == (10.0, 5.5, 14.5)
+    # |10 - k| / 10 over k = 5 .. 15: 0 once, 10, 20, 30, 40 and 50 % twice.
+    assert k["median_absolute_error_percent"] == pytest.approx(30.0)
+    assert k["noise_floor_share"] == pytest.approx(5 / 11)
+    assert (k["paper_identified"], k["paper_error_percent"]) == (9.0, "10")
+    total = rows["c + c_p"]
+    assert (total["target"], total["paper_identified"], total["paper_error_percent"]) == (5, 5, 0)
+    assert total["median_absolute_error_percent"] == pytest.approx(0.0, abs=1e-12)
+    assert np.isnan(rows["k_p"]["best_error_percent"])
+
+
+def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
+    made = Table(
+        "Fifty % of a_b.",
+        (Column("case", "Case"), Column("value", "Value", 3), Column("none", "None")),
+        [("a_b", 1234.5678, None), ("c & d", -1e-300 * 0, float("nan"))],
+    )
+    write(made, tmp_path / "t.csv")
+    frame = pd.read_csv(tmp_path / "t.csv", dtype=str, keep_default_na=False)
+    assert frame.to_numpy().tolist() == [["a_b", "1234.57", ""], ["c & d", "0", ""]]
+    assert "1.23e+03" in (tmp_path / "t.md").read_text()
+    latex = (tmp_path / "t.tex").read_text()
+    assert r"Fifty \% of a\_b." in latex
+    assert r"c \& d" in latex
+    assert "c &amp; d" in (tmp_path / "t.html").read_text()
+
+
+def test_unknown_tables_and_files_are_explained(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match="Did you mean 'errors'"):
+        table.run("erors", {}, [], tmp_path / "t.csv")
+    with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
+        table.run("errors", SETTINGS, [tmp_path / "gone.csv"], tmp_path / "t.csv")
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
+        table.run("errors", SETTINGS, [tmp_path / "other.csv"], tmp_path / "t.csv")
+    assert not (tmp_path / "t.csv").exists()

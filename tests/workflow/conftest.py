@@ -1,0 +1,80 @@
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+# A whole study in a few seconds: real physics and algorithm, little of each.
+SMALL = """
+seeds: 4
+batch_size: 2
+measurement: {rate_Hz: 1.0}
+genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
+cases:
+  liquid_drop_1: null
+"""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What a call of Snakemake came to."""
+
+    status: int
+    output: str
+
+    def jobs(self, rule: str) -> int:
+        """How many jobs of a rule were run or would be (from the job table)."""
+        for line in self.output.splitlines():
+            words = line.split()
+            if len(words) == 2 and words[0] == rule and words[1].isdigit():
+                return int(words[1])
+        return 0
+
+
+Snakemake = Callable[..., Run]
+
+
+def snakemake(
+    folder: Path, *arguments: str, config: str = SMALL, environment: dict[str, str] | None = None
+) -> Run:
+    """Run the repository's workflow in a folder of its own, over a config laid on the default."""
+    overlay = folder / "overlay.yaml"
+    overlay.write_text(config)
+    jobs = () if any(argument.startswith("-j") for argument in arguments) else ("-j2",)
+    command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
+    command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
+    command += ["--configfile", str(overlay)]
+    done = subprocess.run(
+        command,
+        cwd=ROOT,
+        env={**os.environ, **(environment or {})},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=600,
+    )
+    return Run(done.returncode, done.stdout)
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished small study; copy it before changing anything."""
+    folder = tmp_path_factory.mktemp("finished")
+    run = snakemake(folder)
+    assert run.status == 0, run.output
+    return folder
+
+
+def tables(folder: Path) -> dict[str, bytes]:
+    """Every file of results that is compared, by name."""
+    results = folder / "results"
+    return {
+        str(path.relative_to(results)): path.read_bytes()
+        for kind in ("tables", "targets", "identifications")
+        for path in sorted((results / kind).glob("*.*"))
+    }

@@ -1,0 +1,127 @@
+"""What a study writes, and that it is always the same."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+
+from biogrip.gripper import Arm, Gripper
+from biogrip.protocol import Phase, torque_steps
+from biogrip.response.linear import rotation, step_response
+from biogrip.sample import generalized_maxwell
+from biogrip.study.validation import schema
+from tests.workflow.conftest import SMALL, snakemake, tables
+
+COLUMNS = (
+    *("case", "method", "seed", "k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"),
+    *("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"),
+)
+CASES = ("endothelial_cell", "liquid_drop_2")
+
+
+def test_results_have_the_names_and_columns_they_promise(finished: Path) -> None:
+    results = finished / "results"
+    for case in CASES:
+        target = pd.read_csv(results / "targets" / f"{case}.csv")
+        assert list(target.columns) == ["time_s", "torque_Nm", "rotation_rad"]
+        assert len(target) == 401
+        assert target["rotation_rad"].max() > 0
+        found = pd.read_csv(results / "identifications" / f"{case}.csv")
+        assert tuple(found.columns) == COLUMNS
+        assert found["seed"].tolist() == [0, 1, 2, 3]
+        history = pd.read_parquet(results / "histories" / f"{case}.parquet")
+        last = history.groupby("seed")["best_misfit_rad"].last().to_numpy()
+        np.testing.assert_allclose(last, found["misfit_rad"], rtol=1e-6)
+        for suffix in (".csv", ".md", ".tex", ".html"):
+            assert (results / "tables" / f"errors_{case}{suffix}").stat().st_size > 300
+        for figure in ("fit", "convergence", "evolution"):
+            for suffix in (".png", ".pdf"):
+                path = results / "figures" / f"{figure}_{case}{suffix}"
+                assert path.stat().st_size > 5000
+    for figure in ("overview", "torque", "linkage", "comb"):
+        assert (results / "figures" / f"{figure}.png").stat().st_size > 5000
+    errors = pd.read_csv(results / "tables" / "errors.csv")
+    assert errors["parameter"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"] * 2
+
+
+def test_measurements_are_target_and_noise_and_can_be_opened(finished: Path) -> None:
+    traces = sorted((finished / "results" / "measurements" / CASES[0]).glob("*.parquet"))
+    assert [path.stem for path in traces] == ["seeds_0-1", "seeds_2-3"]
+    recorded = pq.read_table(traces[0]).to_pandas()
+    assert list(recorded.columns) == ["time_s", "target_rad", "seed_0", "seed_1"]
+    noise = recorded[["seed_0", "seed_1"]].sub(recorded["target_rad"], axis=0)
+    level = noise.std() / recorded["target_rad"].max()
+    # 401 samples: 3.5 % of the standard deviation, four times that is allowed.
+    assert np.all(np.abs(level / 0.1 - 1) < 0.14)
+
+
+def test_last_row_is_the_identification_that_its_own_trace_gives(finished: Path) -> None:
+    """Misfit and noise in the file, recomputed from the files alone."""
+    results = finished / "results"
+    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+    steps = torque_steps((Phase(200.0, 1.6e-9, 1.6e-9), Phase(200.0, 0.32e-9, 0.32e-9)))
+    found = pd.read_csv(results / "identifications" / f"{CASES[0]}.csv").iloc[-1]
+    trace = pq.read_table(results / "measurements" / CASES[0] / "seeds_2-3.parquet").to_pandas()
+    sample = found[["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]].to_numpy(float)
+    response = step_response(Gripper(1.5e-3, 75.0, arm, arm), generalized_maxwell(sample))
+    fitted = rotation(response, steps, trace["time_s"].to_numpy())[0]
+    assert np.sqrt(np.mean((fitted - trace["seed_3"]) ** 2)) == pytest.approx(
+        found["misfit_rad"], rel=1e-6
+    )
+    noise = trace["seed_3"] - trace["target_rad"]
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(found["noise_rms_rad"], rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "batch_size"), [(["-j1"], 4), (["-j2"], 1), (["-j2"], 3)], ids=str
+)
+def test_jobs_and_batches_change_no_byte(
+    finished: Path, tmp_path: Path, arguments: list[str], batch_size: int
+) -> None:
+    config = SMALL.replace("batch_size: 2", f"batch_size: {batch_size}")
+    run = snakemake(tmp_path, *arguments, "all_tables", config=config)
+    assert run.status == 0, run.output
+    ours, theirs = tables(tmp_path), tables(finished)
+    assert ours.keys() == theirs.keys()
+    assert [name for name in ours if ours[name] != theirs[name]] == []
+
+
+def test_another_study_seed_changes_everything_random(finished: Path, tmp_path: Path) -> None:
+    config = SMALL + "study_seed: 2\n"
+    run = snakemake(tmp_path, "all_tables", config=config)
+    assert run.status == 0, run.output
+    ours, theirs = tables(tmp_path), tables(finished)
+    changed = {name for name in ours if ours[name] != theirs[name]}
+    assert changed >= {f"identifications/{case}.csv" for case in CASES} | {"tables/errors.csv"}
+    assert not any(name.startswith("targets/") for name in changed)
+
+
+def test_report_shows_every_table_and_figure_with_its_labels(
+    finished: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(finished, tmp_path / "study")
+    report = tmp_path / "report.html"
+    run = snakemake(tmp_path / "study", "--report", str(report))
+    assert run.status == 0, run.output
+    page = report.read_text()
+    for item in ("errors", "fit", "evolution", "convergence", "overview", "evidence"):
+        assert f'"{item}"' in page, item
+    assert "Share at noise floor" in page or "data:text/html" in page
+
+
+def test_schema_describes_every_key() -> None:
+    """Every leaf of the schema says what it means."""
+
+    def leaves(node: dict[str, object]) -> list[dict[str, object]]:
+        inner = [v for v in node.values() if isinstance(v, dict)]
+        found = [leaf for value in inner for leaf in leaves(value)]
+        is_leaf = node.get("type") in ("number", "integer") or "enum" in node
+        return [node, *found] if is_leaf else found
+
+    items = {"minimum": -18}, {"minimum": 1, "maximum": 9}
+    for leaf in leaves(schema()):
+        inside_a_list = any(all(leaf.get(k) == v for k, v in item.items()) for item in items)
+        assert "description" in leaf or inside_a_list or set(leaf) == {"type"}, leaf
