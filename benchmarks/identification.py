@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.setup import problem, seconds
 from biogrip.arrays import Array
 from biogrip.identify.genetic import genetic
-from biogrip.response.misfit import PopulationMisfit
+from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.study import build
 
 
@@ -15,7 +15,7 @@ def identification_rows() -> list[dict[str, str]]:
     """Time an identification of a fixed seed whole, and its misfit calls within it."""
     p = problem()
     settings = build.genetic_settings(p.genetic)
-    misfit = PopulationMisfit(p.gripper, p.model, p.steps, 0.1, p.trace_rad)
+    misfit = SeriesMisfit(p.gripper, p.model, p.steps, 0.1, p.trace_rad)
     spent: list[float] = []
 
     def timed(parameters: Array) -> Array:

@@ -10,7 +10,7 @@ from benchmarks.setup import Problem, problem, seconds
 from biogrip.arrays import Array
 from biogrip.protocol import torque_at
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import PopulationMisfit
+from biogrip.response.misfit_series import SeriesMisfit
 
 INDIVIDUALS = 500
 # The one-by-one peers are timed on a few individuals and scaled.
@@ -21,7 +21,7 @@ def misfit_rows() -> list[dict[str, str]]:
     """Measure every way; accuracy is the median relative distance from 'vectorised numpy'."""
     p = problem()
     samples = p.genome.decode(p.genome.draw(INDIVIDUALS, np.random.default_rng(1)))
-    ours = PopulationMisfit(p.gripper, p.model, p.steps, 0.1, p.trace_rad)
+    ours = SeriesMisfit(p.gripper, p.model, p.steps, 0.1, p.trace_rad)
     exact = vectorised(p, samples)
     base = seconds(lambda: ours(samples))
     rows = [_row("biogrip, no response formed", base, base, ours(samples), exact)]
@@ -69,7 +69,7 @@ def by_radau(p: Problem, sample: Array) -> float:
     )
     phi, state = np.empty(len(p.time_s)), np.zeros(2)
     edges = [*p.steps.time_s, p.time_s[-1]]
-    torque = np.cumsum(p.steps.left_Nm)
+    torque = np.cumsum(p.steps.left[:, 0])
     for phase, (start, end) in enumerate(pairwise(edges)):
         load = np.array([torque[phase] / damping, 0.0])
         here = (p.time_s >= start) & (p.time_s <= end)

@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.identify.genome import Genome, genome_of
 from biogrip.measurement import Noise, add_noise
-from biogrip.protocol import TorqueSteps, sample_times, torque_steps
+from biogrip.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import MODELS, SampleModel
 from biogrip.study import build
@@ -29,7 +29,7 @@ class Problem:
 
     gripper: Gripper
     model: SampleModel
-    steps: TorqueSteps
+    steps: TorqueHistory
     time_s: Array
     trace_rad: Array
     genome: Genome
@@ -43,8 +43,8 @@ def problem() -> Problem:
     model = MODELS[case.model.name]
     gripper = build.gripper(case.blocks["gripper"])
     phases = build.phases(case.blocks["protocol"])
-    steps = torque_steps(phases)
-    time_s = sample_times(phases, case.blocks["measurement"]["rate_Hz"])
+    steps = torque_history(phases)
+    time_s = sample_times(steps.end_s, case.blocks["measurement"]["rate_Hz"])
     truth = np.array([[case.parameters[name] for name in model.names]])
     clean = rotation(step_response(gripper, model.network(truth)), steps, time_s)[0]
     noise = Noise(**case.blocks["measurement"]["noise"])

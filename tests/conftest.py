@@ -1,7 +1,7 @@
 import pytest
 
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Phase, TorqueSteps, torque_steps
+from biogrip.protocol import Phase, TorqueHistory, held, torque_history
 
 
 @pytest.fixture(scope="session")
@@ -19,9 +19,9 @@ def unequal_gripper() -> Gripper:
 @pytest.fixture(scope="session")
 def phases() -> tuple[Phase, ...]:
     """The paper's protocol, Figure 3."""
-    return (Phase(200.0, 1.6e-9, 1.6e-9), Phase(200.0, 0.32e-9, 0.32e-9))
+    return (held(200.0, 1.6e-9), held(200.0, 0.32e-9))
 
 
 @pytest.fixture(scope="session")
-def steps(phases: tuple[Phase, ...]) -> TorqueSteps:
-    return torque_steps(phases)
+def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
+    return torque_history(phases)

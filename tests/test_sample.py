@@ -7,31 +7,33 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.gripper import Gripper
-from biogrip.protocol import Phase, TorqueSteps, torque_steps
+from biogrip.protocol import TorqueHistory, held, torque_history
 from biogrip.response.linear import _sample_polynomials, rotation, step_response
 from biogrip.sample import MODELS, Network, SampleModel, generalized_maxwell, liquid_drop
 
 TIMES = np.linspace(0.1, 400, 300)
 
 
-def response_of(gripper: Gripper, steps: TorqueSteps, network: Network) -> np.ndarray:
+def response_of(gripper: Gripper, steps: TorqueHistory, network: Network) -> np.ndarray:
     return rotation(step_response(gripper, network), steps, TIMES)[0]
 
 
-def kelvin_voigt(gripper: Gripper, steps: TorqueSteps, spring: float, damper: float) -> np.ndarray:
+def kelvin_voigt(
+    gripper: Gripper, steps: TorqueHistory, spring: float, damper: float
+) -> np.ndarray:
     """Closed form without inertia: one exponential a step."""
     u = 2 * gripper.lever_m**2
     stiffness = gripper.left.stiffness_Nm_per_rad + u * spring
     rate = stiffness / (gripper.left.damping_Nms_per_rad + u * damper)
     phi = np.zeros_like(TIMES)
-    for start, height in zip(steps.time_s, steps.left_Nm, strict=True):
+    for start, height in zip(steps.time_s, steps.left[:, 0], strict=True):
         elapsed = np.maximum(TIMES - start, 0)
         phi += height / stiffness * -np.expm1(-rate * elapsed)
     return phi
 
 
 def test_liquid_drop_is_generalized_maxwell_without_its_damper(
-    gripper: Gripper, steps: TorqueSteps
+    gripper: Gripper, steps: TorqueHistory
 ) -> None:
     drop = response_of(gripper, steps, liquid_drop([9.5, 0.3, 10.0]))
     general = response_of(gripper, steps, generalized_maxwell([9.5, 0.3, 10.0, 0.0]))
@@ -39,7 +41,7 @@ def test_liquid_drop_is_generalized_maxwell_without_its_damper(
 
 
 def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
-    gripper: Gripper, steps: TorqueSteps
+    gripper: Gripper, steps: TorqueHistory
 ) -> None:
     """k to infinity: Kelvin-Voigt with c + c_p, however the sum is split."""
     expected = kelvin_voigt(gripper, steps, 0.02, 10.0)
@@ -50,7 +52,7 @@ def test_a_stiff_branch_is_a_damper_and_only_the_sum_of_dampers_shows(
 
 
 def test_a_blocked_damper_leaves_the_springs_in_parallel(
-    gripper: Gripper, steps: TorqueSteps
+    gripper: Gripper, steps: TorqueHistory
 ) -> None:
     """c to infinity: k and k_p side by side."""
     ours = response_of(gripper, steps, generalized_maxwell([2.0, 0.5, 1e9, 3.0]))
@@ -62,8 +64,8 @@ def test_maxwell_liquid_flows_at_the_rate_of_its_damper(gripper: Gripper) -> Non
     """k_p, c_p to 0 and soft arms: phi = tau/u (1/k + t/c)."""
     soft = replace(gripper.left, stiffness_Nm_per_rad=1e-16)
     free = Gripper(gripper.arm_length_m, gripper.reference_angle_deg, soft, soft)
-    held = torque_steps((Phase(400.0, 1.6e-9, 1.6e-9),))
-    ours = response_of(free, held, liquid_drop([2.0, 0.0, 50.0]))
+    constant = torque_history((held(400.0, 1.6e-9),))
+    ours = response_of(free, constant, liquid_drop([2.0, 0.0, 50.0]))
     expected = 1.6e-9 / (2 * free.lever_m**2) * (1 / 2.0 + TIMES / 50.0)
     # The arm's damper delays the start by c_g / (u k) = 4e-7 s.
     np.testing.assert_allclose(ours, expected, rtol=1e-6)

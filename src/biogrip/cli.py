@@ -37,11 +37,17 @@ def _parser() -> argparse.ArgumentParser:
     _inputs(measurement, "target")
     _outputs(measurement, "output")
 
+    calibration = _stage(
+        stages, "calibration", _calibration, "calibrate a gripper without a sample"
+    )
+    _outputs(calibration, "output", "traces")
+
     identification = _stage(
         stages, "identification", _identification, "identify the sample in noisy traces"
     )
     _seeds(identification)
     _inputs(identification, "measurements")
+    _inputs(identification, "calibrated", many=True)
     _outputs(identification, "output", "history")
 
     collection = _stage(stages, "collection", _collection, "join the batches of a case")
@@ -126,6 +132,12 @@ def _measurement(options: argparse.Namespace) -> None:
     measurement.run(options.settings, _batch(options.seeds), options.target, options.output)
 
 
+def _calibration(options: argparse.Namespace) -> None:
+    from biogrip.stages import calibration
+
+    calibration.run(options.settings, options.output, options.traces)
+
+
 def _identification(options: argparse.Namespace) -> None:
     from biogrip.stages import identification
 
@@ -135,6 +147,7 @@ def _identification(options: argparse.Namespace) -> None:
         options.measurements,
         options.output,
         options.history,
+        *options.calibrated,
     )
 
 

@@ -1,73 +1,183 @@
-"""What the experiment does: torque against time, and when the rotation is sampled."""
+"""What the experiment does: the torque of both arms against time, and when the rotation is sampled.
 
+Within a phase a torque is a quadratic in time plus sinusoids, which covers holds,
+ramps and sinusoids given as torque or, since torque goes with the square of the
+voltage, as voltage.
+"""
+
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, ComplexArray
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """A sinusoid amplitude_Nm * cos(omega t + phase), t from the start of its phase."""
+
+    amplitude_Nm: float
+    omega_rad_per_s: float
+    phase_rad: float
+
+
+@dataclass(frozen=True)
+class Load:
+    """Closing torque of one arm within a phase, as a function of the time since its start.
+
+    Parameters
+    ----------
+    value_Nm, slope_Nm_per_s, curvature_Nm_per_s2
+        The quadratic value + slope t + curvature t^2 / 2.
+    harmonics
+        Sinusoids on top of it.
+    """
+
+    value_Nm: float
+    slope_Nm_per_s: float = 0.0
+    curvature_Nm_per_s2: float = 0.0
+    harmonics: tuple[Harmonic, ...] = ()
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of time in which both comb drives hold their torque.
+    """A stretch of the protocol.
 
     Parameters
     ----------
     duration_s
-        How long the phase lasts.
-    torque_left_Nm, torque_right_Nm
+        How long it lasts.
+    left, right
         Closing torques tau_2 and tau_4, as increments on those that close the
         arms onto the sample.
     """
 
     duration_s: float
-    torque_left_Nm: float
-    torque_right_Nm: float
+    left: Load
+    right: Load
 
 
 @dataclass(frozen=True)
-class TorqueSteps:
-    """A protocol as the steps it is made of: the linear response superposes them.
+class TorqueHistory:
+    """A protocol as what sets in when: linear responses to it superpose.
 
     Parameters
     ----------
-    time_s : (n_steps,)
-        When each step happens, ascending.
-    left_Nm, right_Nm : (n_steps,)
-        By how much tau_2 and tau_4 jump then.
+    time_s : (n_events,)
+        Starts of the phases.
+    left, right : (n_events, 3)
+        By how much value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2
+        and tau_4 jump then.
+    harmonic_time_s, omega_rad_per_s : (n_harmonics,)
+        When a sinusoid Re(a e^(i omega (t - start))) sets in; switching off is
+        setting in with the opposite sign.
+    harmonic_left, harmonic_right : (n_harmonics,)
+        Complex amplitudes a in N m.
+    end_s
+        End of the protocol.
     """
 
     time_s: Array
-    left_Nm: Array
-    right_Nm: Array
+    left: Array
+    right: Array
+    harmonic_time_s: Array
+    omega_rad_per_s: Array
+    harmonic_left: ComplexArray
+    harmonic_right: ComplexArray
+    end_s: float
 
-    @property
+    @cached_property
     def symmetric(self) -> bool:
         """Whether both arms are driven alike."""
-        return bool(np.array_equal(self.left_Nm, self.right_Nm))
+        same = np.array_equal(self.left, self.right)
+        return bool(same and np.array_equal(self.harmonic_left, self.harmonic_right))
+
+    @cached_property
+    def only_steps(self) -> bool:
+        """Whether the torque is piecewise constant."""
+        ramps = np.any(self.left[:, 1:]) or np.any(self.right[:, 1:])
+        return not ramps and len(self.harmonic_time_s) == 0
 
 
-def torque_steps(phases: tuple[Phase, ...]) -> TorqueSteps:
-    """Turn phases that follow one another from t = 0 into torque steps."""
-    starts = np.concatenate(([0.0], np.cumsum([phase.duration_s for phase in phases])[:-1]))
-    left = np.array([phase.torque_left_Nm for phase in phases])
-    right = np.array([phase.torque_right_Nm for phase in phases])
-    return TorqueSteps(starts, np.diff(left, prepend=0.0), np.diff(right, prepend=0.0))
+def held(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None = None) -> Phase:
+    """Return a phase that holds a torque, the same on both arms unless a right one is given."""
+    right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
+    return Phase(duration_s, Load(torque_left_Nm), Load(right))
 
 
-def torque_at(steps: TorqueSteps, time_s: ArrayLike) -> Array:
-    """Torque of the left arm in N m; at the instant of a step, its value after it."""
-    passed = np.searchsorted(steps.time_s, np.asarray(time_s, dtype=float), side="right")
-    return np.concatenate(([0.0], np.cumsum(steps.left_Nm)))[passed]
+def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:
+    """Turn phases that follow one another from t = 0 into what sets in when."""
+    ends = np.cumsum([phase.duration_s for phase in phases])
+    starts = np.concatenate(([0.0], ends[:-1]))
+    jumps, harmonics = [], []
+    before = {"left": np.zeros(3), "right": np.zeros(3)}
+    for start, phase in zip(starts, phases, strict=True):
+        row = []
+        for arm in ("left", "right"):
+            load: Load = getattr(phase, arm)
+            now = np.array([load.value_Nm, load.slope_Nm_per_s, load.curvature_Nm_per_s2])
+            row.append(now - before[arm])
+            t, (value, slope, curvature) = phase.duration_s, now
+            before[arm] = np.array(
+                [value + slope * t + curvature * t**2 / 2, slope + curvature * t, curvature]
+            )
+        jumps.append(row)
+        harmonics += _harmonic_events(start, phase)
+    left, right = np.moveaxis(np.array(jumps), 1, 0)
+    times, omegas, a_left, a_right = (
+        (np.array(c) for c in zip(*harmonics, strict=True))
+        if (harmonics)
+        else (np.zeros(0), np.zeros(0), np.zeros(0, complex), np.zeros(0, complex))
+    )
+    return TorqueHistory(starts, left, right, times, omegas, a_left, a_right, float(ends[-1]))
 
 
-def duration_s(phases: tuple[Phase, ...]) -> float:
-    """Length of the whole protocol in s."""
-    return float(sum(phase.duration_s for phase in phases))
+def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, complex, complex]]:
+    """Switching on, and at the end of the phase off, of its sinusoids."""
+    events = []
+    for arm in ("left", "right"):
+        for h in getattr(phase, arm).harmonics:
+            for time, sign in ((0.0, 1), (phase.duration_s, -1)):
+                angle = h.phase_rad + h.omega_rad_per_s * time
+                a = sign * h.amplitude_Nm * complex(math.cos(angle), math.sin(angle))
+                both = (a, 0j) if arm == "left" else (0j, a)
+                events.append((start + time, h.omega_rad_per_s, *both))
+    return _merged(events)
 
 
-def sample_times(phases: tuple[Phase, ...], rate_Hz: float) -> Array:
-    """Uniform sampling instants in s, both ends of the protocol included."""
-    count = int(np.floor(duration_s(phases) * rate_Hz * (1 + 1e-12))) + 1
+def _merged(
+    events: list[tuple[float, float, complex, complex]],
+) -> list[tuple[float, float, complex, complex]]:
+    """Join what both arms do at the same time with the same frequency."""
+    merged: dict[tuple[float, float], list[complex]] = {}
+    for time, omega, left, right in events:
+        pair = merged.setdefault((time, omega), [0j, 0j])
+        pair[0] += left
+        pair[1] += right
+    return [(time, omega, left, right) for (time, omega), (left, right) in merged.items()]
+
+
+def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> Array:
+    """Torque of an arm in N m; at the instant of a step, its value after it."""
+    t = np.asarray(time_s, dtype=float)
+    torque = np.zeros_like(t)
+    for start, (value, slope, curvature) in zip(history.time_s, getattr(history, arm), strict=True):
+        elapsed = t - start
+        rise = value + slope * elapsed + curvature * elapsed**2 / 2
+        torque += np.where(elapsed >= 0, rise, 0.0)
+    amplitudes = getattr(history, f"harmonic_{arm}")
+    for start, omega, a in zip(
+        history.harmonic_time_s, history.omega_rad_per_s, amplitudes, strict=True
+    ):
+        elapsed = t - start
+        torque += np.where(elapsed >= 0, (a * np.exp(1j * omega * elapsed)).real, 0.0)
+    return torque
+
+
+def sample_times(duration_s: float, rate_Hz: float) -> Array:
+    """Uniform sampling instants in s, both ends included where they fall on one."""
+    count = int(np.floor(duration_s * rate_Hz * (1 + 1e-12))) + 1
     return np.arange(count) / rate_Hz

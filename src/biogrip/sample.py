@@ -1,19 +1,24 @@
 """Constitutive models of the sample: spring-dashpot networks between the two jaws (Figure 5).
 
-Every network is a membrane spring k_p and a damper c_p beside any number of
+Every network is a parallel spring k_p and damper c_p beside any number of
 Maxwell branches (a spring k and a damper c in series). Its force follows the
 shortening delta of the sample as
 
     F(s) = [k_p + c_p s + sum_j k_j c_j s / (k_j + c_j s)] delta(s)
+
+A model is one entry of `MODELS`; genome, tables and figures follow from it.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array
+
+_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
+_SUFFIXES = {"stiffness": "_N_per_m", "damping": "_Ns_per_m"}
 
 
 @dataclass(frozen=True)
@@ -23,26 +28,38 @@ class Parameter:
     Parameters
     ----------
     name
-        Identifier in config and code.
+        Identifier in config, columns and code.
     kind
-        ``"stiffness"`` or ``"damping"``; decides the unit and the search range.
+        ``"stiffness"`` or ``"damping"``; decides the unit.
     meaning
         A few words for tables.
+    range_name
+        Which entry of the search range holds for it.
+    may_vanish
+        Whether zero is a possible value: the element is then not there.
     """
 
     name: str
     kind: str
     meaning: str
+    range_name: str
+    may_vanish: bool = False
 
     @property
     def unit(self) -> str:
         """SI unit."""
-        return {"stiffness": "N/m", "damping": "N s/m"}[self.kind]
+        return _UNITS[self.kind]
 
     @property
     def column(self) -> str:
         """Name of the parameter's column in result files."""
-        return self.name + {"stiffness": "_N_per_m", "damping": "_Ns_per_m"}[self.kind]
+        return self.name + _SUFFIXES[self.kind]
+
+    @property
+    def symbol(self) -> str:
+        """The symbol as mathtext."""
+        letter, _, index = self.name.partition("_")
+        return f"${letter}_{{{index}}}$" if index else f"${letter}$"
 
 
 @dataclass(frozen=True)
@@ -75,12 +92,16 @@ class SampleModel:
         What there is to identify, in the order of the columns of a population.
     network
         Turns parameters of shape (n, n_parameters) into a `Network`.
+    exchangeable
+        Parameters whose sum deserves a row of its own in tables, because stiff
+        branches make them trade against each other.
     """
 
     name: str
     title: str
     parameters: tuple[Parameter, ...]
-    network: Callable[[Array], Network]
+    network: Callable[[ArrayLike], Network]
+    exchangeable: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -88,26 +109,41 @@ class SampleModel:
         return tuple(parameter.name for parameter in self.parameters)
 
 
-K = Parameter("k", "stiffness", "Maxwell spring")
-K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring")
-C = Parameter("c", "damping", "Maxwell damper")
-C_P = Parameter("c_p", "damping", "parallel damper")
+K = Parameter("k", "stiffness", "Maxwell spring", "k")
+K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring", "k_p", may_vanish=True)
+C = Parameter("c", "damping", "Maxwell damper", "c")
+C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
+
+SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
+"""The paper's parameters, which every file of identifications has columns for."""
+
+MOST_BRANCHES = 8
+
+
+def _columns(parameters: ArrayLike) -> Array:
+    return np.atleast_2d(np.asarray(parameters, dtype=float)).T
 
 
 def generalized_maxwell(parameters: ArrayLike) -> Network:
-    r"""Generalized Maxwell-Wiechert model, Figure 5 (2); columns k, k_p, c, c_p.
+    r"""Generalized Maxwell-Wiechert model, Figure 5 (2).
+
+    With one branch the columns are k, k_p, c, c_p; with more they are
+    k_1 ... k_n, k_p, c_1 ... c_n, c_p.
 
     ::
 
               +---/\/\/---[==]---+
-              |     k       c    |
+              |    k_1    c_1    |
+              +---/\/\/---[==]---+      (any number of branches)
+              |    k_2    c_2    |
         B o---+------/\/\/-------+---o C
               |       k_p        |
               +-------[==]-------+
                       c_p
     """
-    k, k_p, c, c_p = np.atleast_2d(np.asarray(parameters, dtype=float)).T
-    return Network(k_p=k_p, c_p=c_p, k=k[:, None], c=c[:, None])
+    columns = _columns(parameters)
+    n = len(columns) // 2 - 1
+    return Network(k_p=columns[n], c_p=columns[-1], k=columns[:n].T, c=columns[n + 1 : 2 * n + 1].T)
 
 
 def liquid_drop(parameters: ArrayLike) -> Network:
@@ -120,9 +156,95 @@ def liquid_drop(parameters: ArrayLike) -> Network:
         B o---+------/\/\/-------+---o C
                       k_p
     """
-    k, k_p, c = np.atleast_2d(np.asarray(parameters, dtype=float)).T
+    k, k_p, c = _columns(parameters)
     return Network(k_p=k_p, c_p=np.zeros_like(k_p), k=k[:, None], c=c[:, None])
 
+
+def kelvin_voigt(parameters: ArrayLike) -> Network:
+    r"""Kelvin-Voigt solid; columns k_p, c_p.
+
+    ::
+
+              +------/\/\/-------+
+        B o---+       k_p        +---o C
+              +-------[==]-------+
+                      c_p
+    """
+    k_p, c_p = _columns(parameters)
+    none = np.zeros((len(k_p), 0))
+    return Network(k_p=k_p, c_p=c_p, k=none, c=none)
+
+
+def maxwell(parameters: ArrayLike) -> Network:
+    r"""Maxwell liquid; columns k, c.
+
+    ::
+
+        B o---/\/\/---[==]---o C
+                k       c
+    """
+    k, c = _columns(parameters)
+    none = np.zeros_like(k)
+    return Network(k_p=none, c_p=none, k=k[:, None], c=c[:, None])
+
+
+def zener_kelvin(parameters: ArrayLike) -> Network:
+    r"""Zener solid (standard linear solid) in Kelvin's form; columns k_s, k_v, c_v.
+
+    Its Maxwell form has k_p = k_s k_v/(k_s + k_v), k = k_s^2/(k_s + k_v) and
+    c = c_v [k_s/(k_s + k_v)]^2.
+
+    ::
+
+                         +---/\/\/---+
+        B o---/\/\/------+    k_v    +---o C
+               k_s       +---[==]----+
+                              c_v
+    """
+    k_s, k_v, c_v = _columns(parameters)
+    share = k_s / (k_s + k_v)
+    return Network(
+        k_p=share * k_v,
+        c_p=np.zeros_like(k_s),
+        k=(share * k_s)[:, None],
+        c=(share**2 * c_v)[:, None],
+    )
+
+
+def burgers(parameters: ArrayLike) -> Network:
+    r"""Burgers fluid; columns k_s, c_s, k_v, c_v.
+
+    A Maxwell liquid and a Kelvin-Voigt element in series have the compliance
+    1/k_s + 1/(c_s s) + 1/(k_v + c_v s). Its inverse is two Maxwell branches, their
+    rates the roots of a r^2 - b r + k_v with a = c_s c_v/k_s, e = c_s k_v/k_s and
+    b = c_s + c_v + e; their springs share k_s. Written without differences.
+
+    ::
+
+                                +---/\/\/---+
+        B o---/\/\/---[==]------+    k_v    +---o C
+               k_s    c_s       +---[==]----+
+                                     c_v
+    """
+    k_s, c_s, k_v, c_v = _columns(parameters)
+    e = c_s * k_v / k_s
+    d = c_s + c_v - e
+    root = np.hypot(d, 2 * np.sqrt(c_s * e))
+    larger = 0.5 * (np.abs(d) + root)
+    smaller = c_s * e / larger
+    # q - e and e - q', with q and q' the greater and lesser of (b +- root) / 2.
+    fast, slow = np.where(d >= 0, (larger, smaller), (smaller, larger))
+    q = e + fast
+    rates = np.stack((q * k_s / (c_s * c_v), k_v / q), axis=1)
+    springs = np.stack((k_s * fast / root, k_s * slow / root), axis=1)
+    none = np.zeros_like(k_s)
+    return Network(k_p=none, c_p=none, k=springs, c=springs / rates)
+
+
+_K_S = Parameter("k_s", "stiffness", "series spring", "k")
+_C_S = Parameter("c_s", "damping", "series damper", "c")
+_K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
+_C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")
 
 MODELS: dict[str, SampleModel] = {
     model.name: model
@@ -130,8 +252,9 @@ MODELS: dict[str, SampleModel] = {
         SampleModel(
             "generalized_maxwell",
             "generalized Maxwell-Wiechert model",
-            (K, K_P, C, C_P),
+            SINGLE_BRANCH,
             generalized_maxwell,
+            exchangeable=("c", "c_p"),
         ),
         SampleModel(
             "liquid_drop",
@@ -139,7 +262,50 @@ MODELS: dict[str, SampleModel] = {
             (K, K_P, C),
             liquid_drop,
         ),
+        SampleModel("kelvin_voigt", "Kelvin-Voigt solid", (K_P, C_P), kelvin_voigt),
+        SampleModel("maxwell", "Maxwell liquid", (K, C), maxwell),
+        SampleModel(
+            "zener_maxwell",
+            "Zener solid, Maxwell form",
+            (K, replace(K_P, meaning="parallel spring"), C),
+            liquid_drop,
+        ),
+        SampleModel("zener_kelvin", "Zener solid, Kelvin form", (_K_S, _K_V, _C_V), zener_kelvin),
+        SampleModel("burgers", "Burgers fluid", (_K_S, _C_S, _K_V, _C_V), burgers),
     )
 }
 
-ALL_PARAMETERS: tuple[Parameter, ...] = (K, K_P, C, C_P)
+
+def model_named(name: str, branches: int = 1) -> SampleModel:
+    """Return a model, the generalized one with a number of Maxwell branches."""
+    model = MODELS[name]
+    if branches == 1:
+        return model
+    springs = tuple(
+        replace(K, name=f"k_{j}", meaning=f"spring of branch {j}") for j in range(1, branches + 1)
+    )
+    dampers = tuple(
+        replace(C, name=f"c_{j}", meaning=f"damper of branch {j}") for j in range(1, branches + 1)
+    )
+    return replace(
+        model,
+        parameters=(*springs, K_P, *dampers, C_P),
+        exchangeable=(*(damper.name for damper in dampers), "c_p"),
+    )
+
+
+def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
+    """Return the model with some parameters at known values, and only the others to identify."""
+    if not fixed:
+        return model
+    free = tuple(p for p in model.parameters if p.name not in fixed)
+
+    def network(parameters: ArrayLike) -> Network:
+        given = np.atleast_2d(np.asarray(parameters, dtype=float))
+        columns = dict(zip((p.name for p in free), given.T, strict=True))
+        filled = [
+            columns.get(name, np.full(len(given), fixed.get(name, np.nan))) for name in model.names
+        ]
+        return model.network(np.stack(filled, axis=1))
+
+    return replace(model, parameters=free, network=network)

@@ -8,12 +8,12 @@ from biogrip.gripper import Gripper
 from biogrip.identify.genetic import GeneticSettings, Identification, _cross, _mutate, genetic
 from biogrip.identify.genome import GeneRange, genome_of
 from biogrip.measurement import Noise, add_noise, rms
-from biogrip.protocol import TorqueSteps
+from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import PopulationMisfit
+from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.sample import MODELS
 
-PAPER = GeneticSettings(500, 250, "pairs", 1, 11, 20, 0.5, 1, 20, 40, 200)
+PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 MODEL = MODELS["generalized_maxwell"]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 GENOME = genome_of(MODEL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
@@ -120,7 +120,7 @@ def test_mutation_waits_for_its_generation() -> None:
 
 
 @pytest.fixture(scope="module")
-def endothelial(gripper: Gripper, steps: TorqueSteps) -> tuple[Array, Array]:
+def endothelial(gripper: Gripper, steps: TorqueHistory) -> tuple[Array, Array]:
     """Target and one noisy trace of Table 5."""
     time_s = np.arange(4001) / 10
     response = step_response(gripper, MODEL.network(np.array([35.0, 12.3, 299.9, 1e-3])))
@@ -129,10 +129,10 @@ def endothelial(gripper: Gripper, steps: TorqueSteps) -> tuple[Array, Array]:
 
 
 def test_last_bits_of_the_misfit_do_not_matter(
-    gripper: Gripper, steps: TorqueSteps, endothelial: tuple[Array, Array]
+    gripper: Gripper, steps: TorqueHistory, endothelial: tuple[Array, Array]
 ) -> None:
     """A misfit wrong by 1e-13, far more than processors differ, takes the same way."""
-    misfit = PopulationMisfit(gripper, MODEL, steps, 0.1, endothelial[1])
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, endothelial[1])
     jitter = np.random.default_rng(7)
 
     def disturbed(parameters: Array) -> Array:
@@ -147,14 +147,14 @@ def test_last_bits_of_the_misfit_do_not_matter(
 
 
 def test_about_four_runs_in_ten_find_the_basin_of_table_5(
-    gripper: Gripper, steps: TorqueSteps, endothelial: tuple[Array, Array]
+    gripper: Gripper, steps: TorqueHistory, endothelial: tuple[Array, Array]
 ) -> None:
     """What the algorithm as printed is worth: neither nothing nor certainty.
 
     60 runs at a true share of 0.42 give 25, with a standard deviation of 3.8.
     """
     target, trace = endothelial
-    misfit = PopulationMisfit(gripper, MODEL, steps, 0.1, trace)
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
     floor = 1.02 * rms(trace - target)
     answers = [genetic(misfit, GENOME, PAPER, np.random.default_rng([8, s])) for s in range(60)]
     good = [answer for answer in answers if answer.misfit_rad <= floor]

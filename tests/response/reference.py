@@ -10,11 +10,11 @@ from mpmath import mp, mpf
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueSteps
+from biogrip.protocol import TorqueHistory
 
 
 def rotation_50_digits(
-    gripper: Gripper, parameters: Array, steps: TorqueSteps, time_s: Array
+    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:
     """phi_2 of one sample (k, k_p, c, c_p) with inertia, shape (n_times,)."""
     with mp.workdps(50):
@@ -38,7 +38,9 @@ def rotation_50_digits(
         a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
         rates, vectors = mp.eig(a)
         phi = [mpf(0)] * len(time_s)
-        for start, left, right in zip(steps.time_s, steps.left_Nm, steps.right_Nm, strict=True):
+        for start, left, right in zip(
+            steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True
+        ):
             load = mp.matrix(5, 1)
             load[2], load[3] = mpf(float(left)) / inertia[0], mpf(float(right)) / inertia[1]
             rest = mp.lu_solve(a, -load)

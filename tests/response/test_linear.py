@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Phase, TorqueSteps, torque_steps
+from biogrip.protocol import TorqueHistory, held, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import Network, generalized_maxwell
 from tests.response.reference import random_samples, rotation_50_digits
@@ -16,10 +16,8 @@ TIMES = np.array([0.1, 0.2, 0.7, 3.3, 20.0, 90.0, 199.9, 200.1, 200.5, 210.0, 29
 CHUNKS = range(10)
 
 
-def worst_error(gripper: Gripper, steps: TorqueSteps, samples: Array) -> float:
-    response = step_response(
-        gripper, generalized_maxwell(samples), symmetric_torque=steps.symmetric
-    )
+def worst_error(gripper: Gripper, steps: TorqueHistory, samples: Array) -> float:
+    response = step_response(gripper, generalized_maxwell(samples), symmetric=steps.symmetric)
     ours = rotation(response, steps, TIMES)
     exact = np.array([rotation_50_digits(gripper, sample, steps, TIMES) for sample in samples])
     return float(np.max(np.abs(ours - exact) / np.abs(exact).max(axis=1, keepdims=True)))
@@ -27,7 +25,7 @@ def worst_error(gripper: Gripper, steps: TorqueSteps, samples: Array) -> float:
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 def test_equal_arms_over_the_whole_search_range(
-    gripper: Gripper, steps: TorqueSteps, chunk: int
+    gripper: Gripper, steps: TorqueHistory, chunk: int
 ) -> None:
     """1000 chromosomes against 50 digits; 1e-9 of the peak is asked, 1e-11 is held."""
     assert worst_error(gripper, steps, random_samples(100, chunk)) < 1e-11
@@ -35,15 +33,15 @@ def test_equal_arms_over_the_whole_search_range(
 
 @pytest.mark.parametrize("chunk", CHUNKS)
 def test_unequal_arms_over_the_whole_search_range(
-    unequal_gripper: Gripper, steps: TorqueSteps, chunk: int
+    unequal_gripper: Gripper, steps: TorqueHistory, chunk: int
 ) -> None:
     """1000 chromosomes against 50 digits; 1e-6 of the peak is asked, 1e-11 is held."""
     assert worst_error(unequal_gripper, steps, random_samples(100, 100 + chunk)) < 1e-11
 
 
 def test_unequal_torques(gripper: Gripper, unequal_gripper: Gripper) -> None:
-    steps = torque_steps(
-        (Phase(50.0, 1.6e-9, 0.9e-9), Phase(150.0, 0.0, 0.4e-9), Phase(200.0, 0.32e-9, 0.32e-9))
+    steps = torque_history(
+        (held(50.0, 1.6e-9, 0.9e-9), held(150.0, 0.0, 0.4e-9), held(200.0, 0.32e-9))
     )
     for arms in (gripper, unequal_gripper):
         assert worst_error(arms, steps, random_samples(25, 999)) < 1e-10
@@ -57,10 +55,10 @@ def test_mirrored_gripper_swaps_its_arms(unequal_gripper: Gripper) -> None:
         unequal_gripper.right,
         unequal_gripper.left,
     )
-    right_only = torque_steps((Phase(400.0, 0.0, 1.6e-9),))
+    right_only = torque_history((held(400.0, 0.0, 1.6e-9),))
     network = generalized_maxwell(random_samples(200, 5))
     ours, theirs = (
-        rotation(step_response(arms, network, symmetric_torque=False), right_only, TIMES)
+        rotation(step_response(arms, network, symmetric=False), right_only, TIMES)
         for arms in (unequal_gripper, mirrored)
     )
     scale = np.abs(ours).max(axis=1, keepdims=True)
@@ -99,14 +97,14 @@ def test_against_radau_with_inertia() -> None:
         )
         state = solved.y[:, -1]
         integrated.append(solved.y[0, 1:])
-    steps = torque_steps((Phase(4.0, 1.6e-9, 1.6e-9), Phase(4.0, 0.32e-9, 0.32e-9)))
+    steps = torque_history((held(4.0, 1.6e-9), held(4.0, 0.32e-9)))
     time_s = np.concatenate((grid, 4 + grid[1:]))
     ours = rotation(step_response(gripper, generalized_maxwell(sample)), steps, time_s)[0]
     # Radau's local tolerance, over a few thousand steps.
     assert np.max(np.abs(ours - np.concatenate(integrated))) < 1e-7 * np.abs(ours).max()
 
 
-def test_inertia_may_be_left_out_of_the_misfit(gripper: Gripper, steps: TorqueSteps) -> None:
+def test_inertia_may_be_left_out_of_the_misfit(gripper: Gripper, steps: TorqueHistory) -> None:
     """From 0.1 s after a step, what inertia changes is bounded.
 
     A slow pole p = k/c moves by the share p I/c = p^2 I/k, which changes its
@@ -132,7 +130,7 @@ def test_inertia_free_rates_are_real_and_negative(unequal_gripper: Gripper) -> N
     assert np.all(response.rates < 0)
 
 
-def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueSteps) -> None:
+def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueHistory) -> None:
     samples = random_samples(500, 13)
     response = step_response(gripper, generalized_maxwell(samples))
     peak = np.abs(rotation(response, steps, TIMES)).max(axis=1)
@@ -142,7 +140,7 @@ def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueS
     np.testing.assert_allclose(response.static[:, 0], expected, rtol=1e-14)
 
 
-def test_identical_branches_make_no_trouble(gripper: Gripper, steps: TorqueSteps) -> None:
+def test_identical_branches_make_no_trouble(gripper: Gripper, steps: TorqueHistory) -> None:
     """Two equal Maxwell branches are one of twice the spring and damper: a double root cancels."""
     one = Network(np.array([1.0]), np.array([0.1]), np.array([[4.0]]), np.array([[20.0]]))
     two = Network(

@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Phase, torque_steps
+from biogrip.protocol import held, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import generalized_maxwell
 from biogrip.study.validation import schema
@@ -62,7 +62,7 @@ def test_last_row_is_the_identification_that_its_own_trace_gives(finished: Path)
     """Misfit and noise in the file, recomputed from the files alone."""
     results = finished / "results"
     arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
-    steps = torque_steps((Phase(200.0, 1.6e-9, 1.6e-9), Phase(200.0, 0.32e-9, 0.32e-9)))
+    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
     found = pd.read_csv(results / "identifications" / f"{CASES[0]}.csv").iloc[-1]
     trace = pq.read_table(results / "measurements" / CASES[0] / "seeds_2-3.parquet").to_pandas()
     sample = found[["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]].to_numpy(float)

@@ -46,6 +46,11 @@ PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
 
 
+def calibrations_of(case):
+    """The calibration that a case relies on, if it does."""
+    return [f"results/calibrations/{case}.yaml"] if PLAN.is_calibrated(case) else []
+
+
 wildcard_constraints:
     case="[A-Za-z][A-Za-z0-9_-]*",
     batch=r"seeds_\d+-\d+",

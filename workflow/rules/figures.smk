@@ -22,6 +22,7 @@ rule overview_figure:
         measurements=PLAN.batch_files(
             "results/measurements/{case}/{batch}.parquet", CASES[0]
         ),
+        calibrated=calibrations_of(CASES[0]),
         code=source_files("biogrip.figures.overview"),
     output:
         png=report(
@@ -41,7 +42,7 @@ rule overview_figure:
         "Drawing the overview"
     shell:
         "biogrip figure overview --settings {params.settings:q} "
-        "--inputs {input.identifications:q} {input.measurements:q} "
+        "--inputs {input.identifications:q} {input.measurements:q} {input.calibrated:q} "
         "--output {output.png:q} 2> {log:q}"
 
 
@@ -104,6 +105,7 @@ rule fit_figure:
         measurements=lambda wildcards: PLAN.batch_files(
             "results/measurements/{case}/{batch}.parquet", wildcards.case
         ),
+        calibrated=lambda wildcards: calibrations_of(wildcards.case),
         code=source_files("biogrip.figures.fit"),
     output:
         png=report(
@@ -123,7 +125,7 @@ rule fit_figure:
         "Drawing the best fit of {wildcards.case}"
     shell:
         "biogrip figure fit --settings {params.settings:q} "
-        "--inputs {input.identifications:q} {input.measurements:q} "
+        "--inputs {input.identifications:q} {input.measurements:q} {input.calibrated:q} "
         "--output {output.png:q} 2> {log:q}"
 
 

@@ -4,6 +4,7 @@
 rule identification:
     input:
         measurements="results/measurements/{case}/{batch}.parquet",
+        calibrated=lambda wildcards: calibrations_of(wildcards.case),
         code=source_files("biogrip.stages.identification"),
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
@@ -18,7 +19,7 @@ rule identification:
         "Identifying {wildcards.case}, {wildcards.batch}"
     shell:
         "biogrip identification --settings {params.settings:q} --seeds {wildcards.batch} "
-        "--measurements {input.measurements:q} "
+        "--measurements {input.measurements:q} --calibrated {input.calibrated:q} "
         "--output {output.parameters:q} --history {output.history:q} 2> {log:q}"
 
 
@@ -39,7 +40,7 @@ rule collection:
     conda:
         "../envs/biogrip.yaml"
     params:
-        settings=PLAN.collection(),
+        settings=lambda wildcards: PLAN.collection(wildcards.case),
     message:
         "Putting together the identifications of {wildcards.case}"
     shell:

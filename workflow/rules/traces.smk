@@ -35,3 +35,22 @@ rule measurement:
     shell:
         "biogrip measurement --settings {params.settings:q} --seeds {wildcards.batch} "
         "--target {input.target:q} --output {output:q} 2> {log:q}"
+
+
+rule calibration:
+    input:
+        code=source_files("biogrip.stages.calibration"),
+    output:
+        gripper="results/calibrations/{case}.yaml",
+        traces="results/calibrations/{case}.parquet",
+    log:
+        "results/logs/calibration/{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.calibration(wildcards.case),
+    message:
+        "Calibrating the gripper of {wildcards.case} without a sample"
+    shell:
+        "biogrip calibration --settings {params.settings:q} "
+        "--output {output.gripper:q} --traces {output.traces:q} 2> {log:q}"

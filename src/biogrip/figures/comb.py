@@ -13,14 +13,14 @@ from matplotlib.patches import Wedge
 from biogrip import actuator
 from biogrip.actuator import CombDrive
 from biogrip.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
-from biogrip.protocol import torque_at, torque_steps
+from biogrip.protocol import torque_at
 from biogrip.study import build
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
     comb = build.comb_drive(settings["actuator"])
-    steps = torque_steps(build.phases(settings["protocol"]))
+    steps = build.torque(settings)
     drawn = figure(PAGE_IN, 2.7)
     whole, detail, curve = drawn.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from biogrip.figures.results import SYMBOLS, read_history
+from biogrip.figures.results import read_history
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
-from biogrip.sample import MODELS
+from biogrip.study import build
 from biogrip.tables.errors import read_identifications
 
 
@@ -24,7 +24,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     found = read_identifications(inputs[0])
     history = read_history(inputs[1])
     best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
-    parameters = MODELS[settings["model"]].parameters
+    parameters = build.sample_model(settings).parameters
     identified = settings["published"].get("identified", {})
     drawn = figure(PAGE_IN, 3.9)
     grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
@@ -39,7 +39,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
         axes.set_yscale("log")
-        axes.set_ylabel(f"{SYMBOLS[parameter.name]} ({parameter.unit})")
+        axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
         axes.set_xlim(0, history["generation"].max())
     for axes in grid[-(len(grid) // 2) :]:
         axes.set_xlabel("generation")

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.results import SYMBOLS, best_fit, scale_of
+from biogrip.figures.results import best_fit, scale_of
 from biogrip.figures.style import (
     ALL_SEEDS,
     FITTED,
@@ -19,8 +19,8 @@ from biogrip.figures.style import (
     figure,
     panel,
 )
-from biogrip.sample import MODELS
-from biogrip.tables.errors import at_noise_floor, read_identifications
+from biogrip.study import build
+from biogrip.tables.errors import at_noise_floor, quantities, read_identifications
 
 _WORST = 1e3
 _MOST_CASES = 4
@@ -38,11 +38,11 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         first (Parquet).
     """
     identifications = [path for path in inputs if path.suffix == ".csv"]
-    measurements = [path for path in inputs if path.suffix == ".parquet"]
+    others = [path for path in inputs if path.suffix != ".csv"]
     cases = list(settings["cases"].values())[:_MOST_CASES]
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    _fit(axes[0], cases[0], identifications[0], measurements)
+    _fit(axes[0], cases[0], identifications[0], others)
     for index, (case, path) in enumerate(zip(cases, identifications, strict=False)):
         _scatter(axes[index + 1], case, path, settings["noise_floor_tolerance"], index)
     handles, labels = axes[1].get_legend_handles_labels()
@@ -57,8 +57,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     return drawn
 
 
-def _fit(axes: Axes, case: dict[str, Any], identifications: Path, measurements: list[Path]) -> None:
-    fit = best_fit(case, identifications, measurements)
+def _fit(axes: Axes, case: dict[str, Any], identifications: Path, others: list[Path]) -> None:
+    fit = best_fit(case, identifications, others)
     factor, unit = scale_of(fit.target_rad, "rad")
     axes.plot(
         fit.time_s,
@@ -138,19 +138,16 @@ def _quantities(
     case: dict[str, Any],
 ) -> list[tuple[str, list[str], float, float | None]]:
     """Label, columns, target and the paper's value of each parameter, and of c + c_p."""
-    parameters = MODELS[case["model"]].parameters
-    dampers = [parameter for parameter in parameters if parameter.kind == "damping"]
-    groups = [[parameter] for parameter in parameters] + ([dampers] if len(dampers) > 1 else [])
     identified = case["published"].get("identified", {})
-    quantities = []
-    for group in groups:
+    found = []
+    for group in quantities(build.sample_model(case)):
         target = sum(case["parameters"][parameter.name] for parameter in group)
         known = all(parameter.name in identified for parameter in group)
         paper = sum(identified[parameter.name] for parameter in group) if known else None
-        label = "+".join(SYMBOLS[parameter.name] for parameter in group)
+        label = "+".join(parameter.symbol for parameter in group)
         if target > 0:
-            quantities.append((label, [p.column for p in group], target, paper))
-    return quantities
+            found.append((label, [p.column for p in group], target, paper))
+    return found
 
 
 def _clipped(ratio: Array) -> Array:

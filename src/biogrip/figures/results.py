@@ -8,16 +8,14 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.errors import BiogripError
-from biogrip.protocol import torque_steps
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS
+from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.tables.errors import read_identifications
 from biogrip.traces import read_measurements
-
-SYMBOLS = {"k": "$k$", "k_p": "$k_p$", "c": "$c$", "c_p": "$c_p$"}
 
 
 @dataclass(frozen=True)
@@ -40,38 +38,41 @@ class Fit:
     fitted_rad: Array
 
 
-def best_fit(settings: dict[str, Any], identifications: Path, measurements: list[Path]) -> Fit:
+def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]) -> Fit:
     """Read the seed of lowest misfit and simulate its answer.
 
     Parameters
     ----------
     settings
-        ``model``, ``gripper``, ``protocol``.
+        ``model``, ``branches``, ``gripper``, ``protocol``, ``nonlinear``.
     identifications
         Identifications of the case, CSV.
-    measurements
-        Its noisy traces, Parquet; named after their batch of seeds.
+    others
+        Its noisy traces, Parquet, named after their batch of seeds; and its
+        calibration, YAML, if it has one.
     """
     found = read_identifications(identifications)
     best = found.loc[found["misfit_rad"].idxmin()]
     seed = int(best["seed"])
-    recorded = read_measurements(_holding(seed, measurements), [seed])
-    model = MODELS[settings["model"]]
-    parameters = [float(best[parameter.column]) for parameter in model.parameters]
-    steps = torque_steps(build.phases(settings["protocol"]))
-    response = step_response(
-        build.gripper(settings["gripper"]),
-        model.network(np.array([parameters])),
-        symmetric_torque=steps.symmetric,
-    )
-    fitted = rotation(response, steps, recorded.time_s)[0]
+    recorded = read_measurements(_holding(seed, others), [seed])
+    model = build.sample_model(settings)
+    network = model.network(np.array([[float(best[p.column]) for p in model.parameters]]))
+    gripper, torque = build.gripper(settings["gripper"]), build.torque(settings)
+    for path in others:
+        if path.suffix == ".yaml":
+            gripper = read_calibrated_arms(path, gripper)
+    if settings["nonlinear"]:
+        fitted = nonlinear_rotation(gripper, network, torque, recorded.time_s)
+    else:
+        response = step_response(gripper, network, symmetric=torque.symmetric)
+        fitted = rotation(response, torque, recorded.time_s)
     return Fit(
         seed,
         int(best["generations"]),
         recorded.time_s,
         recorded.target_rad,
         recorded.rotation_rad[seed],
-        fitted,
+        fitted[0],
     )
 
 

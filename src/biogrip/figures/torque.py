@@ -1,5 +1,6 @@
 """Figure 3: the torque that the comb drives exert, and the voltage it takes."""
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -8,38 +9,42 @@ from matplotlib.figure import Figure
 
 from biogrip import actuator
 from biogrip.figures.style import BLUE, COLUMN_IN, ORANGE, figure
-from biogrip.protocol import duration_s, torque_at, torque_steps
+from biogrip.protocol import torque_at, torque_history
 from biogrip.study import build
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     """Draw torque and voltage of the left arm against time."""
-    phases = build.phases(settings["protocol"])
+    phases = build.phases(settings)
     comb = build.comb_drive(settings["actuator"])
-    steps = torque_steps(phases)
-    ends = np.append(steps.time_s, duration_s(phases))
-    torque = torque_at(steps, steps.time_s)
-    volts = actuator.voltage(comb, torque)
+    history = torque_history(phases)
+    # Both sides of every jump, and enough points for ramps and sinusoids.
+    grid = np.linspace(0, history.end_s, 4001)
+    time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
+    torque = torque_at(history, time_s)
+    volts = actuator.voltage(comb, np.maximum(torque, 0))
     drawn = figure(COLUMN_IN, 2.2)
-    left, right = drawn.subplots(2, 1, sharex=True)
-    left.stairs(1e9 * torque, ends, baseline=0, color=BLUE, linewidth=1.4)
-    left.set_ylabel("torque (nN m)")
-    right.stairs(volts, ends, baseline=0, color=ORANGE, linewidth=1.4)
-    right.set_ylabel("voltage (V)")
-    right.set_xlabel("time (s)")
-    for axes, values, form in (
-        (left, 1e9 * torque, "{:.3g} nN m"),
-        (right, volts, "{:.3g} V"),
+    upper, lower = drawn.subplots(2, 1, sharex=True)
+    ends = np.append(history.time_s, history.end_s)
+    for axes, values, unit, colour in (
+        (upper, 1e9 * torque, "nN m", BLUE),
+        (lower, volts, "V", ORANGE),
     ):
+        axes.plot(time_s, values, color=colour, linewidth=1.4)
         axes.set_ylim(0, 1.35 * values.max())
-        for start, end, value in zip(ends, ends[1:], values, strict=False):
-            axes.annotate(
-                form.format(value),
-                (0.5 * (start + end), value),
-                xytext=(0, 3),
-                textcoords="offset points",
-                ha="center",
-                fontsize=7,
-            )
+        for start, end in pairwise(ends):
+            here = values[(time_s >= start) & (time_s < end)]
+            if np.ptp(here) < 1e-9 * values.max():
+                axes.annotate(
+                    f"{here[0]:.3g} {unit}",
+                    (0.5 * (start + end), here[0]),
+                    xytext=(0, 3),
+                    textcoords="offset points",
+                    ha="center",
+                    fontsize=7,
+                )
+    upper.set_ylabel("torque (nN m)")
+    lower.set_ylabel("voltage (V)")
+    lower.set_xlabel("time (s)")
     drawn.align_ylabels()
     return drawn

@@ -24,7 +24,8 @@ class GeneticSettings:
         parents are drawn with a probability proportional to their rank.
     first_cut, last_cut
         Crossover point: the number of genes kept from the first parent is drawn
-        uniformly from this range; `last_cut` is at most the number of genes less one.
+        uniformly from this range. Negative numbers count from the end: -1 is one
+        less than the chromosome has.
     mutation_start
         First generation in which children mutate.
     mutation_probability
@@ -168,12 +169,12 @@ class _Population:
     ranking: np.ndarray[tuple[int], np.dtype[np.float32]]
 
     def first(self, count: int) -> "_Population":
-        return _Population(self.chromosomes[:count], self.codes[:count], self.ranking[:count])
+        return _Population(self.chromosomes[:count], self.codes[:, :count], self.ranking[:count])
 
     def merged(self, other: "_Population") -> "_Population":
         return _sorted(
             np.concatenate((self.chromosomes, other.chromosomes)),
-            np.concatenate((self.codes, other.codes)),
+            np.concatenate((self.codes, other.codes), axis=1),
             np.concatenate((self.ranking, other.ranking)),
         )
 
@@ -184,8 +185,8 @@ def _rank(chromosomes: IntArray, misfit: Callable[[Array], Array], genome: Genom
 
 
 def _sorted(chromosomes: IntArray, codes: IntArray, ranking: np.ndarray) -> _Population:
-    order = np.lexsort((codes, ranking))
-    return _Population(chromosomes[order], codes[order], ranking[order])
+    order = np.lexsort((*codes[::-1], ranking))
+    return _Population(chromosomes[order], codes[:, order], ranking[order])
 
 
 def _record(
@@ -208,8 +209,11 @@ def _cross(parents: IntArray, settings: GeneticSettings, rng: np.random.Generato
         shuffled = [rng.permutation(len(parents))[: len(parents) // 2 * 2] for _ in range(rounds)]
         drawn = np.concatenate(shuffled)[: 2 * pairs].reshape(pairs, 2)
     genes = parents.shape[1]
-    last = min(settings.last_cut, genes - 1)
-    cut = rng.integers(min(settings.first_cut, last), last, size=(pairs, 1), endpoint=True)
+    first, last = (
+        min(cut if cut > 0 else genes + cut, genes - 1)
+        for cut in (settings.first_cut, settings.last_cut)
+    )
+    cut = rng.integers(min(first, last), last, size=(pairs, 1), endpoint=True)
     mother, father = parents[drawn[:, 0]], parents[drawn[:, 1]]
     from_mother = np.arange(genes) < cut
     children = np.concatenate(

@@ -77,12 +77,24 @@ class Genome:
         return np.where(power < 0, mantissa / scale, mantissa * scale)
 
     def code(self, chromosomes: IntArray) -> IntArray:
-        """Number chromosomes so that different ones have different numbers, shape (n,)."""
-        span = self.high - self.low + 1
-        weight = np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))
-        return (chromosomes - self.low) @ weight
+        """Number chromosomes so that different ones have different numbers.
+
+        Returns
+        -------
+        (n_words, n)
+            Fifteen genes a word, for sorting and comparing.
+        """
+        words = []
+        for start in range(0, self.genes, _GENES_A_WORD):
+            here = slice(start, start + _GENES_A_WORD)
+            span = (self.high - self.low + 1)[here]
+            weight = np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))
+            words.append((chromosomes[:, here] - self.low[here]) @ weight)
+        return np.array(words)
 
 
+# Five parameters of the widest range, (37 * 9 * 9)^5, stay below 2^63.
+_GENES_A_WORD = 15
 _POWERS_OF_TEN = np.array([float(f"1e{power}") for power in range(23)])
 
 
@@ -94,9 +106,9 @@ def genome_of(model: SampleModel, ranges: dict[str, GeneRange]) -> Genome:
     model
         Gives the order of the parameters.
     ranges
-        Gene ranges by parameter name; others than the model's are ignored.
+        Gene ranges by the name of the range, see `Parameter.range_name`.
     """
-    chosen = [ranges[name] for name in model.names]
+    chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     low = [gene for r in chosen for gene in (r.exponent[0], r.digit[0], r.digit[0])]
     high = [gene for r in chosen for gene in (r.exponent[1], r.digit[1], r.digit[1])]
     return Genome(np.array(low, dtype=np.int64), np.array(high, dtype=np.int64))

@@ -3,28 +3,35 @@
 import csv
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from biogrip.arrays import Array
 from biogrip.files import written_whole
 from biogrip.identify.genetic import Identification
-from biogrip.sample import ALL_PARAMETERS, SampleModel
+from biogrip.sample import SINGLE_BRANCH, Parameter, SampleModel
 
-PARAMETER_COLUMNS = tuple(parameter.column for parameter in ALL_PARAMETERS)
+LEADING = ("case", "method", "seed")
+TRAILING = ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason")
 
-COLUMNS = (
-    "case",
-    "method",
-    "seed",
-    *PARAMETER_COLUMNS,
-    "misfit_rad",
-    "noise_rms_rad",
-    "generations",
-    "evaluations",
-    "stop_reason",
-)
+
+def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
+    """Parameters that a file of identifications has columns for.
+
+    The paper's four wherever they cover the model, elements that it lacks being
+    zero, so that such files can be put together; else the model's own.
+    """
+    return (
+        SINGLE_BRANCH if set(model.names) <= {p.name for p in SINGLE_BRANCH} else model.parameters
+    )
+
+
+def columns(model: SampleModel) -> tuple[str, ...]:
+    """Columns of a file of identifications."""
+    return (*LEADING, *(p.column for p in parameters_in_file(model)), *TRAILING)
 
 
 @dataclass(frozen=True)
@@ -35,8 +42,9 @@ class Record:
     ----------
     case, method, seed
         Whose it is.
-    model
-        Sample model that was identified.
+    model, searched, fixed
+        Sample model; the same without the parameters that were not identified;
+        and those, by name.
     answer
         What came out.
     noise_rms_rad
@@ -47,6 +55,8 @@ class Record:
     method: str
     seed: int
     model: SampleModel
+    searched: SampleModel
+    fixed: dict[str, float]
     answer: Identification
     noise_rms_rad: float
 
@@ -55,16 +65,16 @@ def write_identifications(path: Path, records: list[Record]) -> None:
     """Write one row a seed as CSV; elements that the model lacks are 0."""
     with written_whole(path) as scratch, scratch.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        writer.writerow(columns(records[0].model))
         for record in records:
             answer = record.answer
-            values = dict(zip(record.model.names, answer.parameters, strict=True))
+            values = _by_name(record, answer.parameters)
             writer.writerow(
                 (
                     record.case,
                     record.method,
                     record.seed,
-                    *(f"{values.get(p.name, 0.0):.10g}" for p in ALL_PARAMETERS),
+                    *(f"{values.get(p.name, 0.0):.10g}" for p in parameters_in_file(record.model)),
                     f"{answer.misfit_rad:.6e}",
                     f"{record.noise_rms_rad:.6e}",
                     answer.generations,
@@ -80,10 +90,15 @@ def write_histories(path: Path, records: list[Record]) -> None:
         pq.write_table(pa.concat_tables([_history(record) for record in records]), scratch)
 
 
+def _by_name(record: Record, identified: Array) -> dict[str, Any]:
+    """Identified and fixed values by parameter name."""
+    return {**record.fixed, **dict(zip(record.searched.names, identified, strict=True))}
+
+
 def _history(record: Record) -> pa.Table:
     history = record.answer.history
     generations = len(history.best_misfit)
-    values = dict(zip(record.model.names, history.best_parameters.T, strict=True))
+    values = _by_name(record, history.best_parameters.T)
     return pa.table(
         {
             "case": pa.array([record.case] * generations, pa.string()),
@@ -93,6 +108,9 @@ def _history(record: Record) -> pa.Table:
             "evaluations": history.evaluations,
             "best_misfit_rad": history.best_misfit,
             "median_misfit_rad": history.median_misfit,
-            **{p.column: values.get(p.name, np.zeros(generations)) for p in ALL_PARAMETERS},
+            **{
+                p.column: np.broadcast_to(values.get(p.name, 0.0), generations)
+                for p in parameters_in_file(record.model)
+            },
         }
     )

@@ -1,10 +1,11 @@
-"""The corrected linear model, eqs. (4)-(6), solved exactly for torque steps.
+"""The corrected linear model, eqs. (4)-(6), solved exactly for any protocol.
 
 With Z_i(s) = I_i s^2 + c_i s + k_i the impedance of an arm, G(s) = P/Q that of
 the sample and b = l sin(hat-theta_2) the lever of both arms, the closing
-rotation of the left arm is
+rotations are
 
     phi_2 = [Z_4 Q tau_2 + b^2 P (tau_2 - tau_4)] / D
+    phi_4 = [Z_2 Q tau_2 - (Z_2 Q + b^2 P) (tau_2 - tau_4)] / D
     D     = Z_2 Z_4 Q + b^2 P (Z_2 + Z_4)
 
 and with equal arms and torques, after Z cancels, phi = Q tau / (Z Q + 2 b^2 P).
@@ -12,6 +13,7 @@ Written like this no coefficient of D is a difference, so none loses digits.
 """
 
 from dataclasses import dataclass
+from math import factorial
 from typing import Any
 
 import numpy as np
@@ -19,25 +21,27 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueSteps
+from biogrip.protocol import TorqueHistory
 from biogrip.response.roots import real_quadratic_roots, roots, separate
 from biogrip.sample import Network
+
+LEFT, RIGHT = 0, 1
 
 
 @dataclass(frozen=True)
 class StepResponse:
     """Response of n samples to unit torque steps, as a constant plus exponentials.
 
-    A unit step of drive d at time 0 turns the left arm by
-    ``static[:, d] + sum_j weights[:, d, j] exp(rates[:, j] t)``.
+    A unit step of drive d at time 0 turns arm a (`LEFT`, `RIGHT`) by
+    ``static[:, a, d] + sum_j weights[:, a, d, j] exp(rates[:, j] t)``.
 
     Parameters
     ----------
-    static : (n, n_drives)
+    static : (n, n_arms, n_drives)
         Final rotation in rad per N m.
     rates : (n, n_modes)
         Exponents in 1/s, real without inertia, complex with it.
-    weights : (n, n_drives, n_modes)
+    weights : (n, n_arms, n_drives, n_modes)
         In rad per N m.
     """
 
@@ -46,23 +50,38 @@ class StepResponse:
     weights: NDArray[Any]
 
 
-def drives(steps: TorqueSteps) -> Array:
-    """Step heights in N m of the drives of `step_response`, shape (n_drives, n_steps).
+def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
+    """Combine what the two arms do into the drives of `step_response`.
 
-    One drive, the common torque, if both arms are driven alike; else tau_2 and
-    tau_2 - tau_4.
+    One drive, the common one, if both arms are driven alike; else that of the
+    left arm, and left minus right.
+
+    Parameters
+    ----------
+    left, right : (...)
+        Torques, or jumps of torque, of the arms.
+    symmetric
+        Whether they are the same.
+
+    Returns
+    -------
+    (n_drives, ...)
     """
-    if steps.symmetric:
-        return steps.left_Nm[None, :]
-    return np.stack((steps.left_Nm, steps.left_Nm - steps.right_Nm))
+    return left[None] if symmetric else np.stack((left, left - right))
+
+
+def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:
+    """Whether both arms move alike, so that one stands for both."""
+    return torque.symmetric and gripper.left == gripper.right
 
 
 def step_response(
     gripper: Gripper,
     network: Network,
     *,
-    symmetric_torque: bool = True,
+    symmetric: bool = True,
     inertia: bool = True,
+    both_arms: bool = False,
 ) -> StepResponse:
     """Solve the linear model for n samples at once (corrected eqs. 4-6).
 
@@ -72,44 +91,101 @@ def step_response(
         Its arms may differ.
     network
         The samples.
-    symmetric_torque
+    symmetric
         Whether both arms are driven alike; decides the drives, see `drives`.
     inertia
         Without it the ring of the arms, over within milliseconds, is left out
         and all rates are real and negative.
+    both_arms
+        Whether the right arm's rotation is wanted too.
     """
     p, q = _sample_polynomials(network)
     z_2 = _arm_polynomial(gripper.left, inertia)
     z_4 = _arm_polynomial(gripper.right, inertia)
     coupling = gripper.lever_m**2
-    if symmetric_torque and gripper.left == gripper.right:
-        numerators = [q]
+    if symmetric and gripper.left == gripper.right:
+        numerators = [[q]] * (2 if both_arms else 1)
         denominator = _add(_multiply(z_2, q), 2 * coupling * p)
     else:
-        numerators = [_multiply(z_4, q)]
-        if not symmetric_torque:
-            numerators.append(coupling * p)
+        left, right = _multiply(z_4, q), _multiply(z_2, q)
+        numerators = [[left, coupling * p], [right, -_add(right, coupling * p)]]
+        numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
         arms = _multiply(z_2, z_4)
         denominator = _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
     return _partial_fractions(numerators, denominator, real=not inertia)
 
 
-def rotation(response: StepResponse, steps: TorqueSteps, time_s: Array) -> Array:
-    """Closing rotation of the left arm in rad, shape (n, n_times).
+def rotation(
+    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+) -> Array:
+    """Closing rotation of an arm in rad, shape (n, n_times), at any times.
 
-    Steps superpose: phi(t) = sum_s dtau_s h(t - t_s), whatever the sampling. A
-    step response starts at zero, so h(t) = sum_j w_j (e^(p_j t) - 1), which loses
-    no digits to the constant where a sample creeps far from its rest.
+    What sets in at different times superposes. A step response starts at zero,
+    so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the constant
+    where a sample creeps far from its rest; ramps and parabolas are its integrals.
     """
-    heights = drives(steps)
+    return _superposed(response, torque, time_s, arm, rate=False)
+
+
+def rotation_rate(
+    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+) -> Array:
+    """Closing rate of an arm in rad/s, shape (n, n_times), at any times."""
+    return _superposed(response, torque, time_s, arm, rate=True)
+
+
+def _superposed(
+    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int, *, rate: bool
+) -> Array:
+    symmetric = response.static.shape[2] == 1
     phi = np.zeros((response.static.shape[0], len(time_s)))
-    for start, height in zip(steps.time_s, heights.T, strict=True):
+    weights = response.weights[:, arm]
+    rates = response.rates[:, :, None]
+    jumps = drives(torque.left, torque.right, symmetric)
+    for start, jump in zip(torque.time_s, np.moveaxis(jumps, 1, 0), strict=True):
         after = time_s >= start
         elapsed = time_s[after] - start
-        change = np.expm1(response.rates[:, :, None] * elapsed)
-        weights = np.einsum("ndj,d->nj", response.weights, height)
-        phi[:, after] += np.einsum("nj,njt->nt", weights, change).real
+        for order in np.flatnonzero(np.any(jump != 0, axis=0)):
+            amplitude = np.einsum("ndj,d->nj", weights, jump[:, order])
+            growth = _growth(int(order) - rate, rates, elapsed)
+            phi[:, after] += np.einsum("nj,njt->nt", amplitude, growth).real
+    amplitudes = drives(torque.harmonic_left, torque.harmonic_right, symmetric)
+    for start, omega, a in zip(
+        torque.harmonic_time_s, torque.omega_rad_per_s, amplitudes.T, strict=True
+    ):
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        # int_0^t h'(t - s) e^(i omega s) ds with h' = sum_j w_j p_j e^(p_j t).
+        share = response.rates / (1j * omega - response.rates)
+        swing = (1j * omega) ** rate * np.exp(1j * omega * elapsed)
+        swing = swing - rates**rate * np.exp(rates * elapsed)
+        amplitude = np.einsum("ndj,d->nj", weights, a) * share
+        phi[:, after] += np.einsum("nj,njt->nt", amplitude, swing).real
     return phi
+
+
+def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
+    """Response of a mode, over its weight, to t^order/order!; of order -1, to an impulse."""
+    z = rates * elapsed
+    if order < 0:
+        return rates * np.exp(z)
+    if order == 0:
+        return np.expm1(z)
+    return rates * elapsed ** (order + 1) * phi_function(order + 1, z)
+
+
+def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
+    """phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n, without cancellation near zero."""
+    small = np.abs(z) < 1.0
+    near = np.where(small, z, 0)
+    series = np.zeros_like(near)
+    for k in range(18, -1, -1):
+        series = series * near + 1 / factorial(k + order)
+    far = np.where(small, 1, z)
+    value = np.expm1(far) / far
+    for n in range(1, order):
+        value = (value - 1 / factorial(n)) / far
+    return np.where(small, series, value)
 
 
 def _sample_polynomials(network: Network) -> tuple[Array, Array]:
@@ -156,7 +232,9 @@ def _product(factors: list[Array], one: Array) -> Array:
     return product
 
 
-def _partial_fractions(numerators: list[Array], denominator: Array, *, real: bool) -> StepResponse:
+def _partial_fractions(
+    numerators: list[list[Array]], denominator: Array, *, real: bool
+) -> StepResponse:
     """Step response of N(s)/D(s): N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
     rates: NDArray[Any]
     if denominator.shape[1] == 2:
@@ -169,10 +247,10 @@ def _partial_fractions(numerators: list[Array], denominator: Array, *, real: boo
         rates = roots(denominator)
     distance = rates[:, :, None] - rates[:, None, :]
     distance += np.eye(rates.shape[1])
-    slope = denominator[:, -1:] * np.prod(distance, axis=2)
-    static = np.stack([n[:, 0] / denominator[:, 0] for n in numerators], axis=1)
-    weights = np.stack([_evaluate(n, rates) / (rates * slope) for n in numerators], axis=1)
-    return StepResponse(static, rates, weights)
+    slope = rates * denominator[:, -1:] * np.prod(distance, axis=2)
+    static = np.array([[n[:, 0] / denominator[:, 0] for n in row] for row in numerators])
+    weights = np.array([[_evaluate(n, rates) / slope for n in row] for row in numerators])
+    return StepResponse(np.moveaxis(static, 2, 0), rates, np.moveaxis(weights, 2, 0))
 
 
 def _evaluate(coefficients: Array, z: NDArray[Any]) -> NDArray[Any]:

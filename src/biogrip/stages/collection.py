@@ -9,7 +9,8 @@ import pyarrow.parquet as pq
 
 from biogrip.errors import BiogripError
 from biogrip.files import written_whole
-from biogrip.identify.records import COLUMNS
+from biogrip.identify.records import columns
+from biogrip.study import build
 
 
 def run(
@@ -25,7 +26,7 @@ def run(
     ----------
     settings
         ``seeds``: how many seeds the study has; batches may hold more, left
-        from a larger study.
+        from a larger study. ``model``, ``branches``: what the columns are.
     batches, histories
         Files of the identification stage, in the order of their seeds.
     output, history
@@ -36,7 +37,9 @@ def run(
     BiogripError
         If a seed is missing or comes twice.
     """
-    rows = [row for batch in batches for row in _rows(batch) if int(row[2]) < settings["seeds"]]
+    header = columns(build.sample_model(settings))
+    rows = [row for batch in batches for row in _rows(batch, header)]
+    rows = [row for row in rows if int(row[2]) < settings["seeds"]]
     if [int(row[2]) for row in rows] != list(range(settings["seeds"])):
         names = ", ".join(str(batch) for batch in batches)
         raise BiogripError(
@@ -45,7 +48,7 @@ def run(
         )
     with written_whole(output) as scratch, scratch.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(COLUMNS)
+        writer.writerow(header)
         writer.writerows(rows)
     with written_whole(history) as scratch:
         schema = pq.read_schema(histories[0])
@@ -55,14 +58,14 @@ def run(
                 joined.write_table(table.filter(pc.less(table["seed"], settings["seeds"])))
 
 
-def _rows(batch: Path) -> list[list[str]]:
+def _rows(batch: Path, wanted: tuple[str, ...]) -> list[list[str]]:
     try:
         with batch.open(newline="") as stream:
             header, *rows = csv.reader(stream)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{batch}: cannot be read: {error}.") from error
-    if tuple(header) != COLUMNS:
+    if tuple(header) != wanted:
         raise BiogripError(
-            f"{batch}, line 1: found {', '.join(header)}; wanted {', '.join(COLUMNS)}."
+            f"{batch}, line 1: found {', '.join(header)}; wanted {', '.join(wanted)}."
         )
     return rows

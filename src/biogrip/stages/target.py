@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.protocol import sample_times, torque_at, torque_steps
+from biogrip.protocol import torque_at
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS
+from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study import build
 from biogrip.traces import write_target
 
@@ -18,18 +18,19 @@ def run(settings: dict[str, Any], output: Path) -> None:
     Parameters
     ----------
     settings
-        ``gripper``, ``protocol``, ``rate_Hz``, ``model``, ``parameters``.
+        ``gripper``, ``protocol`` (and ``actuator``, if that is in volts),
+        ``sampling``, ``model``, ``branches``, ``parameters``, ``nonlinear``.
     output
         The target, CSV.
     """
-    phases = build.phases(settings["protocol"])
-    steps = torque_steps(phases)
-    model = MODELS[settings["model"]]
+    gripper, torque = build.gripper(settings["gripper"]), build.torque(settings)
+    model = build.sample_model(settings)
     parameters = [settings["parameters"][name] for name in model.names]
-    response = step_response(
-        build.gripper(settings["gripper"]),
-        model.network(np.array([parameters])),
-        symmetric_torque=steps.symmetric,
-    )
-    time_s = sample_times(phases, settings["rate_Hz"])
-    write_target(output, time_s, torque_at(steps, time_s), rotation(response, steps, time_s)[0])
+    network = model.network(np.array([parameters]))
+    time_s = build.sampling(settings["sampling"], torque.end_s)
+    if settings["nonlinear"]:
+        simulated = nonlinear_rotation(gripper, network, torque, time_s)
+    else:
+        response = step_response(gripper, network, symmetric=torque.symmetric)
+        simulated = rotation(response, torque, time_s)
+    write_target(output, time_s, torque_at(torque, time_s), simulated[0])

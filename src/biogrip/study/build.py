@@ -1,13 +1,20 @@
 """From plain config blocks to the objects of the field."""
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from biogrip.actuator import CombDrive
+import numpy as np
+
+from biogrip.actuator import CombDrive, capacitance_slope
+from biogrip.arrays import Array
+from biogrip.contact import Contact, contact
 from biogrip.gripper import Arm, Gripper
 from biogrip.identify.genetic import GeneticSettings
 from biogrip.identify.genome import GeneRange
-from biogrip.protocol import Phase
+from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, sample_times, torque_history
+from biogrip.sample import SampleModel, model_named
 
 
 def gripper(block: Mapping[str, Any]) -> Gripper:
@@ -25,16 +32,42 @@ def comb_drive(block: Mapping[str, Any]) -> CombDrive:
     return CombDrive(**block)
 
 
-def phases(block: Mapping[str, Any]) -> tuple[Phase, ...]:
-    """Build the phases of a ``protocol`` block."""
-    return tuple(
-        Phase(
-            phase["duration_s"],
-            phase["torque_Nm"],
-            phase.get("torque_right_Nm", phase["torque_Nm"]),
-        )
-        for phase in block["phases"]
-    )
+def contact_of(
+    gripper_block: Mapping[str, Any], actuator: Mapping[str, Any], size_m: float
+) -> Contact:
+    """Close a gripper, given in its neutral configuration, onto a sample."""
+    neutral, comb = gripper(gripper_block), comb_drive(actuator)
+    return contact(neutral, gripper_block["jaw_gap_m"], comb, size_m)
+
+
+def sample_model(settings: Mapping[str, Any]) -> SampleModel:
+    """Build the sample model of ``model`` and ``branches``."""
+    return model_named(settings["model"], settings.get("branches", 1))
+
+
+def torque(settings: Mapping[str, Any]) -> TorqueHistory:
+    """Build the torque of a ``protocol`` block; with voltages, an ``actuator`` block is needed."""
+    return torque_history(phases(settings))
+
+
+def phases(settings: Mapping[str, Any]) -> tuple[Phase, ...]:
+    """Build the phases of a ``protocol`` block, voltages turned into torques (eq. 9)."""
+    per_square_volt = math.nan
+    if "actuator" in settings:
+        per_square_volt = 0.5 * capacitance_slope(comb_drive(settings["actuator"]))
+    return tuple(_phase(phase, per_square_volt) for phase in settings["protocol"]["phases"])
+
+
+def uses_voltage(protocol: Mapping[str, Any]) -> bool:
+    """Whether a ``protocol`` block gives any phase in volts."""
+    return any("voltage_V" in phase for phase in protocol["phases"])
+
+
+def sampling(measurement: Mapping[str, Any], end_s: float) -> Array:
+    """Sampling times in s of a ``measurement`` block."""
+    if "times_s" in measurement:
+        return np.array(measurement["times_s"], dtype=float)
+    return sample_times(end_s, measurement["rate_Hz"])
 
 
 def gene_ranges(block: Mapping[str, Any]) -> dict[str, GeneRange]:
@@ -48,3 +81,46 @@ def gene_ranges(block: Mapping[str, Any]) -> dict[str, GeneRange]:
 def genetic_settings(block: Mapping[str, Any]) -> GeneticSettings:
     """Build the settings of a ``genetic_algorithm`` block."""
     return GeneticSettings(**block)
+
+
+def _phase(phase: Mapping[str, Any], per_square_volt: float) -> Phase:
+    if "voltage_V" in phase:
+        left = _load(phase, "voltage_V", "V")
+        right = replace(left, value_Nm=phase.get("voltage_right_V", left.value_Nm))
+        left, right = (_squared(load, per_square_volt) for load in (left, right))
+    else:
+        left = _load(phase, "torque_Nm", "Nm")
+        right = replace(left, value_Nm=phase.get("torque_right_Nm", left.value_Nm))
+    return Phase(phase["duration_s"], left, right)
+
+
+def _load(phase: Mapping[str, Any], key: str, unit: str) -> Load:
+    """A hold, a ramp or a sinusoid that starts at its mean, rising."""
+    value = phase[key]
+    slope = (phase.get(f"to_{key}", value) - value) / phase["duration_s"]
+    harmonics: tuple[Harmonic, ...] = ()
+    if f"amplitude_{unit}" in phase:
+        omega = 2 * math.pi * phase["frequency_Hz"]
+        harmonics = (Harmonic(phase[f"amplitude_{unit}"], omega, -math.pi / 2),)
+    return Load(value, slope, 0.0, harmonics)
+
+
+def _squared(volts: Load, per_square_volt: float) -> Load:
+    """Torque of a voltage V + r t, or V + A sin(omega t), by tau = kappa V^2.
+
+    The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
+    """
+    kappa, value = per_square_volt, volts.value_Nm
+    mean = value**2
+    harmonics: list[Harmonic] = []
+    for h in volts.harmonics:
+        a, omega = h.amplitude_Nm, h.omega_rad_per_s
+        mean += a**2 / 2
+        harmonics.append(Harmonic(2 * kappa * value * a, omega, h.phase_rad))
+        harmonics.append(Harmonic(kappa * a**2 / 2, 2 * omega, math.pi))
+    return Load(
+        kappa * mean,
+        2 * kappa * value * volts.slope_Nm_per_s,
+        2 * kappa * volts.slope_Nm_per_s**2,
+        tuple(harmonics),
+    )

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError
-from biogrip.sample import MODELS, SampleModel
+from biogrip.sample import SampleModel
+from biogrip.study import build
 from biogrip.study.source import read_places
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
@@ -25,8 +26,16 @@ class Case:
     parameters
         True values by name, SI units.
     blocks
-        The case's gripper, protocol, measurement, search_range and
-        genetic_algorithm, as plain config blocks.
+        The case's own version of every block of `OVERRIDABLE`, as in the config.
+    branches
+        Number of Maxwell branches of a generalized model.
+    size_m
+        Diameter of the sample, if it is given.
+    fixed
+        Parameters that are not identified, by name.
+    assumed_gripper
+        ``"calibrated"``, or the keys in which the gripper that the
+        identification believes in differs from the true one.
     published
         What the paper reports, or nothing.
     """
@@ -36,6 +45,10 @@ class Case:
     model: SampleModel
     parameters: dict[str, float]
     blocks: dict[str, dict[str, Any]]
+    branches: int
+    size_m: float | None
+    fixed: dict[str, float]
+    assumed_gripper: str | dict[str, Any]
     published: dict[str, Any]
 
 
@@ -106,28 +119,34 @@ def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
             case = dict(case)
             for block in OVERRIDABLE:
                 if block in config:
-                    case[block] = _overlaid(config[block], case.get(block, {}))
+                    case[block] = overlaid(config[block], case.get(block, {}))
         filled[name] = case
     return {**config, "cases": filled}
 
 
-def _overlaid(base: Any, over: Any) -> Any:
+def overlaid(base: Any, over: Any) -> Any:
+    """Lay a config block over another: blocks key by key, everything else whole."""
     if isinstance(base, dict) and isinstance(over, dict):
         merged = copy.deepcopy(base)
         for key, value in over.items():
-            merged[key] = _overlaid(merged[key], value) if key in merged else value
+            merged[key] = overlaid(merged[key], value) if key in merged else value
         return merged
     return over
 
 
 def _case(name: str, block: dict[str, Any]) -> Case:
-    model = MODELS[block["sample"]["model"]]
+    sample = block["sample"]
+    model = build.sample_model(sample)
     return Case(
         name=name,
         title=block.get("title", name),
         model=model,
-        parameters={symbol: float(block["sample"][symbol]) for symbol in model.names},
+        parameters={symbol: float(sample[symbol]) for symbol in model.names},
         blocks={key: block[key] for key in OVERRIDABLE},
+        branches=sample.get("branches", 1),
+        size_m=sample.get("size_m"),
+        fixed={symbol: float(value) for symbol, value in block.get("fixed", {}).items()},
+        assumed_gripper=block.get("assumed_gripper", {}),
         published=block.get("published", {}),
     )
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from biogrip.study import build
 from biogrip.study.batches import Batch, existing_batches, plan_batches
-from biogrip.study.config import Case, Study
+from biogrip.study.config import Case, Study, overlaid
 
 METHOD = "genetic"
 
@@ -41,11 +42,13 @@ class Plan:
     def target(self, case: str) -> str:
         """Settings of the target stage."""
         c = self._case(case)
+        measurement = c.blocks["measurement"]
+        key = "times_s" if "times_s" in measurement else "rate_Hz"
         return _json(
-            gripper=c.blocks["gripper"],
-            protocol=c.blocks["protocol"],
-            rate_Hz=c.blocks["measurement"]["rate_Hz"],
-            model=c.model.name,
+            **self._simulation(c),
+            gripper=self._gripper(c),
+            nonlinear=c.blocks["models"]["target"] == "nonlinear",
+            sampling={key: measurement[key]},
             parameters=c.parameters,
         )
 
@@ -57,22 +60,38 @@ class Plan:
             noise=self._case(case).blocks["measurement"]["noise"],
         )
 
-    def identification(self, case: str) -> str:
-        """Settings of the identification stage."""
+    def calibration(self, case: str) -> str:
+        """Settings of the calibration stage."""
         c = self._case(case)
         return _json(
             study_seed=self.study.config["study_seed"],
             case=case,
-            gripper=c.blocks["gripper"],
-            protocol=c.blocks["protocol"],
-            model=c.model.name,
+            gripper=self._gripper(c),
+            calibration=c.blocks["calibration"],
+        )
+
+    def is_calibrated(self, case: str) -> bool:
+        """Whether the identification of a case takes its gripper from a calibration."""
+        return self._case(case).assumed_gripper == "calibrated"
+
+    def identification(self, case: str) -> str:
+        """Settings of the identification stage."""
+        c = self._case(case)
+        return _json(
+            **self._simulation(c),
+            study_seed=self.study.config["study_seed"],
+            case=case,
+            gripper=self._assumed_gripper(c),
+            nonlinear=c.blocks["models"]["identification"] == "nonlinear",
+            fixed=c.fixed,
             search_range=c.blocks["search_range"],
             genetic_algorithm=c.blocks["genetic_algorithm"],
         )
 
-    def collection(self) -> str:
+    def collection(self, case: str) -> str:
         """Settings of the collection stage."""
-        return _json(seeds=self.study.seeds)
+        c = self._case(case)
+        return _json(seeds=self.study.seeds, model=c.model.name, branches=c.branches)
 
     def errors(self, case: str) -> str:
         """Settings of a case's error table."""
@@ -108,6 +127,20 @@ class Plan:
         """Study-wide blocks by name, for tables and figures that show them."""
         return _json(**{key: self.study.config[key] for key in keys})
 
+    def linearisation(self) -> str:
+        """Settings of the comparison of linear and nonlinear model."""
+        cases = {
+            name: {**self._truth(case), "gripper": self._gripper(case)}
+            for name, case in self.study.cases.items()
+            if case.published
+        }
+        return _json(cases=cases, protocol=self.study.config["protocol"], **self._comb())
+
+    def _comb(self) -> dict[str, Any]:
+        """The comb drive, if the study's protocol is given in volts."""
+        uses = build.uses_voltage(self.study.config["protocol"])
+        return {"actuator": self.study.config["actuator"]} if uses else {}
+
     def evidence(self) -> str:
         """Settings of the tables that hold the paper against itself."""
         return _json(
@@ -129,18 +162,50 @@ class Plan:
         return {
             "title": case.title,
             "model": case.model.name,
+            "branches": case.branches,
             "parameters": case.parameters,
             "published": case.published,
         }
 
-    @staticmethod
-    def _fit(case: Case) -> dict[str, Any]:
+    def _fit(self, case: Case) -> dict[str, Any]:
         return {
+            **self._simulation(case),
             "title": case.title,
+            "gripper": self._assumed_gripper(case),
+            "nonlinear": case.blocks["models"]["identification"] == "nonlinear",
+        }
+
+    def _simulation(self, case: Case) -> dict[str, Any]:
+        """What every simulation of a case needs, but for the gripper."""
+        settings = {
             "model": case.model.name,
-            "gripper": case.blocks["gripper"],
+            "branches": case.branches,
             "protocol": case.blocks["protocol"],
         }
+        if build.uses_voltage(case.blocks["protocol"]):
+            settings["actuator"] = self.study.config["actuator"]
+        return settings
+
+    def _gripper(self, case: Case) -> dict[str, Any]:
+        """The true gripper where its jaws touch the sample."""
+        block = case.blocks["gripper"]
+        angle = block["reference_angle_deg"]
+        if case.size_m is not None:
+            touching = build.contact_of(block, self.study.config["actuator"], case.size_m)
+            angle = touching.reference_angle_deg
+        return {
+            "arm_length_m": block["arm_length_m"],
+            "reference_angle_deg": angle,
+            "left": block["left"],
+            "right": block["right"],
+        }
+
+    def _assumed_gripper(self, case: Case) -> dict[str, Any]:
+        """The gripper that the identification believes in; a calibration replaces its arms."""
+        if isinstance(case.assumed_gripper, str):
+            return self._gripper(case)
+        believed: dict[str, Any] = overlaid(self._gripper(case), case.assumed_gripper)
+        return believed
 
 
 def _json(**settings: Any) -> str:

@@ -14,17 +14,12 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.sample import MODELS
+from biogrip.study.meaning import Problem, meaning_problems
 from biogrip.study.source import ConfigFiles, KeyPath
 
-Problem = tuple[KeyPath, str]
-
 OVERRIDABLE = (
-    "gripper",
-    "protocol",
-    "measurement",
-    "search_range",
-    "genetic_algorithm",
+    *("gripper", "protocol", "measurement", "search_range"),
+    *("genetic_algorithm", "models", "calibration"),
 )
 """Blocks that hold for all cases, and that a case may change for itself."""
 
@@ -40,7 +35,6 @@ _Validator = extend(
         lambda _, value: isinstance(value, int) and not isinstance(value, bool),
     ),
 )
-_MOST_SAMPLES = 10_000_000
 
 
 @cache
@@ -72,7 +66,11 @@ def check(config: Mapping[str, Any], files: ConfigFiles) -> None:
         Names file, line and key of every problem (the first few, where there
         are many), what was found and what is allowed.
     """
-    problems = list(_schema_problems(config)) or list(_meaning_problems(config))
+    problems = (
+        list(_odd_keys((), config))
+        or list(_schema_problems(config))
+        or list(meaning_problems(config))
+    )
     seen: dict[str, str] = {}
     for path, text in problems:
         # A block that a case inherits is wrong once, not once a case.
@@ -97,6 +95,15 @@ def _dotted(path: KeyPath) -> str:
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return text or "the file"
+
+
+def _odd_keys(path: KeyPath, value: Any) -> Iterator[Problem]:
+    if isinstance(value, Mapping):
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
+                yield (*path, key), f"{text} quotes."
+            yield from _odd_keys((*path, key), inner)
 
 
 def _schema_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
@@ -129,11 +136,10 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
                 "(it names files).",
             )
         case "type":
-            wanted = {
-                "object": "a block of keys",
-                "array": "a list",
-                "string": "text",
-            }.get(limit, f"a{'n' if limit == 'integer' else ''} {limit}")
+            words = {"object": "a block of keys", "array": "a list", "string": "text"}
+            kinds = [limit] if isinstance(limit, str) else limit
+            article = "an" if limit == "integer" else "a"
+            wanted = " or ".join(words.get(kind, f"{article} {kind}") for kind in kinds)
             yield path, f"found {_shown(found)}, allowed is {wanted}."
         case "enum":
             hint = nearest(found, limit)
@@ -186,80 +192,3 @@ def _not_finite(path: KeyPath, value: Any) -> Iterator[Problem]:
             yield from _not_finite((*path, index), inner)
     elif isinstance(value, float) and not math.isfinite(value):
         yield path, f"found {value}, allowed is a finite number."
-
-
-def _meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
-    """Problems that no schema of single keys can see."""
-    for name, case in config["cases"].items():
-        path = ("cases", name)
-        yield from _sample_problems((*path, "sample"), case["sample"])
-        yield from _genetic_problems((*path, "genetic_algorithm"), case["genetic_algorithm"])
-        yield from _range_problems((*path, "search_range"), case["search_range"])
-        yield from _sampling_problems(path, case)
-    for index, key in enumerate(config["reconstructed"]):
-        if not _exists(config, key):
-            yield (
-                ("reconstructed", index),
-                f"found '{key}', allowed is a key of this study.",
-            )
-
-
-def _sample_problems(path: KeyPath, sample: Mapping[str, Any]) -> Iterator[Problem]:
-    names = MODELS[sample["model"]].names
-    for name in sample:
-        if name != "model" and name not in names:
-            text = f"is no parameter of {sample['model']}, which has {', '.join(names)}."
-            yield (*path, name), text
-    for name in names:
-        if name not in sample:
-            yield (
-                (*path, name),
-                f"is missing: {sample['model']} needs {', '.join(names)}.",
-            )
-
-
-def _genetic_problems(path: KeyPath, settings: Mapping[str, Any]) -> Iterator[Problem]:
-    for low, high, below in (
-        ("survivors", "population", True),
-        ("first_cut", "last_cut", False),
-        ("min_generations", "max_generations", False),
-    ):
-        wrong = settings[low] >= settings[high] if below else settings[low] > settings[high]
-        if wrong:
-            word = "less than" if below else "at most"
-            text = f"found {settings[low]}, allowed is {word} {high}, which is {settings[high]}."
-            yield (*path, low), text
-
-
-def _range_problems(path: KeyPath, ranges: Mapping[str, Any]) -> Iterator[Problem]:
-    for name, genes in ranges.items():
-        for gene, (low, high) in genes.items():
-            if low > high:
-                yield (
-                    (*path, name, gene),
-                    f"found [{low}, {high}], allowed is [lowest, highest].",
-                )
-
-
-def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
-    phases = case["protocol"]["phases"]
-    if not any(phase["torque_Nm"] for phase in phases):
-        text = "no phase has a torque, so nothing would move; allowed is at least one above 0 N m."
-        yield (*path, "protocol", "phases"), text
-    samples = sum(phase["duration_s"] for phase in phases) * case["measurement"]["rate_Hz"] + 1
-    needed = len(MODELS[case["sample"]["model"]].names) + 1
-    if not needed <= samples <= _MOST_SAMPLES:
-        text = (
-            f"found {case['measurement']['rate_Hz']}, which gives {samples:.6g} samples over the "
-            f"protocol; allowed are {needed} to {_MOST_SAMPLES}."
-        )
-        yield (*path, "measurement", "rate_Hz"), text
-
-
-def _exists(config: Mapping[str, Any], key: str) -> bool:
-    block: Any = config
-    for part in key.split("."):
-        if not isinstance(block, Mapping) or part not in block:
-            return False
-        block = block[part]
-    return True

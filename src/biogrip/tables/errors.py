@@ -8,8 +8,9 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.records import COLUMNS
-from biogrip.sample import MODELS, Parameter
+from biogrip.identify.records import LEADING, TRAILING
+from biogrip.sample import Parameter, SampleModel
+from biogrip.study import build
 from biogrip.tables.layout import Column, Table
 
 TABLE_COLUMNS = (
@@ -37,18 +38,18 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``case``, ``title``, ``model``, ``parameters``, ``published``,
+        ``case``, ``title``, ``model``, ``branches``, ``parameters``, ``published``,
         ``noise_floor_tolerance``.
     inputs
         The identifications of the case, CSV.
     """
     found = read_identifications(inputs[0])
-    model = MODELS[settings["model"]]
+    model = build.sample_model(settings)
     best = int(found["misfit_rad"].to_numpy().argmin())
     share = float(np.mean(at_noise_floor(found, settings["noise_floor_tolerance"])))
     published = settings["published"]
     rows = []
-    for names in _quantities(model.parameters):
+    for names in quantities(model):
         label = " + ".join(parameter.name for parameter in names)
         target = sum(settings["parameters"][parameter.name] for parameter in names)
         values = found[[parameter.column for parameter in names]].sum(axis=1).to_numpy(float)
@@ -92,8 +93,9 @@ def read_identifications(path: Path) -> pd.DataFrame:
         frame = pd.read_csv(path)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as identifications: {error}.") from error
-    if tuple(frame.columns) != COLUMNS:
-        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(COLUMNS)}.")
+    wanted = [*LEADING, *TRAILING]
+    if not set(wanted) <= set(frame.columns):
+        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(wanted)}.")
     return frame
 
 
@@ -117,11 +119,11 @@ def error_percent(target: float, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
-def _quantities(parameters: tuple[Parameter, ...]) -> list[list[Parameter]]:
-    """Every parameter, and the sum of the dampers, which a stiff branch makes exchangeable."""
-    dampers = [parameter for parameter in parameters if parameter.kind == "damping"]
-    singles = [[parameter] for parameter in parameters]
-    return [*singles, dampers] if len(dampers) > 1 else singles
+def quantities(model: SampleModel) -> list[list[Parameter]]:
+    """Every parameter, and together those that trade against each other."""
+    singles = [[parameter] for parameter in model.parameters]
+    together = [p for p in model.parameters if p.name in model.exchangeable]
+    return [*singles, together] if together else singles
 
 
 def _paper(

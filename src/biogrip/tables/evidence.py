@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from biogrip import actuator
-from biogrip.sample import ALL_PARAMETERS
+from biogrip.sample import SINGLE_BRANCH
 from biogrip.study import build
 from biogrip.tables.errors import read_identifications
 from biogrip.tables.layout import Cell, Column, Table
@@ -92,7 +92,7 @@ def _gripper_rows(settings: dict[str, Any]) -> list[tuple[Cell, ...]]:
 def _gene_rows(settings: dict[str, Any]) -> list[tuple[Cell, ...]]:
     ranges = build.gene_ranges(settings["search_range"])
     rows: list[tuple[Cell, ...]] = []
-    for parameter in ALL_PARAMETERS:
+    for parameter in SINGLE_BRANCH:
         low, high = ranges[parameter.name].exponent
         remark = "reconstructed from Table 4"
         quantity = f"values of the exponent gene of {parameter.name}"

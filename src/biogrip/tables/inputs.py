@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from biogrip.sample import ALL_PARAMETERS
+from biogrip.sample import SINGLE_BRANCH
 from biogrip.study import build
 from biogrip.tables.layout import Column, Table
 
@@ -81,7 +81,7 @@ def actuator(settings: dict[str, Any], inputs: list[Path]) -> Table:
 def gene_ranges(settings: dict[str, Any], inputs: list[Path]) -> Table:
     """Table 3: values that the genes may take."""
     rows = []
-    for parameter in ALL_PARAMETERS:
+    for parameter in SINGLE_BRANCH:
         block = settings["search_range"][parameter.name]
         for index, gene in enumerate(("exponent", "digit", "digit"), start=1):
             low, high = block[gene]
@@ -104,7 +104,7 @@ def parameter_ranges(settings: dict[str, Any], inputs: list[Path]) -> Table:
     """Table 4: ranges of the parameters, as they follow from the genes."""
     ranges = build.gene_ranges(settings["search_range"])
     rows = [
-        (p.name, p.meaning, p.unit, ranges[p.name].low, ranges[p.name].high) for p in ALL_PARAMETERS
+        (p.name, p.meaning, p.unit, ranges[p.name].low, ranges[p.name].high) for p in SINGLE_BRANCH
     ]
     columns = (
         Column("parameter", "Parameter"),

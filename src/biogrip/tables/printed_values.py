@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.identify.genome import nearest_encodable
-from biogrip.sample import MODELS
 from biogrip.study import build
 from biogrip.tables.layout import Cell, Column, Table
 
@@ -35,7 +34,7 @@ def printed_values(settings: dict[str, Any], inputs: list[Path]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for case, block in settings["cases"].items():
         published = block["published"]
-        for name in MODELS[block["model"]].names:
+        for name in build.sample_model(block).names:
             target = block["parameters"][name]
             identified = published["identified"].get(name)
             for quantity, value in (("target", target), ("identified", identified)):

@@ -1,0 +1,59 @@
+"""A calibrated gripper as a file: a config block that can be laid over a study."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import yaml
+
+from biogrip.errors import BiogripError
+from biogrip.gripper import Arm, Gripper
+
+ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
+
+
+@dataclass(frozen=True)
+class CalibratedArm:
+    """An arm and how well it is known.
+
+    Parameters
+    ----------
+    arm, uncertainty
+        Estimates and their standard uncertainties, in the same units.
+    """
+
+    arm: Arm
+    uncertainty: Arm
+
+
+def calibration_yaml(gripper: Gripper, left: CalibratedArm, right: CalibratedArm) -> str:
+    """Write the calibrated gripper as a config file that can be laid over a study."""
+    arms = {"left": left, "right": right}
+    block = {
+        "arm_length_m": gripper.arm_length_m,
+        "reference_angle_deg": gripper.reference_angle_deg,
+        **{name: _rounded(arm.arm, 7) for name, arm in arms.items()},
+        "uncertainty": {name: _rounded(arm.uncertainty, 2) for name, arm in arms.items()},
+    }
+    return yaml.safe_dump({"gripper": block}, sort_keys=False)
+
+
+def read_calibrated_arms(path: Path, gripper: Gripper) -> Gripper:
+    """Return a gripper with the arms of a calibration in place of its own.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing or is no calibration.
+    """
+    try:
+        block = yaml.safe_load(path.read_text(encoding="utf-8"))["gripper"]
+        left, right = (
+            Arm(**{key: float(block[name][key]) for key in ARM_KEYS}) for name in ("left", "right")
+        )
+    except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as a calibration: {error}.") from error
+    return replace(gripper, left=left, right=right)
+
+
+def _rounded(arm: Arm, digits: int) -> dict[str, float]:
+    return {key: float(f"{getattr(arm, key):.{digits}g}") for key in ARM_KEYS}

@@ -1,0 +1,98 @@
+"""No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from biogrip.arrays import Array
+from biogrip.calibrated_gripper import ARM_KEYS, CalibratedArm
+from biogrip.errors import BiogripError
+from biogrip.gripper import Arm
+
+
+@dataclass(frozen=True)
+class FreeMotion:
+    """What a free arm does after a torque step and after a torque impulse.
+
+    Parameters
+    ----------
+    time_s : (n_samples,)
+        From the instant of step and impulse.
+    step_rad, impulse_rad : (n_samples,)
+        The two records.
+    """
+
+    time_s: Array
+    step_rad: Array
+    impulse_rad: Array
+
+
+def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> FreeMotion:
+    """Solve I phi'' + c phi' + k phi = tau for a step and an impulse, from rest.
+
+    With p_1, p_2 the roots of I s^2 + c s + k the impulse turns the arm by
+    J (e^(p_1 t) - e^(p_2 t)) / (I (p_1 - p_2)), whether they are real or complex.
+    """
+    inertia, damping, stiffness = (getattr(arm, key) for key in ARM_KEYS)
+    middle = -damping / (2 * inertia)
+    half = np.sqrt(complex(middle**2 - stiffness / inertia))
+    # sinh(half t)/half is even in half, so either root serves, and none is divided by at zero.
+    swing = np.sinc(1j * half * time_s / np.pi) * time_s
+    decay = np.exp(middle * time_s)
+    impulse = (decay * swing).real / inertia
+    cosine = (decay * np.cosh(half * time_s)).real
+    step = (1 - cosine + middle * inertia * impulse) / stiffness
+    return FreeMotion(time_s, step_Nm * step, impulse_Nms * impulse)
+
+
+def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> CalibratedArm:
+    """Identify an arm by least squares on both records, in the logarithms of I, c and k.
+
+    Parameters
+    ----------
+    record
+        The measured motion.
+    step_Nm, impulse_Nms
+        What caused it.
+
+    Raises
+    ------
+    BiogripError
+        If the arm does not ring within the record, or no arm fits.
+    """
+    start = _first_guess(record, step_Nm)
+    weights = [1 / np.ptp(record.step_rad), 1 / np.ptp(record.impulse_rad)]
+
+    def residuals(logarithms: Array) -> Array:
+        motion = free_motion(Arm(*np.exp(logarithms)), record.time_s, step_Nm, impulse_Nms)
+        return np.concatenate(
+            (
+                weights[0] * (motion.step_rad - record.step_rad),
+                weights[1] * (motion.impulse_rad - record.impulse_rad),
+            )
+        )
+
+    found = least_squares(residuals, np.log(start), method="lm")
+    if not found.success or not np.all(np.isfinite(found.x)):
+        raise BiogripError("calibration: no arm fits the records; is the rate high enough?")
+    freedom = max(len(found.fun) - 3, 1)
+    variance = np.linalg.inv(found.jac.T @ found.jac) * (2 * found.cost / freedom)
+    values = np.exp(found.x)
+    return CalibratedArm(Arm(*values), Arm(*(values * np.sqrt(np.diag(variance)))))
+
+
+def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
+    """Stiffness from the step's end, frequency from the ring's spectrum, damping from its fall."""
+    tail = len(record.time_s) // 4
+    stiffness = step_Nm / np.mean(record.step_rad[-tail:])
+    interval = record.time_s[1] - record.time_s[0]
+    spectrum = np.abs(np.fft.rfft(record.impulse_rad))
+    peak = int(np.argmax(spectrum[1:])) + 1
+    omega = 2 * np.pi * np.fft.rfftfreq(len(record.time_s), interval)[peak]
+    early, late = (float(np.std(part)) for part in np.array_split(record.impulse_rad, 8)[:2])
+    decay = np.log(max(early / late, 1.01)) / (len(record.time_s) // 8 * interval)
+    if not stiffness > 0:
+        raise BiogripError("calibration: the arm does not follow the torque step.")
+    inertia = stiffness / omega**2
+    return np.array([inertia, 2 * inertia * decay, stiffness])

@@ -1,0 +1,294 @@
+"""The corrected nonlinear model, eqs. (1)-(3), as a correction to the exact linear solution.
+
+In the displacements u of the tips the sample stays linear; an arm is nonlinear
+only through its rotation phi(u) and its lever b(phi) = l sin(hat-theta_2 - phi).
+Divided by the lever, an arm's equation is
+
+    (c phi' + k phi)/b + F = tau/b
+
+and the linear model's is (c u' + k u)/b_0^2 + F = tau/b_0. So the nonlinear
+displacement is the linear one plus the linear response to the load
+
+    g = tau (1/b - 1/b_0) - k (phi/b - u/b_0^2) - c u' (1/b^2 - 1/b_0^2)
+
+which is small, of second order in the rotation. It is found by repeated
+substitution; each sweep is an implicit collocation (Radau IIA, five stages) of
+uncoupled linear modes on a mesh graded towards the torque's jumps, for all
+samples at once. Inertia acts on the linear part alone.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.gripper import Arm, Gripper
+from biogrip.protocol import TorqueHistory, torque_at
+from biogrip.response.linear import (
+    LEFT,
+    RIGHT,
+    StepResponse,
+    drives,
+    is_symmetric,
+    rotation,
+    rotation_rate,
+    step_response,
+)
+from biogrip.sample import Network
+
+STAGES = 5
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How finely the correction is computed.
+
+    Parameters
+    ----------
+    first_s
+        Length of the first element after a jump of the torque.
+    growth
+        Ratio of each element's length to the one before.
+    per_period
+        Elements in a period of the fastest sinusoid.
+    tolerance
+        Stop when a sweep changes nothing by more than this share of the peak.
+    most_sweeps
+        Give up then.
+    """
+
+    first_s: float
+    growth: float
+    per_period: float
+    tolerance: float
+    most_sweeps: int
+
+
+FINE = Accuracy(first_s=1e-8, growth=1.3, per_period=8.0, tolerance=1e-13, most_sweeps=200)
+"""For one trace: below 1e-7 of the peak everywhere that was tried (see the tests)."""
+
+COARSE = Accuracy(first_s=1e-3, growth=2.0, per_period=4.0, tolerance=1e-8, most_sweeps=30)
+"""For a population: far below what noise can tell, at a hundredth of the cost."""
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Nonlinear minus linear rotation of n samples, as polynomials on a mesh.
+
+    Parameters
+    ----------
+    edges_s : (n_elements + 1,)
+        The mesh.
+    values_rad : (n, n_arms, n_elements, STAGES + 1)
+        At the start of each element and at its nodes.
+    converged : (n,)
+        Whether the sweeps came to rest.
+    """
+
+    edges_s: Array
+    values_rad: Array
+    converged: np.ndarray
+
+    def at(self, time_s: Array, arm: int = LEFT) -> Array:
+        """Evaluate at ascending times, shape (n, n_times)."""
+        cuts = np.searchsorted(time_s, self.edges_s[1:-1], side="left")
+        pieces = np.split(time_s, cuts)
+        values = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
+        parts = [
+            values[:, element] @ _lagrange((piece - start) / (end - start))
+            for element, ((start, end), piece) in enumerate(
+                zip(pairwise(self.edges_s), pieces, strict=True)
+            )
+            if len(piece)
+        ]
+        return np.concatenate(parts, axis=1)
+
+
+def nonlinear_rotation(
+    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+) -> Array:
+    """Closing rotation of an arm in rad, shape (n, n_times), at ascending times.
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the model describes.
+    """
+    found = correction(gripper, network, torque, FINE)
+    if not np.all(found.converged):
+        raise BiogripError(
+            "the nonlinear response could not be computed: the torque closes the arms so far "
+            "that they lose their lever on the sample. Allowed are smaller torques."
+        )
+    linear = step_response(gripper, network, symmetric=torque.symmetric, both_arms=arm == RIGHT)
+    return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
+
+
+def correction(
+    gripper: Gripper, network: Network, torque: TorqueHistory, accuracy: Accuracy
+) -> Correction:
+    """Compute nonlinear minus linear rotation, without inertia.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        The arms, n samples, the protocol.
+    accuracy
+        How finely.
+    """
+    symmetric = is_symmetric(gripper, torque)
+    arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
+    response = step_response(
+        gripper, network, symmetric=torque.symmetric, inertia=False, both_arms=not symmetric
+    )
+    edges = mesh(torque, accuracy)
+    modes = _Modes(response, np.diff(edges))
+    nodes = _nodes(edges)
+    before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
+    shape = (len(network.k_p), len(arms), *nodes.shape)
+    b_0 = gripper.lever_m
+    linear = np.empty(shape)
+    linear_rate = np.empty(shape)
+    tau = np.empty(shape[1:])
+    for index, name in enumerate(("left", "right")[: len(arms)]):
+        linear[:, index] = rotation(response, torque, nodes.ravel(), index).reshape(
+            -1, *nodes.shape
+        )
+        rate = rotation_rate(response, torque, before_jumps, index)
+        linear_rate[:, index] = rate.reshape(-1, *nodes.shape)
+        tau[index] = torque_at(torque, before_jumps, name).reshape(nodes.shape)
+    peak = np.abs(linear).max(axis=(1, 2, 3))
+    extra, extra_rate = np.zeros(shape), np.zeros(shape)
+    converged = np.zeros(shape[0], dtype=bool)
+    for _ in range(accuracy.most_sweeps):
+        u, u_rate = b_0 * (linear + extra), b_0 * (linear_rate + extra_rate)
+        load = b_0 * _load(gripper, arms, tau, u, u_rate)
+        previous = extra
+        extra, extra_rate = modes.respond(_as_drives(load, torque.symmetric))
+        change = np.abs(extra - previous).max(axis=(1, 2, 3))
+        converged = change <= accuracy.tolerance * peak
+        if np.all(converged | ~np.isfinite(change)):
+            break
+    phi = rotation_of_tip(gripper, b_0 * (linear + extra))
+    at_nodes = phi - linear
+    values = np.concatenate((np.zeros((*shape[:3], 1)), at_nodes), axis=3)
+    values[:, :, 1:, 0] = at_nodes[:, :, :-1, -1]
+    return Correction(edges, values, converged)
+
+
+def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
+    """Rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
+
+    Solved for phi without a difference of nearly equal cosines; NaN beyond the
+    displacement at which the arms lie flat.
+    """
+    angle = np.radians(gripper.reference_angle_deg)
+    cos, sin = np.cos(angle), np.sin(angle)
+    x = displacement_m / gripper.arm_length_m
+    rest = x * (2 * cos + x)
+    with np.errstate(invalid="ignore"):
+        new_sin = np.sqrt(sin * sin - rest)
+    return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)
+
+
+def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
+    """Element edges from 0 to the end, graded towards everything that sets in."""
+    jumps = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s, [torque.end_s])))
+    longest = np.inf
+    if len(torque.omega_rad_per_s):
+        longest = 2 * np.pi / torque.omega_rad_per_s.max() / accuracy.per_period
+    edges = [0.0]
+    for start, end in pairwise(jumps[jumps <= torque.end_s]):
+        length, here = accuracy.first_s, start
+        # An element that would leave a sliver takes it along.
+        while here + 1.5 * min(length, longest) < end:
+            here += min(length, longest)
+            edges.append(here)
+            length *= accuracy.growth
+        edges.append(end)
+    return np.array(edges)
+
+
+def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array) -> Array:
+    """The load g of every arm, shape (n, n_arms, n_elements, STAGES)."""
+    b_0 = gripper.lever_m
+    phi = rotation_of_tip(gripper, u)
+    b = gripper.arm_length_m * np.sin(np.radians(gripper.reference_angle_deg) - phi)
+    load = np.empty_like(u)
+    for i, arm in enumerate(arms):
+        stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
+        load[:, i] = tau[i] * (1 / b[:, i] - 1 / b_0)
+        load[:, i] -= stiffness * (phi[:, i] / b[:, i] - u[:, i] / b_0**2)
+        load[:, i] -= damping * u_rate[:, i] * (1 / b[:, i] ** 2 - 1 / b_0**2)
+    return load
+
+
+def _as_drives(load: Array, symmetric_torque: bool) -> Array:
+    """Loads of the arms as drives, shape (n, n_drives, n_elements, STAGES)."""
+    if load.shape[1] == 1:
+        return load
+    return np.moveaxis(drives(load[:, 0], load[:, 1], symmetric=False), 0, 1)
+
+
+class _Modes:
+    """The linear modes, ready to respond to loads given at the nodes of a mesh."""
+
+    def __init__(self, response: StepResponse, lengths_s: Array) -> None:
+        a, ones = _radau()[1], np.ones(STAGES)
+        z = response.rates[:, :, None] * lengths_s
+        # (1 - z A)^-1 through the eigenvectors of A: one scalar inverse each.
+        eigenvalues, vectors = np.linalg.eig(a)
+        products = np.einsum("ik,kj->kij", vectors, np.linalg.inv(vectors)).reshape(STAGES, -1)
+        inverse = (1 / (1 - z[..., None] * eigenvalues)) @ products
+        self._inverse = inverse.real.reshape(*z.shape, STAGES, STAGES)
+        self._carry = self._inverse @ ones
+        self._gain = lengths_s[:, None, None] * (self._inverse @ a)
+        self._rates = response.rates[:, None, :, None, None]
+        self._residues = response.weights * response.rates[:, None, None, :]
+
+    def respond(self, load: Array) -> tuple[Array, Array]:
+        """Rotation and rate of the arms at the nodes, (n, n_arms, n_elements, STAGES) each."""
+        forced = np.einsum("nmeij,ndej->ndmei", self._gain, load, optimize=True)
+        start = np.zeros(forced.shape[:4])
+        for element in range(forced.shape[3] - 1):
+            carried = self._carry[:, None, :, element, -1] * start[..., element]
+            start[..., element + 1] = carried + forced[..., element, -1]
+        q = self._carry[:, None] * start[..., None] + forced
+        q_rate = self._rates * q + load[:, :, None]
+        return (
+            np.einsum("nadm,ndmei->naei", self._residues, q, optimize=True),
+            np.einsum("nadm,ndmei->naei", self._residues, q_rate, optimize=True),
+        )
+
+
+@cache
+def _radau() -> tuple[Array, Array]:
+    """Nodes c and matrix A of the Radau IIA method with `STAGES` stages."""
+    legendre = np.polynomial.legendre
+    ends = legendre.Legendre.basis(STAGES) - legendre.Legendre.basis(STAGES - 1)
+    c = 0.5 * (np.sort(ends.roots().real) + 1)
+    c[-1] = 1.0
+    powers = np.arange(STAGES)
+    vandermonde = c[:, None] ** powers
+    integrals = c[:, None] ** (powers + 1) / (powers + 1)
+    return c, integrals @ np.linalg.inv(vandermonde)
+
+
+def _nodes(edges: Array) -> Array:
+    """Collocation nodes, shape (n_elements, STAGES)."""
+    nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
+    nodes[:, -1] = edges[1:]
+    return nodes
+
+
+def _lagrange(x: Array) -> Array:
+    """Values at x of the polynomials that are 1 at one of 0 and the nodes, (STAGES + 1, n)."""
+    points = np.concatenate(([0.0], _radau()[0]))
+    values = np.ones((len(points), len(x)))
+    for i, point in enumerate(points):
+        for other in np.delete(points, i):
+            values[i] *= (x - other) / (point - other)
+    return values

@@ -1,0 +1,202 @@
+"""What no schema of single keys can see: how the keys of a study go together."""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any
+
+from biogrip.errors import BiogripError, nearest
+from biogrip.sample import SampleModel
+from biogrip.study import build
+from biogrip.study.source import KeyPath
+
+Problem = tuple[KeyPath, str]
+
+_MOST_SAMPLES = 10_000_000
+_DRIVING = ("torque_Nm", "to_torque_Nm", "torque_right_Nm", "voltage_V", "to_voltage_V")
+_NO_PARAMETERS = ("model", "branches", "size_m")
+
+
+def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
+    """Find what is wrong with a config that fits the schema.
+
+    Parameters
+    ----------
+    config
+        Complete: every case has its blocks filled in.
+
+    Yields
+    ------
+    tuple
+        The path of the key, and what was found and what is allowed.
+    """
+    for name, case in config["cases"].items():
+        path = ("cases", name)
+        found = list(_sample_problems((*path, "sample"), case["sample"]))
+        found += _phase_problems((*path, "protocol", "phases"), case["protocol"]["phases"])
+        found += _genetic_problems((*path, "genetic_algorithm"), case["genetic_algorithm"])
+        found += _range_problems((*path, "search_range"), case["search_range"])
+        yield from found
+        if not found:
+            yield from _fixed_problems((*path, "fixed"), case)
+            yield from _cut_problems((*path, "genetic_algorithm"), case)
+            yield from _sampling_problems(path, case)
+            yield from _gripper_problems(path, case, config["actuator"])
+    for index, key in enumerate(config["reconstructed"]):
+        if not _exists(config, key):
+            yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+
+
+def _model(case: Mapping[str, Any]) -> SampleModel:
+    return build.sample_model(case["sample"])
+
+
+def _sample_problems(path: KeyPath, sample: Mapping[str, Any]) -> Iterator[Problem]:
+    if "branches" in sample and sample["model"] != "generalized_maxwell":
+        yield (*path, "branches"), "only generalized_maxwell has a number of branches."
+        return
+    model = _model({"sample": sample})
+    names = ", ".join(model.names)
+    for name in sample:
+        if name not in (*_NO_PARAMETERS, *model.names):
+            hint = nearest(name, model.names)
+            yield (*path, name), f"is no parameter of {model.name}, which has {names}.{hint}"
+    for parameter in model.parameters:
+        if parameter.name not in sample:
+            yield (*path, parameter.name), f"is missing: {model.name} needs {names}."
+            continue
+        value = sample[parameter.name]
+        if value < 0 or (value == 0 and not parameter.may_vanish):
+            allowed = "at least" if parameter.may_vanish else "greater than"
+            text = f"found {value}, allowed is {allowed} 0 {parameter.unit}."
+            yield (*path, parameter.name), text
+
+
+def _fixed_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    fixed, names = case.get("fixed", {}), _model(case).names
+    for name in fixed:
+        if name not in names:
+            text = f"is no parameter of the sample, which has {', '.join(names)}."
+            yield (*path, name), text + nearest(name, names)
+    for parameter in _model(case).parameters:
+        if fixed.get(parameter.name) == 0 and not parameter.may_vanish:
+            yield (*path, parameter.name), f"found 0, allowed is greater than 0 {parameter.unit}."
+    if set(names) <= set(fixed):
+        yield path, "leaves nothing to identify; allowed are fewer parameters."
+
+
+def _phase_problems(path: KeyPath, phases: list[Mapping[str, Any]]) -> Iterator[Problem]:
+    for index, phase in enumerate(phases):
+        here = (*path, index)
+        given = [key for key in ("torque_Nm", "voltage_V") if key in phase]
+        if len(given) != 1:
+            found = " and ".join(given) or "neither"
+            yield here, f"found {found}, allowed is one of torque_Nm and voltage_V."
+            continue
+        by = given[0]
+        quantity, unit = by.split("_")
+        swing, right, ramp = f"amplitude_{unit}", f"{quantity}_right_{unit}", f"to_{by}"
+        for key in phase:
+            if key not in ("duration_s", by, right, ramp, swing, "frequency_Hz"):
+                yield (*here, key), f"does not go with {by}."
+        if (swing in phase) != ("frequency_Hz" in phase):
+            yield here, f"has one of {swing} and frequency_Hz; allowed are both or neither."
+        if swing in phase and ramp in phase:
+            yield here, "has a ramp and a sinusoid; allowed is one of them in a phase."
+        if phase.get(swing, 0) > min(phase[by], phase.get(right, phase[by])):
+            text = f"found {phase[swing]}, allowed is at most {by}: comb drives only pull."
+            yield (*here, swing), text
+
+
+def _gripper_problems(
+    path: KeyPath, case: Mapping[str, Any], actuator: Mapping[str, Any]
+) -> Iterator[Problem]:
+    assumed = case.get("assumed_gripper", {})
+    if isinstance(assumed, str):
+        if assumed != "calibrated":
+            text = f"found '{assumed}', allowed is 'calibrated' or keys of a gripper block."
+            yield (*path, "assumed_gripper"), text
+    else:
+        yield from _assumed_problems((*path, "assumed_gripper"), assumed, case["gripper"])
+    if "size_m" in case["sample"]:
+        try:
+            build.contact_of(case["gripper"], actuator, case["sample"]["size_m"])
+        except BiogripError as error:
+            yield (*path, "sample", "size_m"), str(error)
+
+
+def _assumed_problems(
+    path: KeyPath, assumed: Mapping[str, Any], true: Mapping[str, Any]
+) -> Iterator[Problem]:
+    for key, value in assumed.items():
+        if key not in true:
+            yield (*path, key), f"unknown key.{nearest(key, true)} Allowed here: {', '.join(true)}."
+        elif isinstance(true[key], Mapping) and isinstance(value, Mapping):
+            yield from _assumed_problems((*path, key), value, true[key])
+        elif not isinstance(value, int | float) or isinstance(value, bool) or value <= 0:
+            yield (*path, key), f"found {value!r}, allowed is a number greater than 0."
+
+
+def _genetic_problems(path: KeyPath, settings: Mapping[str, Any]) -> Iterator[Problem]:
+    for low, high, below in (
+        ("survivors", "population", True),
+        ("min_generations", "max_generations", False),
+    ):
+        wrong = settings[low] >= settings[high] if below else settings[low] > settings[high]
+        if wrong:
+            word = "less than" if below else "at most"
+            text = f"found {settings[low]}, allowed is {word} {high}, which is {settings[high]}."
+            yield (*path, low), text
+
+
+def _cut_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    settings = case["genetic_algorithm"]
+    genes = 3 * (len(_model(case).names) - len(case.get("fixed", {})))
+    first, last = settings["first_cut"], settings["last_cut"]
+    last = last if last > 0 else genes + last
+    if not 1 <= first <= last:
+        text = f"found {first}, allowed is 1 to last_cut, which is {last} of {genes} genes here."
+        yield (*path, "first_cut"), text
+
+
+def _range_problems(path: KeyPath, ranges: Mapping[str, Any]) -> Iterator[Problem]:
+    for name, genes in ranges.items():
+        for gene, (low, high) in genes.items():
+            if low > high:
+                yield (
+                    (*path, name, gene),
+                    f"found [{low}, {high}], allowed is [lowest, highest].",
+                )
+
+
+def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    phases = case["protocol"]["phases"]
+    if not any(phase.get(key) for phase in phases for key in _DRIVING):
+        text = "no phase has a torque, so nothing would move; allowed is at least one above 0 N m."
+        yield (*path, "protocol", "phases"), text
+    here = (*path, "measurement")
+    needed = len(_model(case).names) + 1
+    end = sum(phase["duration_s"] for phase in phases)
+    times = case["measurement"].get("times_s")
+    if times is None:
+        rate = case["measurement"]["rate_Hz"]
+        samples = end * rate + 1
+        if not needed <= samples <= _MOST_SAMPLES:
+            text = f"found {rate}, which gives {samples:.6g} samples over the protocol; "
+            yield (*here, "rate_Hz"), f"{text}allowed are {needed} to {_MOST_SAMPLES}."
+        return
+    if len(times) < needed:
+        yield (*here, "times_s"), f"found {len(times)} times, allowed are at least {needed}."
+    for index, (before, after) in enumerate(pairwise(times), start=1):
+        if not before < after <= end:
+            text = f"found {after}, allowed is later than {before} and at most {end} s."
+            yield (*here, "times_s", index), text
+            break
+
+
+def _exists(config: Mapping[str, Any], key: str) -> bool:
+    block: Any = config
+    for part in key.split("."):
+        if not isinstance(block, Mapping) or part not in block:
+            return False
+        block = block[part]
+    return True
