@@ -21,6 +21,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BiogripError as error:
         print(f"biogrip: {error}", file=sys.stderr)
         return 1
+    except KeyError as error:
+        print(f"biogrip: --settings: the key {error} is missing.", file=sys.stderr)
+        return 1
     return 0
 
 
@@ -41,6 +44,11 @@ def _parser() -> argparse.ArgumentParser:
         stages, "calibration", _calibration, "calibrate a gripper without a sample"
     )
     _outputs(calibration, "output", "traces")
+
+    linearisation = _stage(
+        stages, "linearisation", _linearisation, "compare the linear and the nonlinear model"
+    )
+    _outputs(linearisation, "output")
 
     identification = _stage(
         stages, "identification", _identification, "identify the sample in noisy traces"
@@ -136,6 +144,12 @@ def _calibration(options: argparse.Namespace) -> None:
     from biogrip.stages import calibration
 
     calibration.run(options.settings, options.output, options.traces)
+
+
+def _linearisation(options: argparse.Namespace) -> None:
+    from biogrip.stages import linearisation
+
+    linearisation.run(options.settings, options.output)
 
 
 def _identification(options: argparse.Namespace) -> None:

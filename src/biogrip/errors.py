@@ -10,5 +10,6 @@ class BiogripError(Exception):
 
 def nearest(name: object, allowed: Iterable[str]) -> str:
     """Return ``" Did you mean 'x'?"`` for the allowed name closest to `name`, else ``""``."""
-    close = get_close_matches(str(name), list(allowed), n=1, cutoff=0.4)
-    return f" Did you mean '{close[0]}'?" if close else ""
+    by_lower = {choice.lower(): choice for choice in allowed}
+    close = get_close_matches(str(name).lower(), list(by_lower), n=1, cutoff=0.4)
+    return f" Did you mean '{by_lower[close[0]]}'?" if close else ""

@@ -108,6 +108,12 @@ class SampleModel:
         """Parameter names in column order."""
         return tuple(parameter.name for parameter in self.parameters)
 
+    @property
+    def quantities(self) -> list[list[Parameter]]:
+        """What tables have a row for: every parameter, and the sum of the exchangeable ones."""
+        together = [p for p in self.parameters if p.name in self.exchangeable]
+        return [[p] for p in self.parameters] + ([together] if together else [])
+
 
 K = Parameter("k", "stiffness", "Maxwell spring", "k")
 K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring", "k_p", may_vanish=True)

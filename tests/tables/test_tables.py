@@ -5,7 +5,8 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.identify.records import COLUMNS
+from biogrip.identify.records import columns
+from biogrip.sample import MODELS
 from biogrip.stages import table
 from biogrip.tables.errors import errors
 from biogrip.tables.layout import Column, Table, write
@@ -30,7 +31,7 @@ def identifications(tmp_path: Path) -> Path:
     path = tmp_path / "drop.csv"
     with path.open("w", newline="") as stream:
         writer = csv.writer(stream)
-        writer.writerow(COLUMNS)
+        writer.writerow(columns(MODELS["generalized_maxwell"]))
         for seed in range(11):
             misfit = 1.0 if seed == 3 else 1.015 + 0.01 * (seed > 4)
             row = ["drop", "genetic", seed, 5 + seed, 0.1, 5 - 0.1 * seed, 0.1 * seed]

@@ -8,7 +8,7 @@ from snakemake.settings.types import ExecMode
 
 from biogrip.errors import BiogripError
 from biogrip.study.config import check_results_folder, load_study
-from biogrip.study.locks import take_over_dead_run
+from biogrip.study.locks import release_dead_locks, sign_locks
 from biogrip.study.modules import source_files
 from biogrip.study.plan import Plan
 from biogrip.study.source import read_places
@@ -40,10 +40,16 @@ except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 
 if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
-    take_over_dead_run(Path(".snakemake"))
+    release_dead_locks(Path(".snakemake"))
+
+
+onstart:
+    sign_locks(Path(".snakemake"))
+
 
 PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
+PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
 
 
 def calibrations_of(case):

@@ -8,6 +8,7 @@ INPUT_FIGURES = {
 FIGURES = [
     "overview",
     *INPUT_FIGURES,
+    "linearisation",
     *(
         f"{figure}_{case}"
         for case in CASES
@@ -154,3 +155,28 @@ rule evolution_figure:
         "biogrip figure evolution --settings {params.settings:q} "
         "--inputs {input.identifications:q} {input.history:q} "
         "--output {output.png:q} 2> {log:q}"
+
+
+rule linearisation_figure:
+    input:
+        comparison="results/linearisation.csv",
+        code=source_files("biogrip.figures.linearisation"),
+    output:
+        png=report(
+            "results/figures/linearisation.png",
+            caption="../report/linearisation.rst",
+            category="Figures",
+            labels={"case": "all", "item": "linearisation", "format": "figure"},
+        ),
+        pdf="results/figures/linearisation.pdf",
+    log:
+        "results/logs/figures/linearisation.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.linearisation(),
+    message:
+        "Drawing linear against nonlinear model"
+    shell:
+        "biogrip figure linearisation --settings {params.settings:q} "
+        "--inputs {input.comparison:q} --output {output.png:q} 2> {log:q}"

@@ -5,6 +5,7 @@ INPUT_TABLES = {
     "actuator": ("actuator", "reconstructed"),
     "gene_ranges": ("search_range", "reconstructed"),
     "parameter_ranges": ("search_range",),
+    "contact": ("gripper", "actuator"),
 }
 TABLES = [
     *INPUT_TABLES,
@@ -12,12 +13,17 @@ TABLES = [
     "errors",
     "evidence",
     "printed_values",
+    "linearisation",
 ]
 
 
 rule input_table:
     input:
-        code=source_files("biogrip.tables.inputs"),
+        code=lambda wildcards: source_files(
+            "biogrip.tables.contact"
+            if wildcards.table == "contact"
+            else "biogrip.tables.inputs"
+        ),
     output:
         csv="results/tables/{table}.csv",
         text=multiext("results/tables/{table}", ".md", ".tex"),
@@ -94,10 +100,12 @@ rule all_errors_table:
 
 rule evidence_table:
     input:
-        identifications=collect("results/identifications/{case}.csv", case=CASES),
+        identifications=collect(
+            "results/identifications/{case}.csv", case=PUBLISHED_CASES
+        ),
         measurements=[
             file
-            for case in CASES
+            for case in PUBLISHED_CASES
             for file in PLAN.batch_files(
                 "results/measurements/{case}/{batch}.parquet", case
             )
@@ -149,3 +157,44 @@ rule printed_values_table:
     shell:
         "biogrip table printed_values --settings {params.settings:q} "
         "--output {output.csv:q} 2> {log:q}"
+
+
+rule linearisation:
+    input:
+        code=source_files("biogrip.stages.linearisation"),
+    output:
+        "results/linearisation.csv",
+    log:
+        "results/logs/linearisation.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.linearisation(),
+    message:
+        "Comparing the linear and the nonlinear model"
+    shell:
+        "biogrip linearisation --settings {params.settings:q} --output {output:q} 2> {log:q}"
+
+
+rule linearisation_table:
+    input:
+        comparison="results/linearisation.csv",
+        code=source_files("biogrip.tables.linearisation"),
+    output:
+        csv="results/tables/linearisation.csv",
+        text=multiext("results/tables/linearisation", ".md", ".tex"),
+        html=report(
+            "results/tables/linearisation.html",
+            caption="../report/linearisation.rst",
+            category="Tables",
+            labels={"case": "all", "item": "linearisation", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/linearisation.log",
+    conda:
+        "../envs/biogrip.yaml"
+    message:
+        "Writing where the linearisation is good to 1 %"
+    shell:
+        "biogrip table linearisation --settings '{{}}' "
+        "--inputs {input.comparison:q} --output {output.csv:q} 2> {log:q}"

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.results import read_history
 from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
-from biogrip.tables.errors import at_noise_floor, read_identifications
+from biogrip.identify.identifications import at_noise_floor, read_identifications
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
@@ -25,7 +25,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     found = read_identifications(inputs[0])
     history = read_history(inputs[1])
     noise = found.set_index("seed")["noise_rms_rad"]
-    unit = noise if (noise > 0).all() else noise * 0 + found["misfit_rad"].min()
+    noisy = bool((noise > 0).all())
+    unit = noise if noisy else noise * 0 + found["misfit_rad"].min()
     best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
     reached = at_noise_floor(found, settings["noise_floor_tolerance"])
     drawn = figure(COLUMN_IN, 2.5)
@@ -38,7 +39,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         axes.plot(rows["generation"], excess, **style)
     axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=f"all {len(found)} seeds")
     axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
-    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label="noise in the trace")
+    label = "noise in the trace" if noisy else "lowest misfit"
+    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     axes.axvline(settings["mutation_start"], color=TARGET, linestyle=":", linewidth=0.8)
     axes.annotate(
         "mutation starts",
@@ -55,7 +57,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     axes.minorticks_off()
     axes.set_xlim(0, history["generation"].max())
     axes.set_xlabel("generation")
-    axes.set_ylabel("best misfit above noise (%)")
-    axes.set_title(f"{settings['title']}: {reached.sum():.0f} of {len(found)} at the noise floor")
+    axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
+    axes.set_title(f"{settings['title']}: {reached.sum()} of {len(found)} at the noise floor")
     axes.legend(loc="upper right")
     return drawn

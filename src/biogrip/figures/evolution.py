@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.results import read_history
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
+from biogrip.identify.identifications import read_identifications
 from biogrip.study import build
-from biogrip.tables.errors import read_identifications
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
@@ -41,10 +41,13 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         axes.set_yscale("log")
         axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
         axes.set_xlim(0, history["generation"].max())
-    for axes in grid[-(len(grid) // 2) :]:
-        axes.set_xlabel("generation")
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
+    columns = len(grid) // 2
+    for axes, below in zip(grid[:columns], grid[columns:], strict=True):
+        lowest = below if below.get_visible() and below.axison else axes
+        lowest.set_xlabel("generation")
+        lowest.tick_params(labelbottom=True)
     lines = [
         grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
         grid[0].plot([], [], color=FITTED)[0],

@@ -19,11 +19,12 @@ from biogrip.figures.style import (
     figure,
     panel,
 )
+from biogrip.identify.identifications import at_noise_floor, read_identifications
 from biogrip.study import build
-from biogrip.tables.errors import at_noise_floor, quantities, read_identifications
 
 _WORST = 1e3
-_MOST_CASES = 4
+_MOST_CASES = 3
+_TITLE_LETTERS = 21
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
@@ -45,8 +46,12 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     _fit(axes[0], cases[0], identifications[0], others)
     for index, (case, path) in enumerate(zip(cases, identifications, strict=False)):
         _scatter(axes[index + 1], case, path, settings["noise_floor_tolerance"], index)
-    handles, labels = axes[1].get_legend_handles_labels()
-    legend = dict(zip(labels, handles, strict=True))
+    legend: dict[str, Any] = {}
+    for panel_axes in axes[1:]:
+        legend |= {
+            label: handle
+            for handle, label in zip(*panel_axes.get_legend_handles_labels(), strict=True)
+        }
     drawn.legend(
         legend.values(),
         legend.keys(),
@@ -87,7 +92,7 @@ def _scatter(
     index: int,
 ) -> None:
     found = read_identifications(identifications)
-    reached = at_noise_floor(found, tolerance) > 0
+    reached = at_noise_floor(found, tolerance)
     ticks = []
     for x, (label, columns, target, paper) in enumerate(_quantities(case)):
         ratio = _clipped(found[columns].sum(axis=1).to_numpy(float) / target)
@@ -131,7 +136,7 @@ def _scatter(
     else:
         axes.set_ylabel("identified / target")
     axes.set_xticks(range(len(ticks)), ticks)
-    panel(axes, "bcde"[index], case["title"])
+    panel(axes, "bcd"[index], case["title"][:_TITLE_LETTERS])
 
 
 def _quantities(
@@ -140,7 +145,7 @@ def _quantities(
     """Label, columns, target and the paper's value of each parameter, and of c + c_p."""
     identified = case["published"].get("identified", {})
     found = []
-    for group in quantities(build.sample_model(case)):
+    for group in build.sample_model(case).quantities:
         target = sum(case["parameters"][parameter.name] for parameter in group)
         known = all(parameter.name in identified for parameter in group)
         paper = sum(identified[parameter.name] for parameter in group) if known else None

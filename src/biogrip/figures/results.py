@@ -10,11 +10,11 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.errors import BiogripError
+from biogrip.identify.identifications import read_identifications
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study import build
 from biogrip.study.batches import parse_batch
-from biogrip.tables.errors import read_identifications
 from biogrip.traces import read_measurements
 
 

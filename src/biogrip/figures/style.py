@@ -17,7 +17,7 @@ PAGE_IN = 7.2
 # Okabe and Ito's palette.
 BLACK, GREY = "#000000", "#999999"
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
-PURPLE, SKY, YELLOW = "#CC79A7", "#56B4E9", "#E69F00"
+SKY = "#56B4E9"
 
 # What a colour means, everywhere.
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY

@@ -22,6 +22,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
     torque = torque_at(history, time_s)
+    right = torque_at(history, time_s, "right")
     volts = actuator.voltage(comb, np.maximum(torque, 0))
     drawn = figure(COLUMN_IN, 2.2)
     upper, lower = drawn.subplots(2, 1, sharex=True)
@@ -43,6 +44,12 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
                     ha="center",
                     fontsize=7,
                 )
+    if not history.symmetric:
+        upper.plot(time_s, 1e9 * right, "--", color=BLUE, linewidth=1, label="right arm")
+        lower.plot(time_s, actuator.voltage(comb, np.maximum(right, 0)), "--", color=ORANGE)
+        upper.set_ylim(0, 1.35e9 * max(torque.max(), right.max()))
+        lower.set_ylim(0, 1.35 * float(actuator.voltage(comb, max(torque.max(), right.max()))))
+        upper.legend()
     upper.set_ylabel("torque (nN m)")
     lower.set_ylabel("voltage (V)")
     lower.set_xlabel("time (s)")

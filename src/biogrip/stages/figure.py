@@ -6,7 +6,10 @@ from typing import Any
 
 from biogrip.errors import BiogripError, nearest
 
-MODULES = ("overview", "torque", "linkage", "comb", "convergence", "fit", "evolution")
+MODULES = (
+    *("overview", "torque", "linkage", "comb"),
+    *("convergence", "fit", "evolution", "linearisation"),
+)
 """Each module draws the figure of its name in its function ``draw``."""
 
 

@@ -15,6 +15,8 @@ MODULES = {
     "all_errors": "all_errors",
     "evidence": "evidence",
     "printed_values": "printed_values",
+    "linearisation": "linearisation",
+    "contact": "contact",
 }
 """The module that makes each table, in a function of the table's name."""
 

@@ -12,6 +12,11 @@ from biogrip.study import build
 from biogrip.study.source import read_places
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
+STAGE_FOLDERS = (
+    *("targets", "measurements", "calibrations", "identifications", "histories"),
+    *("tables", "figures", "logs"),
+)
+
 
 @dataclass(frozen=True)
 class Case:
@@ -118,7 +123,7 @@ def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
         if isinstance(case, dict):
             case = dict(case)
             for block in OVERRIDABLE:
-                if block in config:
+                if isinstance(config.get(block), dict):
                     case[block] = overlaid(config[block], case.get(block, {}))
         filled[name] = case
     return {**config, "cases": filled}
@@ -152,20 +157,23 @@ def _case(name: str, block: dict[str, Any]) -> Case:
 
 
 def check_results_folder(folder: Path) -> None:
-    """Make the results folder and see that it can be written to.
+    """Make the results folder, and see that it and what is in it can be written to.
 
     Raises
     ------
     BiogripError
         If it cannot.
     """
-    probe = folder / ".writable"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise BiogripError(
-            f"{folder}: results cannot be written here: {error.strerror}. Allowed is a folder "
-            "that you may write to, on a disk with space."
-        ) from error
+    for place in (folder, *(folder / stage for stage in STAGE_FOLDERS)):
+        if place != folder and not place.exists():
+            continue
+        probe = place / ".writable"
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            probe.touch()
+            probe.unlink()
+        except OSError as error:
+            raise BiogripError(
+                f"{place}: results cannot be written here: {error.strerror}. Allowed is a folder "
+                "that you may write to, on a disk with space."
+            ) from error

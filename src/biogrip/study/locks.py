@@ -1,51 +1,55 @@
 """Lets a run that was killed be continued with the same command.
 
 Snakemake locks its folder, and a killed Snakemake leaves the lock behind. Here
-every run leaves its name beside the lock; a lock whose run is provably gone is
-taken away. A lock of another machine, or of a run that lives, is left alone.
+every run writes down, once it holds its lock, who it is and which lock files are
+its own. Those of a run that is provably gone are taken away; a lock of another
+machine, of a run that lives, or that nobody signed is left alone.
 """
 
 import json
 import socket
 from pathlib import Path
+from typing import Any
 
 import psutil
 
 
-def take_over_dead_run(snakemake_folder: Path) -> None:
-    """Remove the lock of a dead run, if there is one, and leave this run's name.
-
-    Parameters
-    ----------
-    snakemake_folder
-        The ``.snakemake`` folder of the working directory.
-    """
-    locks = list((snakemake_folder / "locks").glob("*"))
-    name = snakemake_folder / "run.json"
-    if locks and not _is_dead(name):
-        return
-    for lock in locks:
-        lock.unlink(missing_ok=True)
-    snakemake_folder.mkdir(exist_ok=True)
-    name.write_text(json.dumps(_this_run()))
-
-
-def _this_run() -> dict[str, str | int | float]:
+def sign_locks(snakemake_folder: Path) -> None:
+    """Write down that the locks in a ``.snakemake`` folder are this run's."""
     process = psutil.Process()
-    return {
+    run = {
         "host": socket.gethostname(),
         "pid": process.pid,
         "started": process.create_time(),
+        "locks": _locks(snakemake_folder),
     }
+    (snakemake_folder / "run.json").write_text(json.dumps(run))
 
 
-def _is_dead(name: Path) -> bool:
+def release_dead_locks(snakemake_folder: Path) -> None:
+    """Remove the locks that a dead run has signed in a ``.snakemake`` folder."""
     try:
-        run = json.loads(name.read_text())
-        if run["host"] != socket.gethostname():
-            return False
+        run = json.loads((snakemake_folder / "run.json").read_text())
+        dead = _is_dead(run)
+        signed = dict(run["locks"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return
+    if dead:
+        for name, changed in _locks(snakemake_folder).items():
+            if signed.get(name) == changed:
+                (snakemake_folder / "locks" / name).unlink(missing_ok=True)
+
+
+def _locks(snakemake_folder: Path) -> dict[str, int]:
+    """When each lock file was made: a later run's lock has the same name, but not the same time."""
+    files = (snakemake_folder / "locks").glob("*")
+    return {file.name: file.stat().st_mtime_ns for file in files}
+
+
+def _is_dead(run: dict[str, Any]) -> bool:
+    if run["host"] != socket.gethostname():
+        return False
+    try:
         return abs(psutil.Process(run["pid"]).create_time() - run["started"]) > 1
     except psutil.NoSuchProcess:
         return True
-    except (OSError, ValueError, KeyError, TypeError):
-        return False

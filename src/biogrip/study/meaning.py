@@ -12,7 +12,10 @@ from biogrip.study.source import KeyPath
 Problem = tuple[KeyPath, str]
 
 _MOST_SAMPLES = 10_000_000
-_DRIVING = ("torque_Nm", "to_torque_Nm", "torque_right_Nm", "voltage_V", "to_voltage_V")
+_DRIVING = (
+    *("torque_Nm", "to_torque_Nm", "torque_right_Nm"),
+    *("voltage_V", "to_voltage_V", "voltage_right_V"),
+)
 _NO_PARAMETERS = ("model", "branches", "size_m")
 
 

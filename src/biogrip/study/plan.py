@@ -128,13 +128,14 @@ class Plan:
         return _json(**{key: self.study.config[key] for key in keys})
 
     def linearisation(self) -> str:
-        """Settings of the comparison of linear and nonlinear model."""
+        """Settings of the comparison of linear and nonlinear model, in the order of the cases."""
         cases = {
             name: {**self._truth(case), "gripper": self._gripper(case)}
             for name, case in self.study.cases.items()
-            if case.published
         }
-        return _json(cases=cases, protocol=self.study.config["protocol"], **self._comb())
+        return json.dumps(
+            {"cases": cases, "protocol": self.study.config["protocol"], **self._comb()}
+        )
 
     def _comb(self) -> dict[str, Any]:
         """The comb drive, if the study's protocol is given in volts."""

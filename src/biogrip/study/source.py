@@ -80,7 +80,10 @@ def _lines(file: Path) -> dict[KeyPath, int]:
         ) from error
     lines: dict[KeyPath, int] = {}
     if root is not None:
-        _walk(file, root, (), lines)
+        try:
+            _walk(file, root, (), lines)
+        except RecursionError as error:
+            raise BiogripError(f"{_relative(file)}: an alias contains itself.") from error
     return lines
 
 

@@ -85,9 +85,13 @@ def check(config: Mapping[str, Any], files: ConfigFiles) -> None:
 
 def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
     """Path of the study-wide key that a case inherits, or the path itself."""
-    inherits = len(path) > 2 and path[0] == "cases" and path[2] in OVERRIDABLE
-    own = any(path[:4] in lines for _, lines in files.lines)
-    return path[2:] if inherits and not own else path
+    if len(path) < 3 or path[0] != "cases" or path[2] not in OVERRIDABLE:
+        return path
+    for length in range(len(path), 2, -1):
+        for candidate in (path[:length], path[2:length]):
+            if any(candidate in lines for _, lines in files.lines):
+                return path if candidate == path[:length] else path[2:]
+    return path[2:]
 
 
 def _dotted(path: KeyPath) -> str:
@@ -130,11 +134,12 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
             missing = next(key for key in limit if f"'{key}'" in error.message)
             yield (*path, missing), "is missing and has no default."
         case "propertyNames" | "pattern":
-            yield (
-                (*path, found),
-                "not a usable case name: a letter, then up to 63 letters, digits, '_' or '-' "
-                "(it names files).",
-            )
+            if path[-1:] == ("title",):
+                text = "allowed are 1 to 60 letters, digits, spaces and . , : ; ( ) + / ' - _."
+                yield path, f"found {_shown(found)}, {text}"
+            else:
+                text = "a letter, then up to 63 letters, digits, '_' or '-' (it names files)."
+                yield (*path, found), f"not a usable case name: {text}"
         case "type":
             words = {"object": "a block of keys", "array": "a list", "string": "text"}
             kinds = [limit] if isinstance(limit, str) else limit
@@ -155,8 +160,6 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
             )
         case "minProperties":
             yield path, "is empty; at least one is needed."
-        case "minLength" | "maxLength":
-            yield path, f"found {_shown(found)}, allowed are 1 to 60 characters."
         case _:
             yield path, f"found {_shown(found)}, allowed is {_range(error.schema)}."
 

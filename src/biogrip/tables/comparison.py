@@ -59,6 +59,8 @@ def _differences(published: Path, now: Path) -> list[tuple[str, ...]]:
         return []
     rows: list[tuple[str, ...]] = []
     old, new = old.set_index(key), new.set_index(key)
+    if not (old.index.is_unique and new.index.is_unique):
+        return []
     for label in old.index.union(new.index, sort=False):
         name = " ".join(label) if isinstance(label, tuple) else str(label)
         if label not in new.index or label not in old.index:

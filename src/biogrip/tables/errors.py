@@ -4,12 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
 from biogrip.arrays import Array
-from biogrip.errors import BiogripError
-from biogrip.identify.records import LEADING, TRAILING
-from biogrip.sample import Parameter, SampleModel
+from biogrip.identify.identifications import at_noise_floor, read_identifications
 from biogrip.study import build
 from biogrip.tables.layout import Column, Table
 
@@ -49,7 +46,7 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     share = float(np.mean(at_noise_floor(found, settings["noise_floor_tolerance"])))
     published = settings["published"]
     rows = []
-    for names in quantities(model):
+    for names in model.quantities:
         label = " + ".join(parameter.name for parameter in names)
         target = sum(settings["parameters"][parameter.name] for parameter in names)
         values = found[[parameter.column for parameter in names]].sum(axis=1).to_numpy(float)
@@ -81,49 +78,11 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     return Table(caption, TABLE_COLUMNS, rows)
 
 
-def read_identifications(path: Path) -> pd.DataFrame:
-    """Read a file of identifications.
-
-    Raises
-    ------
-    BiogripError
-        If it is missing or is not one.
-    """
-    try:
-        frame = pd.read_csv(path)
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as identifications: {error}.") from error
-    wanted = [*LEADING, *TRAILING]
-    if not set(wanted) <= set(frame.columns):
-        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(wanted)}.")
-    return frame
-
-
-def at_noise_floor(found: pd.DataFrame, tolerance: float) -> Array:
-    """Whether each seed's misfit reaches the RMS of the noise in its trace, (n_seeds,).
-
-    A fit of a few parameters to thousands of samples comes out at that RMS or a
-    hair below it if, and only if, it is as good as the truth.
-    """
-    misfit, noise = (
-        found["misfit_rad"].to_numpy(float),
-        found["noise_rms_rad"].to_numpy(float),
-    )
-    return np.asarray(misfit <= (1 + tolerance) * noise, dtype=float)
-
-
 def error_percent(target: float, identified: Array) -> Array:
     """Signed error (target - identified) / target in percent; NaN for a target of zero."""
     if target == 0:
         return np.full_like(identified, np.nan)
     return 100 * (target - identified) / target
-
-
-def quantities(model: SampleModel) -> list[list[Parameter]]:
-    """Every parameter, and together those that trade against each other."""
-    singles = [[parameter] for parameter in model.parameters]
-    together = [p for p in model.parameters if p.name in model.exchangeable]
-    return [*singles, together] if together else singles
 
 
 def _paper(

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from biogrip import actuator
+from biogrip.identify.identifications import read_identifications
 from biogrip.sample import SINGLE_BRANCH
 from biogrip.study import build
-from biogrip.tables.errors import read_identifications
 from biogrip.tables.layout import Cell, Column, Table
 from biogrip.traces import read_measurements
 
@@ -64,27 +64,27 @@ def _gripper_rows(settings: dict[str, Any]) -> list[tuple[Cell, ...]]:
     stroke = gripper.left.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
     volts = float(actuator.voltage(comb, stroke))
     return [
-        ("arm length", "mm", None, 1e3 * gripper.arm_length_m, "reconstructed"),
+        ("arm length", "mm", None, 1e3 * gripper.arm_length_m, "from the config"),
         (
             "natural frequency of the free arm",
             "Hz",
             None,
             gripper.left.natural_frequency_Hz,
-            "reconstructed",
+            "from the config",
         ),
         (
             "quality factor of the free arm",
             "",
             None,
             gripper.left.quality_factor,
-            "reconstructed",
+            "from the config",
         ),
         (
             "voltage for the full stroke, no sample",
             "V",
             None,
             volts,
-            "from the reconstructed k_2",
+            "from the config's k_2",
         ),
     ]
 
@@ -94,7 +94,7 @@ def _gene_rows(settings: dict[str, Any]) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
     for parameter in SINGLE_BRANCH:
         low, high = ranges[parameter.name].exponent
-        remark = "reconstructed from Table 4"
+        remark = "from the config, made after Table 4"
         quantity = f"values of the exponent gene of {parameter.name}"
         rows.append((quantity, "", _PRINTED_GENE_VALUES, high - low + 1, remark))
     return rows

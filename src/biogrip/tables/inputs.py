@@ -8,6 +8,10 @@ from biogrip.study import build
 from biogrip.tables.layout import Column, Table
 
 _SOURCE = Column("source", "Source")
+_LEGEND = (
+    " Stated: by the paper, or by whoever changed the config. "
+    "Reconstructed: the paper's value is not available to us."
+)
 
 
 def gripper(settings: dict[str, Any], inputs: list[Path]) -> Table:
@@ -97,7 +101,8 @@ def gene_ranges(settings: dict[str, Any], inputs: list[Path]) -> Table:
         Column("values", "Values"),
         _SOURCE,
     )
-    return Table("Table 3. Values that the genes of the chromosome may take.", columns, rows)
+    caption = "Table 3. Values that the genes of the chromosome may take."
+    return Table(caption + _LEGEND, columns, rows)
 
 
 def parameter_ranges(settings: dict[str, Any], inputs: list[Path]) -> Table:
@@ -130,7 +135,7 @@ def _row(
 
 def _source(settings: dict[str, Any], key: str) -> str:
     marked = any(key == name or key.startswith(f"{name}.") for name in settings["reconstructed"])
-    return "reconstructed" if marked else "paper"
+    return "reconstructed" if marked else "stated"
 
 
 def _quantities(caption: str, rows: list[tuple[str, str, float, str, str]]) -> Table:
@@ -141,6 +146,5 @@ def _quantities(caption: str, rows: list[tuple[str, str, float, str, str]]) -> T
         Column("unit", "Unit"),
         _SOURCE,
     )
-    if any(row[-1] == "reconstructed" for row in rows):
-        caption += " Reconstructed: the paper's value is not available to us."
+    caption += _LEGEND
     return Table(caption, columns, rows)

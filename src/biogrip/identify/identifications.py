@@ -1,0 +1,42 @@
+"""Reading files of identifications."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from biogrip.errors import BiogripError
+from biogrip.identify.records import LEADING, TRAILING
+
+
+def read_identifications(path: Path) -> pd.DataFrame:
+    """Read a file of identifications.
+
+    Raises
+    ------
+    BiogripError
+        If it is missing or is not one.
+    """
+    try:
+        frame = pd.read_csv(path)
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as identifications: {error}.") from error
+    wanted = [*LEADING, *TRAILING]
+    if not set(wanted) <= set(frame.columns):
+        raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(wanted)}.")
+    return frame
+
+
+def at_noise_floor(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
+    """Whether each seed's misfit reaches the RMS of the noise in its trace, (n_seeds,).
+
+    A fit of a few parameters to thousands of samples comes out at that RMS or a
+    hair below it if, and only if, it is as good as the truth.
+    """
+    misfit, noise = (
+        found["misfit_rad"].to_numpy(float),
+        found["noise_rms_rad"].to_numpy(float),
+    )
+    reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise
+    return reached
