@@ -1,5 +1,6 @@
 """Limits tie the models to one another and to closed forms."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,14 @@ from scipy.integrate import solve_ivp
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory, held, torque_history
 from biogrip.response.linear import _sample_polynomials, rotation, step_response
-from biogrip.sample import MODELS, Network, SampleModel, generalized_maxwell, liquid_drop
+from biogrip.sample import (
+    MODELS,
+    Network,
+    generalized_maxwell,
+    liquid_drop,
+    model_named,
+    with_fixed,
+)
 
 TIMES = np.linspace(0.1, 400, 300)
 
@@ -71,13 +79,75 @@ def test_maxwell_liquid_flows_at_the_rate_of_its_damper(gripper: Gripper) -> Non
     np.testing.assert_allclose(ours, expected, rtol=1e-6)
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=list(MODELS))
-def test_a_model_turns_its_parameters_into_a_network(model: SampleModel) -> None:
-    samples = np.arange(1.0, 1 + 5 * len(model.parameters)).reshape(5, -1)
-    network = model.network(samples)
-    for name in model.names:
-        element = np.asarray(getattr(network, name)).reshape(5)
-        np.testing.assert_array_equal(element, samples[:, model.names.index(name)])
+SPRING_OR_DAMPER: dict[str, Callable[..., complex]] = {
+    "generalized_maxwell": lambda s, k, k_p, c, c_p: k_p + c_p * s + series(k, c * s),
+    "liquid_drop": lambda s, k, k_p, c: k_p + series(k, c * s),
+    "kelvin_voigt": lambda s, k_p, c_p: k_p + c_p * s,
+    "maxwell": lambda s, k, c: series(k, c * s),
+    "zener_maxwell": lambda s, k, k_p, c: k_p + series(k, c * s),
+    "zener_kelvin": lambda s, k_s, k_v, c_v: series(k_s, k_v + c_v * s),
+    "burgers": lambda s, k_s, c_s, k_v, c_v: series(k_s, c_s * s, k_v + c_v * s),
+}
+
+
+def series(*impedances: complex) -> complex:
+    """Elements behind one another: compliances add."""
+    return 1 / sum(1 / impedance for impedance in impedances)
+
+
+def impedance(network: Network, s: complex) -> complex:
+    """The library's sample, P/Q, at a complex frequency."""
+    p, q = _sample_polynomials(network)
+    return complex(np.polyval(p[0, ::-1], s) / np.polyval(q[0, ::-1], s))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_model_is_the_network_that_its_drawing_shows(name: str) -> None:
+    """Complex moduli over ten decades, from springs and dampers put together by hand."""
+    rng = np.random.default_rng(0)
+    model = MODELS[name]
+    for _ in range(50):
+        values = 10 ** rng.uniform(-3, 3, len(model.parameters))
+        for s in 1j * np.geomspace(1e-5, 1e5, 21):
+            expected = SPRING_OR_DAMPER[name](s, *values)
+            assert impedance(model.network(values), s) == pytest.approx(expected, rel=1e-11)
+
+
+def test_more_branches_add_up() -> None:
+    model = model_named("generalized_maxwell", branches=3)
+    assert model.names == ("k_1", "k_2", "k_3", "k_p", "c_1", "c_2", "c_3", "c_p")
+    values = [1.0, 2.0, 3.0, 0.5, 10.0, 0.1, 700.0, 0.02]
+    for s in 1j * np.geomspace(1e-4, 1e3, 15):
+        branches = sum(series(values[j], values[4 + j] * s) for j in range(3))
+        expected = 0.5 + 0.02 * s + branches
+        assert impedance(model.network(values), s) == pytest.approx(expected, rel=1e-12)
+
+
+def test_both_zener_forms_are_one_solid() -> None:
+    """k_p, k in parallel of the Maxwell form from k_s, k_v in series of the other."""
+    kelvin = MODELS["zener_kelvin"].network([3.0, 2.0, 40.0])
+    maxwell = MODELS["zener_maxwell"].network([9 / 5, 6 / 5, 40 * 9 / 25])
+    for ours, theirs in zip(
+        (kelvin.k, kelvin.k_p, kelvin.c), (maxwell.k, maxwell.k_p, maxwell.c), strict=True
+    ):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-14)
+
+
+def test_burgers_with_a_stiff_kelvin_voigt_element_is_a_maxwell_liquid() -> None:
+    burgers = MODELS["burgers"].network([2.0, 50.0, 1e9, 1.0])
+    maxwell = MODELS["maxwell"].network([2.0, 50.0])
+    for s in 1j * np.geomspace(1e-3, 1e3, 13):
+        assert impedance(burgers, s) == pytest.approx(impedance(maxwell, s), rel=1e-8)
+
+
+def test_fixing_a_parameter_leaves_the_others(gripper: Gripper, steps: TorqueHistory) -> None:
+    model = MODELS["generalized_maxwell"]
+    fixed = with_fixed(model, {"c_p": 1e-3, "k": 35.0})
+    assert fixed.names == ("k_p", "c")
+    ours = response_of(gripper, steps, fixed.network([[12.3, 299.9]]))
+    theirs = response_of(gripper, steps, model.network([35.0, 12.3, 299.9, 1e-3]))
+    np.testing.assert_array_equal(ours, theirs)
+    assert with_fixed(model, {}) is model
 
 
 def test_the_printed_equation_6_runs_away_and_the_corrected_one_relaxes() -> None:

@@ -37,11 +37,12 @@ def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> 
     inertia, damping, stiffness = (getattr(arm, key) for key in ARM_KEYS)
     middle = -damping / (2 * inertia)
     half = np.sqrt(complex(middle**2 - stiffness / inertia))
-    # sinh(half t)/half is even in half, so either root serves, and none is divided by at zero.
-    swing = np.sinc(1j * half * time_s / np.pi) * time_s
-    decay = np.exp(middle * time_s)
-    impulse = (decay * swing).real / inertia
-    cosine = (decay * np.cosh(half * time_s)).real
+    slow = np.exp((middle + half) * time_s)
+    # (1 - e^(-2 h t)) / (2 h t), which is 1 where the roots coincide.
+    z = 2 * half * time_s
+    apart = np.where(z == 0, 1, -np.expm1(-z) / np.where(z == 0, 1, z))
+    impulse = (slow * apart).real * time_s / inertia
+    cosine = 0.5 * (slow + np.exp((middle - half) * time_s)).real
     step = (1 - cosine + middle * inertia * impulse) / stiffness
     return FreeMotion(time_s, step_Nm * step, impulse_Nms * impulse)
 
@@ -62,20 +63,23 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
         If the arm does not ring within the record, or no arm fits.
     """
     start = _first_guess(record, step_Nm)
-    weights = [1 / np.ptp(record.step_rad), 1 / np.ptp(record.impulse_rad)]
+    measured = np.stack((record.step_rad, record.impulse_rad))
 
-    def residuals(logarithms: Array) -> Array:
+    def differences(logarithms: Array) -> Array:
         motion = free_motion(Arm(*np.exp(logarithms)), record.time_s, step_Nm, impulse_Nms)
-        return np.concatenate(
-            (
-                weights[0] * (motion.step_rad - record.step_rad),
-                weights[1] * (motion.impulse_rad - record.impulse_rad),
-            )
-        )
+        return np.stack((motion.step_rad, motion.impulse_rad)) - measured
 
-    found = least_squares(residuals, np.log(start), method="lm")
-    if not found.success or not np.all(np.isfinite(found.x)):
-        raise BiogripError("calibration: no arm fits the records; is the rate high enough?")
+    scale, logarithms = np.ptp(measured, axis=1), np.log(start)
+    # The second time, each record weighs what its own noise allows.
+    for _ in range(2):
+        weights = 1 / scale[:, None]
+        found = least_squares(
+            lambda x, weights=weights: (weights * differences(x)).ravel(), logarithms, method="lm"
+        )
+        if not found.success or not np.all(np.isfinite(found.x)):
+            raise BiogripError("calibration: no arm fits the records; is the rate high enough?")
+        logarithms = found.x
+        scale = np.maximum(differences(logarithms).std(axis=1), 1e-12 * np.ptp(measured, axis=1))
     freedom = max(len(found.fun) - 3, 1)
     variance = np.linalg.inv(found.jac.T @ found.jac) * (2 * found.cost / freedom)
     values = np.exp(found.x)
@@ -86,13 +90,13 @@ def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Stiffness from the step's end, frequency from the ring's spectrum, damping from its fall."""
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step_rad[-tail:])
+    if not stiffness > 0:
+        raise BiogripError("calibration: the arm does not follow the torque step.")
     interval = record.time_s[1] - record.time_s[0]
     spectrum = np.abs(np.fft.rfft(record.impulse_rad))
     peak = int(np.argmax(spectrum[1:])) + 1
     omega = 2 * np.pi * np.fft.rfftfreq(len(record.time_s), interval)[peak]
     early, late = (float(np.std(part)) for part in np.array_split(record.impulse_rad, 8)[:2])
     decay = np.log(max(early / late, 1.01)) / (len(record.time_s) // 8 * interval)
-    if not stiffness > 0:
-        raise BiogripError("calibration: the arm does not follow the torque step.")
     inertia = stiffness / omega**2
     return np.array([inertia, 2 * inertia * decay, stiffness])

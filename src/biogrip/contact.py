@@ -57,7 +57,7 @@ def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) 
         If the sample is out of range, does not fit, or the comb's stroke does
         not reach it.
     """
-    if not SMALLEST_M <= size_m <= LARGEST_M:
+    if not SMALLEST_M * (1 - 1e-9) <= size_m <= LARGEST_M * (1 + 1e-9):
         allowed = f"{1e6 * SMALLEST_M:g} to {1e6 * LARGEST_M:g} um"
         raise BiogripError(f"found a sample of {1e6 * size_m:g} um, allowed are {allowed}.")
     if size_m > jaw_gap_m:

@@ -137,7 +137,7 @@ def test_starts_at_rest_and_ends_at_the_springs(gripper: Gripper, steps: TorqueH
     assert np.all(np.abs(rotation(response, steps, np.array([0.0]))[:, 0]) < 1e-6 * peak)
     # At infinity only the arm's spring and k_p carry the torque.
     expected = 1 / (gripper.left.stiffness_Nm_per_rad + 2 * gripper.lever_m**2 * samples[:, 1])
-    np.testing.assert_allclose(response.static[:, 0], expected, rtol=1e-14)
+    np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
 
 
 def test_identical_branches_make_no_trouble(gripper: Gripper, steps: TorqueHistory) -> None:

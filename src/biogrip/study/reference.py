@@ -83,8 +83,9 @@ def _allowed(leaf: Mapping[str, Any]) -> str:
         count = "" if low is None else f"{low} " if low == high else f"{low} to {high} "
         inner = _resolved(leaf["items"])
         return f"list of {count}{inner.get('type', 'values')} {_allowed_bounds(inner)}".strip()
-    kind = {"string": "text", "object": "block"}.get(leaf["type"], leaf["type"])
-    return f"{kind} {bounds}".strip()
+    words = {"string": "text", "object": "block"}
+    kinds = leaf["type"] if isinstance(leaf["type"], list) else [leaf["type"]]
+    return f"{' or '.join(words.get(kind, kind) for kind in kinds)} {bounds}".strip()
 
 
 def _allowed_bounds(leaf: Mapping[str, Any]) -> str:

@@ -1,0 +1,39 @@
+import math
+
+import pytest
+
+from biogrip.contact import contact
+from biogrip.errors import BiogripError
+from biogrip.gripper import Gripper
+from tests.test_actuator import TABLE_2
+
+
+@pytest.mark.parametrize("size_um", [30, 60, 120])
+def test_the_tips_close_by_what_the_sample_leaves(gripper: Gripper, size_um: float) -> None:
+    found = contact(gripper, 150e-6, TABLE_2, 1e-6 * size_um)
+    before, after = (math.radians(a) for a in (75.0, found.reference_angle_deg))
+    # Tip positions from their coordinates: each goes half of the way.
+    travel = 1.5e-3 * (math.cos(after) - math.cos(before))
+    assert travel == pytest.approx(0.5e-6 * (150 - size_um), rel=1e-10)
+    assert before - after == pytest.approx(found.closing_rad)
+    assert found.torque_Nm == pytest.approx(4.4e-7 * found.closing_rad)
+
+
+def test_largest_sample_costs_ten_milliradian(gripper: Gripper) -> None:
+    assert contact(gripper, 150e-6, TABLE_2, 120e-6).closing_rad == pytest.approx(0.0104, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("size_um", "gap_um", "message"),
+    [
+        (20, 150, "found a sample of 20 um, allowed are 30 to 120 um"),
+        (121, 150, "allowed are 30 to 120 um"),
+        (110, 100, "allowed is at most the jaw gap, 100 um"),
+        (30, 400, r"takes 7.\d+ degrees of each arm, allowed is the comb's stroke, 4.5 degrees"),
+    ],
+)
+def test_what_cannot_be_gripped_is_refused(
+    gripper: Gripper, size_um: float, gap_um: float, message: str
+) -> None:
+    with pytest.raises(BiogripError, match=message):
+        contact(gripper, 1e-6 * gap_um, TABLE_2, 1e-6 * size_um)
