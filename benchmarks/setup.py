@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.identify.genome import Genome, genome_of
 from biogrip.measurement import Noise, add_noise
-from biogrip.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.protocol import TorqueHistory, sample_times
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import MODELS, SampleModel
 from biogrip.study import build
@@ -42,8 +42,7 @@ def problem() -> Problem:
     case = study.cases["endothelial_cell"]
     model = MODELS[case.model.name]
     gripper = build.gripper(case.blocks["gripper"])
-    phases = build.phases(case.blocks["protocol"])
-    steps = torque_history(phases)
+    steps = build.torque({"protocol": case.blocks["protocol"]})
     time_s = sample_times(steps.end_s, case.blocks["measurement"]["rate_Hz"])
     truth = np.array([[case.parameters[name] for name in model.names]])
     clean = rotation(step_response(gripper, model.network(truth)), steps, time_s)[0]

@@ -47,7 +47,7 @@ def in_process(environment: dict[str, str], *arguments: str) -> str:
 
 
 def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
-    """Targets, measurements, identifications and histories, through the command line."""
+    """Targets to error tables, through the command line."""
     config = ROOT / "config" / "config.yaml"
     plan = Plan(load_study(yaml.safe_load(config.read_text()), [config]), folder)
     for case in CASES:
@@ -62,6 +62,10 @@ def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
             [
                 *("identification", "--settings", plan.identification(case), "--seeds", SEEDS),
                 *("--measurements", noisy, "--output", found, "--history", history),
+            ],
+            [
+                *("table", "errors", "--settings", plan.errors(case)),
+                *("--inputs", found, "--output", folder / f"errors_{case}.csv"),
             ],
         ):
             in_process(environment, "-m", "biogrip", *map(str, arguments))

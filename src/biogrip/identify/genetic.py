@@ -121,7 +121,7 @@ def genetic(
     rng
         The only source of randomness.
     """
-    population = _rank(genome.draw(settings.population, rng), misfit, genome)
+    population = _evaluated(genome.draw(settings.population, rng), misfit, genome).ranked()
     evaluations = settings.population
     rows = [_record(population, settings, evaluations)]
     generation = improved = 0
@@ -139,7 +139,7 @@ def genetic(
             _mutate(children, genome, settings, rng)
         evaluations += len(children)
         best = population.ranking[0]
-        population = survivors.merged(_rank(children, misfit, genome))
+        population = survivors.merged(_evaluated(children, misfit, genome))
         if population.ranking[0] < best:
             improved = generation
         rows.append(_record(population, settings, evaluations))
@@ -162,7 +162,7 @@ def genetic(
 
 @dataclass(frozen=True)
 class _Population:
-    """Individuals, best first."""
+    """Individuals with what they are ranked on."""
 
     chromosomes: IntArray
     codes: IntArray
@@ -172,21 +172,24 @@ class _Population:
         return _Population(self.chromosomes[:count], self.codes[:, :count], self.ranking[:count])
 
     def merged(self, other: "_Population") -> "_Population":
-        return _sorted(
+        return _Population(
             np.concatenate((self.chromosomes, other.chromosomes)),
             np.concatenate((self.codes, other.codes), axis=1),
             np.concatenate((self.ranking, other.ranking)),
-        )
+        ).ranked()
+
+    def ranked(self) -> "_Population":
+        """Best first; ties in the order of the chromosomes' codes."""
+        order = np.lexsort((*self.codes[::-1], self.ranking))
+        return _Population(self.chromosomes[order], self.codes[:, order], self.ranking[order])
 
 
-def _rank(chromosomes: IntArray, misfit: Callable[[Array], Array], genome: Genome) -> _Population:
+def _evaluated(
+    chromosomes: IntArray, misfit: Callable[[Array], Array], genome: Genome
+) -> _Population:
+    """Individuals in the order they come in."""
     ranking = misfit(genome.decode(chromosomes)).astype(np.float32)
-    return _sorted(chromosomes, genome.code(chromosomes), ranking)
-
-
-def _sorted(chromosomes: IntArray, codes: IntArray, ranking: np.ndarray) -> _Population:
-    order = np.lexsort((*codes[::-1], ranking))
-    return _Population(chromosomes[order], codes[:, order], ranking[order])
+    return _Population(chromosomes, genome.code(chromosomes), ranking)
 
 
 def _record(

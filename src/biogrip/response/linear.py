@@ -13,6 +13,7 @@ Written like this no coefficient of D is a difference, so none loses digits.
 """
 
 from dataclasses import dataclass
+from itertools import permutations
 from math import factorial
 from typing import Any
 
@@ -245,12 +246,17 @@ def _partial_fractions(
         rates = separate(roots(denominator).real)
     else:
         rates = roots(denominator)
-    distance = rates[:, :, None] - rates[:, None, :]
-    distance += np.eye(rates.shape[1])
-    slope = rates * denominator[:, -1:] * np.prod(distance, axis=2)
-    static = np.array([[n[:, 0] / denominator[:, 0] for n in row] for row in numerators])
-    weights = np.array([[_evaluate(n, rates) / slope for n in row] for row in numerators])
-    return StepResponse(np.moveaxis(static, 2, 0), rates, np.moveaxis(weights, 2, 0))
+    slope = rates * denominator[:, -1:]
+    for i, j in permutations(range(rates.shape[1]), 2):
+        slope[:, i] *= rates[:, i] - rates[:, j]
+    shape = (len(rates), len(numerators), len(numerators[0]))
+    static = np.empty(shape)
+    weights = np.empty((*shape, rates.shape[1]), dtype=rates.dtype)
+    for arm, row in enumerate(numerators):
+        for drive, numerator in enumerate(row):
+            static[:, arm, drive] = numerator[:, 0] / denominator[:, 0]
+            weights[:, arm, drive] = _evaluate(numerator, rates) / slope
+    return StepResponse(static, rates, weights)
 
 
 def _evaluate(coefficients: Array, z: NDArray[Any]) -> NDArray[Any]:

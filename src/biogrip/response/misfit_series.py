@@ -7,9 +7,11 @@ into sums over z_j^n y_n. Those long sums split in two levels, n = B a + b: one
 matrix product with the trace folded to (B, N/B), one weighted sum over rows.
 """
 
+from functools import cache
+
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import LEFT, drives, step_response
@@ -51,6 +53,9 @@ class SeriesMisfit:
         pieces = np.split(rotation_rad, self._starts[1:])
         self._block = max(1, int(np.sqrt(self._counts.max(initial=1))))
         self._folded, self._columns = _fold(pieces, self._block)
+        rows = max(stop - start for start, stop in self._columns)
+        self._within = np.arange(self._block, dtype=float)
+        self._across = self._block * np.arange(rows, dtype=float)
         self._square_sum = float(sum(np.dot(piece, piece) for piece in pieces))
         self._sums = np.array([piece.sum() for piece in pieces])
 
@@ -75,7 +80,9 @@ class SeriesMisfit:
         static, weights = response.static[:, LEFT], response.weights[:, LEFT]
         rates = response.rates * self._interval_s
         projections = self._projections(rates)
-        pair_rates = rates[:, :, None] + rates[:, None, :]
+        # Each pair of modes once; those of two different modes count twice.
+        first, second, times = _pairs(rates.shape[1])
+        pair_rates = rates[:, first] + rates[:, second]
         square = np.full(len(parameters), self._square_sum)
         for phase, count in enumerate(self._counts):
             if count == 0:
@@ -84,8 +91,8 @@ class SeriesMisfit:
             square += constant * (count * constant - 2 * self._sums[phase])
             linear = constant[:, None] * _geometric(rates, count) - projections[:, :, phase]
             square += 2 * np.einsum("nj,nj->n", amplitudes, linear)
-            pairs = _geometric(pair_rates, count)
-            square += np.einsum("ni,nj,nij->n", amplitudes, amplitudes, pairs)
+            products = times * amplitudes[:, first] * amplitudes[:, second]
+            square += np.einsum("np,np->n", products, _geometric(pair_rates, count))
         misfit: Array = np.sqrt(np.maximum(square, 0) / self._samples)
         return misfit
 
@@ -105,9 +112,8 @@ class SeriesMisfit:
     def _projections(self, rates: Array) -> Array:
         """sum_n z_j^n y_n of every mode and phase, shape (n, n_modes, n_phases)."""
         flat = rates.reshape(-1, 1)
-        within = np.exp(flat * np.arange(self._block)) @ self._folded
-        rows = max(stop - start for start, stop in self._columns)
-        across = np.exp(flat * (self._block * np.arange(rows)))
+        within = np.exp(flat * self._within) @ self._folded
+        across = np.exp(flat * self._across)
         sums = [
             np.einsum("mr,mr->m", within[:, start:stop], across[:, : stop - start])
             for start, stop in self._columns
@@ -126,6 +132,13 @@ def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]
         columns.append((start, start + rows))
         start += rows
     return np.ascontiguousarray(np.concatenate(folded, axis=1)), columns
+
+
+@cache
+def _pairs(modes: int) -> tuple[IntArray, IntArray, Array]:
+    """Indices of all pairs of modes, i <= j, and how often each counts in a square."""
+    first, second = np.triu_indices(modes)
+    return first, second, np.where(first == second, 1.0, 2.0)
 
 
 def _geometric(rates: Array, count: float) -> Array:

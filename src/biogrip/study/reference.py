@@ -85,7 +85,7 @@ def _allowed(leaf: Mapping[str, Any]) -> str:
         return f"list of {count}{inner.get('type', 'values')} {_allowed_bounds(inner)}".strip()
     words = {"string": "text", "object": "block"}
     kinds = leaf["type"] if isinstance(leaf["type"], list) else [leaf["type"]]
-    return f"{' or '.join(words.get(kind, kind) for kind in kinds)} {bounds}".strip()
+    return f"{' or '.join(words.get(str(kind), str(kind)) for kind in kinds)} {bounds}".strip()
 
 
 def _allowed_bounds(leaf: Mapping[str, Any]) -> str:
