@@ -28,7 +28,7 @@ BAD = {
     ),
     "unknown model": (
         "cases: {x: {sample: {model: maxwel, k: 1, k_p: 1, c: 1}}}",
-        "Did you mean 'generalized_maxwell'? Allowed: generalized_maxwell, liquid_drop",
+        "found 'maxwel'. Did you mean 'maxwell'? Allowed: generalized_maxwell, liquid_drop",
     ),
     "zero seeds": ("seeds: 0", "seeds: found 0, allowed is at least 1"),
     "ends before it starts": (

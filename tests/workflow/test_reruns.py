@@ -31,7 +31,7 @@ def test_adding_a_case_reruns_no_finished_job_and_changes_no_number(study: Path)
     assert run.status == 0, run.output
     assert (run.jobs("target"), run.jobs("measurement"), run.jobs("identification")) == (1, 2, 2)
     after = tables(study)
-    joint = {"tables/errors", "tables/evidence"}
+    joint = {"tables/errors", "tables/linearisation"}
     assert [
         name
         for name in before

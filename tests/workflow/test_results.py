@@ -12,7 +12,6 @@ from biogrip.gripper import Arm, Gripper
 from biogrip.protocol import held, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import generalized_maxwell
-from biogrip.study.validation import schema
 from tests.workflow.conftest import SMALL, snakemake, tables
 
 COLUMNS = (
@@ -110,18 +109,3 @@ def test_report_shows_every_table_and_figure_with_its_labels(
     for item in ("errors", "fit", "evolution", "convergence", "overview", "evidence"):
         assert f'"{item}"' in page, item
     assert "Share at noise floor" in page or "data:text/html" in page
-
-
-def test_schema_describes_every_key() -> None:
-    """Every leaf of the schema says what it means."""
-
-    def leaves(node: dict[str, object]) -> list[dict[str, object]]:
-        inner = [v for v in node.values() if isinstance(v, dict)]
-        found = [leaf for value in inner for leaf in leaves(value)]
-        is_leaf = node.get("type") in ("number", "integer") or "enum" in node
-        return [node, *found] if is_leaf else found
-
-    items = {"minimum": -18}, {"minimum": 1, "maximum": 9}
-    for leaf in leaves(schema()):
-        inside_a_list = any(all(leaf.get(k) == v for k, v in item.items()) for item in items)
-        assert "description" in leaf or inside_a_list or set(leaf) == {"type"}, leaf

@@ -135,7 +135,7 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
             yield (*path, missing), "is missing and has no default."
         case "propertyNames" | "pattern":
             if path[-1:] == ("title",):
-                text = "allowed are 1 to 60 letters, digits, spaces and . , : ; ( ) + / ' - _."
+                text = "allowed are 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _."
                 yield path, f"found {_shown(found)}, {text}"
             else:
                 text = "a letter, then up to 63 letters, digits, '_' or '-' (it names files)."
