@@ -29,3 +29,10 @@ def test_uniform_noise_is_bounded() -> None:
     bound = 0.2 * np.sqrt(3)
     noise = noise_of("uniform", "peak")
     assert 0.999 * bound < np.abs(noise).max() <= bound * (1 + 1e-12)
+
+
+def test_the_peak_is_the_largest_rotation_either_way() -> None:
+    """Unequal torques can turn an arm the other way."""
+    rng = np.random.default_rng(0)
+    noisy = add_noise(-CLEAN, Noise("gaussian", 0.1, "peak"), rng)
+    assert rms(noisy + CLEAN) == pytest.approx(0.2, rel=6e-3)

@@ -164,3 +164,75 @@ def test_about_four_runs_in_ten_find_the_basin_of_table_5(
     assert np.all(np.abs(k_p / 12.3 - 1) < 0.05)
     assert np.all(np.abs((c + c_p) / 299.9 - 1) < 0.15)
     assert np.median(np.abs(k / 35 - 1)) < 0.2
+
+
+def test_ties_are_broken_by_the_chromosome_alone() -> None:
+    """With every misfit the same, the lowest codes survive, whatever order they came in."""
+
+    def flat(parameters: Array) -> Array:
+        return np.ones(len(parameters))
+
+    settings = replace(PAPER, min_generations=3, max_generations=3)
+    answer = genetic(flat, GENOME, settings, np.random.default_rng(0))
+    drawn = GENOME.draw(500, np.random.default_rng(0))
+    lowest = drawn[np.argmin(GENOME.code(drawn)[0])]
+    np.testing.assert_array_equal(
+        answer.history.best_parameters[0], GENOME.decode(lowest[None, :])[0]
+    )
+
+
+def test_median_is_the_middle_survivor() -> None:
+    history = run().history
+    first = np.sort(bowl(GENOME.decode(GENOME.draw(500, np.random.default_rng(0)))))
+    assert history.median_misfit[0] == pytest.approx(first[125], rel=1e-6)
+
+
+def test_pairs_are_drawn_afresh() -> None:
+    parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
+    partners = []
+    for seed in range(2):
+        children = _cross(parents, PAPER, np.random.default_rng(seed))
+        partners.append(dict(zip(children[:, 0], children[:, -1], strict=True)))
+    same = sum(partners[0][parent] == partners[1][parent] for parent in range(250))
+    # Chance makes one in 249 the same: 1 expected.
+    assert same < 8
+    assert any(partner != parent + 1 for parent, partner in partners[0].items())
+
+
+def test_shorter_chromosomes_are_cut_inside() -> None:
+    """Nine genes: both parents give at least one, and every cut occurs."""
+    parents = np.repeat(np.arange(250)[:, None], 9, axis=1)
+    children = _cross(parents, PAPER, np.random.default_rng(9))
+    assert set(np.sum(children == children[:, :1], axis=1)) == set(range(1, 9))
+
+
+def test_mutation_reaches_every_value_and_as_many_genes_as_it_says() -> None:
+    children = np.tile(GENOME.low, (20_000, 1))
+    settings = replace(PAPER, mutation_probability=1.0, mutated_genes=3)
+    _mutate(children, GENOME, settings, np.random.default_rng(10))
+    assert np.array_equal(children.max(axis=0), GENOME.high)
+    assert np.sum(children != GENOME.low, axis=1).max() == 3
+
+
+def test_mutation_starts_with_the_generation_it_says() -> None:
+    """With one survivor pair of equals, only mutation makes anything new: in generation 2 here."""
+    seen = []
+
+    def spying(parameters: Array) -> Array:
+        seen.append(len(np.unique(parameters, axis=0)))
+        return bowl(parameters)
+
+    narrow = GeneRange((0, 0), (5, 5))
+    wide = GeneRange((0, 5), (5, 5))
+    genome = genome_of(MODEL, {"k": wide, "k_p": narrow, "c": narrow, "c_p": narrow})
+
+    class Single(type(genome)):  # type: ignore[misc]
+        def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
+            return np.tile(self.low, (count, 1))
+
+    settings = replace(
+        PAPER, mutation_start=2, mutation_probability=1.0, mutated_genes=5, max_generations=2
+    )
+    genetic(spying, Single(genome.low, genome.high), settings, np.random.default_rng(0))
+    assert seen[:2] == [1, 1]
+    assert seen[2] > 1

@@ -1,6 +1,5 @@
 from typing import Any
 
-from biogrip.sample import MODELS, MOST_BRANCHES
 from biogrip.study.validation import OVERRIDABLE, schema
 
 
@@ -29,12 +28,6 @@ def test_every_block_refuses_unknown_keys() -> None:
     assert [n for n, b in with_keys.items() if b.get("additionalProperties") is not False] == [
         "sample"
     ]
-
-
-def test_schema_and_library_know_the_same_models() -> None:
-    sample = schema()["$defs"]["sample"]["properties"]
-    assert sample["model"]["enum"] == list(MODELS)
-    assert sample["branches"]["maximum"] == MOST_BRANCHES
 
 
 def test_a_case_may_override_what_the_library_says() -> None:

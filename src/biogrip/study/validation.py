@@ -14,6 +14,7 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from biogrip.errors import BiogripError, nearest
+from biogrip.sample import MODELS, MOST_BRANCHES
 from biogrip.study.meaning import Problem, meaning_problems
 from biogrip.study.source import ConfigFiles, KeyPath
 
@@ -39,9 +40,12 @@ _Validator = extend(
 
 @cache
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a study."""
+    """Return the JSON Schema of a study, with the sample models that there are."""
     text = resources.files("biogrip.study").joinpath("schema.yaml").read_text(encoding="utf-8")
     loaded: dict[str, Any] = yaml.safe_load(text)
+    sample = loaded["$defs"]["sample"]["properties"]
+    sample["model"]["enum"] = list(MODELS)
+    sample["branches"]["maximum"] = MOST_BRANCHES
     return loaded
 
 
