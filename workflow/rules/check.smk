@@ -45,4 +45,5 @@ rule publish:
     shell:
         f"{RUN_AFRESH}; "
         "mkdir -p {params.published:q}; rm -rf {params.published:q}/*; "
-        'cp -r "$scratch/results/tables" "$scratch/results/figures" {params.published:q}'
+        'cp -r "$scratch/results/tables" "$scratch/results/figures" {params.published:q}; '
+        "rm {params.published:q}/tables/*.html"

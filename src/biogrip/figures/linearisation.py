@@ -61,7 +61,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:
             axes.set_ylabel("torque / protocol's torque")
-        panel(axes, "bcd"[index], case["title"][:21])
+        panel(axes, "bcd"[index], case["title"], most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
 
@@ -79,4 +79,4 @@ def _traces(axes: Any, settings: dict[str, Any], case: dict[str, Any]) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel("closing rotation (mrad)")
     axes.legend()
-    panel(axes, "a", f"{case['title'][:21]}, {_SHOWN_FACTOR:g} x torque")
+    panel(axes, "a", f"{case['title']}, {_SHOWN_FACTOR:g} x torque")

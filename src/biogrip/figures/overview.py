@@ -24,7 +24,7 @@ from biogrip.study import build
 
 _WORST = 1e3
 _MOST_CASES = 3
-_TITLE_LETTERS = 21
+_TITLE_LETTERS = 19
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
@@ -136,7 +136,7 @@ def _scatter(
     else:
         axes.set_ylabel("identified / target")
     axes.set_xticks(range(len(ticks)), ticks)
-    panel(axes, "bcd"[index], case["title"][:_TITLE_LETTERS])
+    panel(axes, "bcd"[index], case["title"], most_letters=_TITLE_LETTERS)
 
 
 def _quantities(

@@ -62,6 +62,7 @@ def save(drawn: Figure, output: Path) -> None:
         drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 
 
-def panel(axes: Axes, letter: str, title: str = "") -> None:
-    """Label a panel."""
-    axes.set_title(rf"$\bf{{{letter}}}$  {title}")
+def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
+    """Label a panel; a title too long for it is cut."""
+    short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
+    axes.set_title(rf"$\bf{{{letter}}}$  {short}", fontsize=7.5)

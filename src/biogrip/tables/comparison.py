@@ -28,11 +28,11 @@ def compare(published: Path, now: Path) -> str:
         If a table is missing on either side or any cell differs; the message
         shows case, parameter, column and both values.
     """
-    names = {path.name for path in published.glob("*.*")}
+    names = _tables(published)
     if not names:
         raise BiogripError(f"{published}: holds no tables to compare with.")
     problems = [f"{name}: published, but not regenerated" for name in _missing(names, now)]
-    regenerated = {path.name for path in now.glob("*.*")}
+    regenerated = _tables(now)
     problems += [
         f"{name}: regenerated, but not published" for name in _missing(regenerated, published)
     ]
@@ -46,6 +46,11 @@ def compare(published: Path, now: Path) -> str:
     if not problems and not differences:
         return f"{len(names)} files of tables agree with {published}, byte for byte."
     raise BiogripError(_report(published, problems, differences))
+
+
+def _tables(folder: Path) -> set[str]:
+    """Names of the tables to compare: HTML is for the report alone."""
+    return {path.name for path in folder.glob("*.*") if path.suffix in (".csv", ".md", ".tex")}
 
 
 def _missing(names: set[str], folder: Path) -> list[str]:
