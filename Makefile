@@ -43,7 +43,8 @@ docs: $(READY)
 
 clean:
 	rm -rf .venv .snakemake results/targets results/measurements results/identifications \
-	  results/histories results/tables results/figures results/logs report.html
+	  results/histories results/calibrations results/linearisation.csv results/tables \
+	  results/figures results/logs report.html
 
 $(READY): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv

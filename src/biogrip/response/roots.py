@@ -66,6 +66,7 @@ def roots(coefficients: Array) -> ComplexArray:
     z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
     off_diagonal = ~np.eye(degree, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
+        settled = False
         for _ in range(_SWEEPS):
             newton = _newton_step(coefficients, z)
             distance = z[:, :, None] - z[:, None, :]
@@ -73,8 +74,10 @@ def roots(coefficients: Array) -> ComplexArray:
             step = newton / (1 - newton * repulsion)
             step = np.where(np.isfinite(step), step, 0)
             z = z - step
-            if np.all(np.abs(step) <= 4e-16 * np.abs(z)):
+            if settled:
                 break
+            # The error is cubed in a sweep, so one more takes it below rounding.
+            settled = bool(np.all(np.abs(step) <= 1e-8 * np.abs(z)))
     return separate(z)
 
 
