@@ -25,12 +25,10 @@ class CalibratedArm:
     uncertainty: Arm
 
 
-def calibration_yaml(gripper: Gripper, left: CalibratedArm, right: CalibratedArm) -> str:
-    """Write the calibrated gripper as a config file that can be laid over a study."""
+def calibration_yaml(left: CalibratedArm, right: CalibratedArm) -> str:
+    """Write the calibrated arms as a config file that can be laid over a study."""
     arms = {"left": left, "right": right}
     block = {
-        "arm_length_m": gripper.arm_length_m,
-        "reference_angle_deg": gripper.reference_angle_deg,
         **{name: _rounded(arm.arm, 7) for name, arm in arms.items()},
         "uncertainty": {name: _rounded(arm.uncertainty, 2) for name, arm in arms.items()},
     }

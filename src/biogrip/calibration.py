@@ -10,6 +10,8 @@ from biogrip.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.errors import BiogripError
 from biogrip.gripper import Arm
 
+_FEWEST_SAMPLES = 64
+
 
 @dataclass(frozen=True)
 class FreeMotion:
@@ -88,6 +90,9 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
 
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Stiffness from the step's end, frequency from the ring's spectrum, damping from its fall."""
+    if len(record.time_s) < _FEWEST_SAMPLES:
+        found = f"found {len(record.time_s)} samples"
+        raise BiogripError(f"calibration: {found}, allowed are {_FEWEST_SAMPLES} or more.")
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step_rad[-tail:])
     if not stiffness > 0:

@@ -67,6 +67,11 @@ def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) 
         )
     closing = float(rotation_of_tip(neutral, np.array(0.5 * (jaw_gap_m - size_m))))
     stroke = math.radians(comb.stroke_deg)
+    if not math.isfinite(closing):
+        raise BiogripError(
+            f"a sample of {1e6 * size_m:g} um is out of the arms' reach; allowed is a larger "
+            "sample, a smaller jaw gap or longer arms."
+        )
     if not closing <= stroke:
         raise BiogripError(
             f"a sample of {1e6 * size_m:g} um takes {math.degrees(closing):.3g} degrees of each "

@@ -105,6 +105,26 @@ BAD = {
     "genetic_algorithm: {survivors: 500}": r"survivors: found 500, allowed is less than population",
     "search_range: {k: {exponent: [3, -3]}}": r"found \[3, -3\], allowed is \[lowest, highest\]",
     "reconstructed: [gripper.lenght]": r"found 'gripper.lenght', allowed is a key of this study",
+    f"cases: {{x: {{{DROP}, assumed_gripper: {{left: 5}}}}}}": r"x.assumed_gripper.left: found 5, "
+    r"allowed is a block of keys",
+    f"cases: {{x: {{{DROP}, assumed_gripper: {{jaw_gap_m: 5}}}}}}": r"jaw_gap_m: unknown key",
+    f"cases: {{x: {{{DROP}, assumed_gripper: measured}}}}": r"allowed is 'calibrated' or keys",
+    f"cases: {{x: {{{DROP}, assumed_gripper: calibrated, calibration: {{rate_Hz: 1000.0}}}}}}": r""
+    r"calibration.rate_Hz: found 1000.0, allowed is at least ten times the arms' natural frequency",
+    f"cases: {{x: {{{DROP}, assumed_gripper: calibrated, calibration: {{duration_s: 1e-5}}}}}}": r""
+    r"calibration.duration_s: found 1e-05, allowed is from five periods",
+    f"cases: {{x: {{{DROP}, fixed: {{k: 1, c: 1, k_p: 1}}}}}}": r"fixed: leaves nothing to",
+    f"cases: {{x: {{{DROP}, fixed: {{q: 1}}}}}}": r"x.fixed.q: is no parameter of the sample",
+    f"cases: {{x: {{{DROP[:-1]}, size_m: 20e-6}}}}}}": r"size_m: found 2e-05, allowed is at least",
+    f"cases: {{off: {{{DROP}}}}}": r"cases\[False\]: is no text: YAML reads on, off, yes, no",
+    "protocol: {phases: [{duration_s: 5, torque_Nm: 1e-9, to_voltage_V: 3}]}": r"to_voltage_V: does"
+    r" "
+    r"not go with torque_Nm",
+    "protocol: {phases: [{duration_s: 5, torque_Nm: 1e-9, amplitude_Nm: 1e-10}]}": r"has one of "
+    r"amplitude_Nm and frequency_Hz; allowed are both or neither",
+    "protocol: {phases: [{duration_s: 5}]}": r"found neither, allowed is one of torque_Nm and volt",
+    "models: {target: cubic}": r"models.target: found 'cubic'. Allowed: linear, nonlinear",
+    "measurement: {times_s: [1, 3, 2, 4, 5, 6]}": r"times_s\[2\]: found 2, allowed is later than 3",
     "cases: null": r"cases: found nothing, allowed is a block of keys",
 }
 

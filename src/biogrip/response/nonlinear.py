@@ -142,7 +142,7 @@ def correction(
     symmetric = is_symmetric(gripper, torque)
     arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
     response = step_response(
-        gripper, network, symmetric=torque.symmetric, inertia=False, both_arms=not symmetric
+        gripper, network, symmetric=symmetric, inertia=False, both_arms=not symmetric
     )
     edges = mesh(torque, accuracy)
     modes = _Modes(response, np.diff(edges))
@@ -167,7 +167,7 @@ def correction(
         u, u_rate = b_0 * (linear + extra), b_0 * (linear_rate + extra_rate)
         load = b_0 * _load(gripper, arms, tau, u, u_rate)
         previous = extra
-        extra, extra_rate = modes.respond(_as_drives(load, torque.symmetric))
+        extra, extra_rate = modes.respond(_as_drives(load))
         change = np.abs(extra - previous).max(axis=(1, 2, 3))
         converged = change <= accuracy.tolerance * peak
         if np.all(converged | ~np.isfinite(change)):
@@ -226,7 +226,7 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
     return load
 
 
-def _as_drives(load: Array, symmetric_torque: bool) -> Array:
+def _as_drives(load: Array) -> Array:
     """Loads of the arms as drives, shape (n, n_drives, n_elements, STAGES)."""
     if load.shape[1] == 1:
         return load

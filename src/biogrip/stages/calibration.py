@@ -48,4 +48,4 @@ def run(settings: dict[str, Any], output: Path, traces: Path) -> None:
         pq.write_table(
             pa.table({key: np.asarray(value) for key, value in columns.items()}), scratch
         )
-    write_text(output, calibration_yaml(gripper, found["left"], found["right"]))
+    write_text(output, calibration_yaml(found["left"], found["right"]))

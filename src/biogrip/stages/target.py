@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from biogrip.errors import BiogripError
 from biogrip.protocol import torque_at
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
@@ -19,9 +20,15 @@ def run(settings: dict[str, Any], output: Path) -> None:
     ----------
     settings
         ``gripper``, ``protocol`` (and ``actuator``, if that is in volts),
-        ``sampling``, ``model``, ``branches``, ``parameters``, ``nonlinear``.
+        ``sampling``, ``model``, ``branches``, ``parameters``, ``nonlinear``,
+        ``stroke_rad``.
     output
         The target, CSV.
+
+    Raises
+    ------
+    BiogripError
+        If the arms turn further than the comb drives can.
     """
     gripper, torque = build.gripper(settings["gripper"]), build.torque(settings)
     model = build.sample_model(settings)
@@ -33,4 +40,10 @@ def run(settings: dict[str, Any], output: Path) -> None:
     else:
         response = step_response(gripper, network, symmetric=torque.symmetric)
         simulated = rotation(response, torque, time_s)
+    largest = float(np.max(np.abs(simulated)))
+    if largest > settings["stroke_rad"]:
+        raise BiogripError(
+            f"the protocol turns the arms by {1e3 * largest:.4g} mrad, allowed is what the comb "
+            f"drive's stroke leaves, {1e3 * settings['stroke_rad']:.4g} mrad."
+        )
     write_target(output, time_s, torque_at(torque, time_s), simulated[0])

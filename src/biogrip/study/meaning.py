@@ -12,6 +12,7 @@ from biogrip.study.source import KeyPath
 Problem = tuple[KeyPath, str]
 
 _MOST_SAMPLES = 10_000_000
+_MOST_PERIODS = 10_000
 _DRIVING = (
     *("torque_Nm", "to_torque_Nm", "torque_right_Nm"),
     *("voltage_V", "to_voltage_V", "voltage_right_V"),
@@ -43,6 +44,8 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
             yield from _fixed_problems((*path, "fixed"), case)
             yield from _cut_problems((*path, "genetic_algorithm"), case)
             yield from _sampling_problems(path, case)
+            if case.get("assumed_gripper") == "calibrated":
+                yield from _calibration_problems((*path, "calibration"), case)
             yield from _gripper_problems(path, case, config["actuator"])
     for index, key in enumerate(config["reconstructed"]):
         if not _exists(config, key):
@@ -103,6 +106,11 @@ def _phase_problems(path: KeyPath, phases: list[Mapping[str, Any]]) -> Iterator[
                 yield (*here, key), f"does not go with {by}."
         if (swing in phase) != ("frequency_Hz" in phase):
             yield here, f"has one of {swing} and frequency_Hz; allowed are both or neither."
+        if right in phase and ramp in phase:
+            yield (*here, right), "does not go with a ramp; allowed is a held torque."
+        if phase.get("frequency_Hz", 0) * phase["duration_s"] > _MOST_PERIODS:
+            text = f"found {phase['frequency_Hz']}, allowed are at most {_MOST_PERIODS} periods"
+            yield (*here, "frequency_Hz"), f"{text} in a phase."
         if swing in phase and ramp in phase:
             yield here, "has a ramp and a sinusoid; allowed is one of them in a phase."
         if phase.get(swing, 0) > min(phase[by], phase.get(right, phase[by])):
@@ -127,14 +135,34 @@ def _gripper_problems(
             yield (*path, "sample", "size_m"), str(error)
 
 
+def _calibration_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    """A free arm must be seen ringing: sampled fast enough, for long enough."""
+    block, gripper = case["calibration"], build.gripper(case["gripper"])
+    frequency = max(arm.natural_frequency_Hz for arm in (gripper.left, gripper.right))
+    if block["rate_Hz"] < 10 * frequency:
+        text = f"found {block['rate_Hz']}, allowed is at least ten times the arms' natural"
+        yield (*path, "rate_Hz"), f"{text} frequency, {10 * frequency:.4g} Hz."
+    if not 5 / frequency <= block["duration_s"] <= _MOST_SAMPLES / block["rate_Hz"]:
+        text = f"found {block['duration_s']}, allowed is from five periods of the arms' ring, "
+        most = _MOST_SAMPLES / block["rate_Hz"]
+        yield (*path, "duration_s"), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
+
+
 def _assumed_problems(
     path: KeyPath, assumed: Mapping[str, Any], true: Mapping[str, Any]
 ) -> Iterator[Problem]:
+    allowed = [key for key in true if key not in ("jaw_gap_m", "uncertainty")]
     for key, value in assumed.items():
-        if key not in true:
-            yield (*path, key), f"unknown key.{nearest(key, true)} Allowed here: {', '.join(true)}."
-        elif isinstance(true[key], Mapping) and isinstance(value, Mapping):
+        if key not in allowed:
+            hint = nearest(key, allowed)
+            yield (*path, key), f"unknown key.{hint} Allowed here: {', '.join(allowed)}."
+        elif isinstance(true[key], Mapping) != isinstance(value, Mapping):
+            wanted = "a block of keys" if isinstance(true[key], Mapping) else "a number"
+            yield (*path, key), f"found {value!r}, allowed is {wanted}."
+        elif isinstance(value, Mapping):
             yield from _assumed_problems((*path, key), value, true[key])
+        elif key == "reference_angle_deg" and not 10 <= value <= 90:
+            yield (*path, key), f"found {value}, allowed is at least 10 and at most 90 deg."
         elif not isinstance(value, int | float) or isinstance(value, bool) or value <= 0:
             yield (*path, key), f"found {value!r}, allowed is a number greater than 0."
 
@@ -156,7 +184,7 @@ def _cut_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
     genes = 3 * (len(_model(case).names) - len(case.get("fixed", {})))
     first, last = settings["first_cut"], settings["last_cut"]
     last = last if last > 0 else genes + last
-    if not 1 <= first <= last:
+    if genes and not 1 <= first <= last:
         text = f"found {first}, allowed is 1 to last_cut, which is {last} of {genes} genes here."
         yield (*path, "first_cut"), text
 

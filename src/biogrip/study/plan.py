@@ -1,6 +1,7 @@
 """What the workflow makes of a study: settings of each job, and names of files."""
 
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,6 +51,7 @@ class Plan:
             nonlinear=c.blocks["models"]["target"] == "nonlinear",
             sampling={key: measurement[key]},
             parameters=c.parameters,
+            stroke_rad=self._stroke_rad(c),
         )
 
     def measurement(self, case: str) -> str:
@@ -200,6 +202,14 @@ class Plan:
             "left": block["left"],
             "right": block["right"],
         }
+
+    def _stroke_rad(self, case: Case) -> float:
+        """What the comb drive's stroke leaves for gripping, after closing onto the sample."""
+        actuator = self.study.config["actuator"]
+        stroke = math.radians(actuator["stroke_deg"])
+        if case.size_m is None:
+            return stroke
+        return stroke - build.contact_of(case.blocks["gripper"], actuator, case.size_m).closing_rad
 
     def _assumed_gripper(self, case: Case) -> dict[str, Any]:
         """The gripper that the identification believes in; a calibration replaces its arms."""
