@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.results import read_history
 from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
-from biogrip.identify.identifications import at_noise_floor, read_identifications
+from biogrip.identify.identifications import at_noise_floor, lowest_misfit, read_identifications
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
@@ -27,7 +27,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else noise * 0 + found["misfit_rad"].min()
-    best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
+    best = int(lowest_misfit(found)["seed"])
     reached = at_noise_floor(found, settings["noise_floor_tolerance"])
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from biogrip.figures.results import read_history
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
-from biogrip.identify.identifications import read_identifications
+from biogrip.identify.identifications import lowest_misfit, read_identifications
 from biogrip.study import build
 
 
@@ -23,7 +23,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     """
     found = read_identifications(inputs[0])
     history = read_history(inputs[1])
-    best = int(found.loc[found["misfit_rad"].idxmin(), "seed"])
+    best = int(lowest_misfit(found)["seed"])
     parameters = build.sample_model(settings).parameters
     identified = settings["published"].get("identified", {})
     drawn = figure(PAGE_IN, 3.9)

@@ -10,9 +10,8 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.errors import BiogripError
-from biogrip.identify.identifications import read_identifications
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nonlinear import nonlinear_rotation
+from biogrip.identify.identifications import lowest_misfit, read_identifications
+from biogrip.response.simulation import simulated_rotation
 from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.traces import read_measurements
@@ -52,7 +51,7 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
         calibration, YAML, if it has one.
     """
     found = read_identifications(identifications)
-    best = found.loc[found["misfit_rad"].idxmin()]
+    best = lowest_misfit(found)
     seed = int(best["seed"])
     recorded = read_measurements(_holding(seed, others), [seed])
     model = build.sample_model(settings)
@@ -61,11 +60,9 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     for path in others:
         if path.suffix == ".yaml":
             gripper = read_calibrated_arms(path, gripper)
-    if settings["nonlinear"]:
-        fitted = nonlinear_rotation(gripper, network, torque, recorded.time_s)
-    else:
-        response = step_response(gripper, network, symmetric=torque.symmetric)
-        fitted = rotation(response, torque, recorded.time_s)
+    fitted = simulated_rotation(
+        gripper, network, torque, recorded.time_s, nonlinear=settings["nonlinear"]
+    )
     return Fit(
         seed,
         int(best["generations"]),

@@ -28,6 +28,11 @@ def read_identifications(path: Path) -> pd.DataFrame:
     return frame
 
 
+def lowest_misfit(found: pd.DataFrame) -> pd.Series:
+    """Return the identification of lowest misfit, the first of them if there are several."""
+    return found.loc[found["misfit_rad"].idxmin()]
+
+
 def at_noise_floor(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
     """Whether each seed's misfit reaches the RMS of the noise in its trace, (n_seeds,).
 

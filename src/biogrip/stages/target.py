@@ -7,8 +7,7 @@ import numpy as np
 
 from biogrip.errors import BiogripError
 from biogrip.protocol import torque_at
-from biogrip.response.linear import rotation, step_response
-from biogrip.response.nonlinear import nonlinear_rotation
+from biogrip.response.simulation import simulated_rotation
 from biogrip.study import build
 from biogrip.traces import write_target
 
@@ -35,11 +34,9 @@ def run(settings: dict[str, Any], output: Path) -> None:
     parameters = [settings["parameters"][name] for name in model.names]
     network = model.network(np.array([parameters]))
     time_s = build.sampling(settings["sampling"], torque.end_s)
-    if settings["nonlinear"]:
-        simulated = nonlinear_rotation(gripper, network, torque, time_s)
-    else:
-        response = step_response(gripper, network, symmetric=torque.symmetric)
-        simulated = rotation(response, torque, time_s)
+    simulated = simulated_rotation(
+        gripper, network, torque, time_s, nonlinear=settings["nonlinear"]
+    )
     largest = float(np.max(np.abs(simulated)))
     if largest > settings["stroke_rad"]:
         raise BiogripError(

@@ -135,14 +135,7 @@ class Plan:
             name: {**self._truth(case), "gripper": self._gripper(case)}
             for name, case in self.study.cases.items()
         }
-        return json.dumps(
-            {"cases": cases, "protocol": self.study.config["protocol"], **self._comb()}
-        )
-
-    def _comb(self) -> dict[str, Any]:
-        """The comb drive, if the study's protocol is given in volts."""
-        uses = build.uses_voltage(self.study.config["protocol"])
-        return {"actuator": self.study.config["actuator"]} if uses else {}
+        return json.dumps({"cases": cases, **self._driving(self.study.config["protocol"])})
 
     def evidence(self) -> str:
         """Settings of the tables that hold the paper against itself."""
@@ -180,14 +173,16 @@ class Plan:
 
     def _simulation(self, case: Case) -> dict[str, Any]:
         """What every simulation of a case needs, but for the gripper."""
-        settings = {
+        return {
             "model": case.model.name,
             "branches": case.branches,
-            "protocol": case.blocks["protocol"],
+            **self._driving(case.blocks["protocol"]),
         }
-        if build.uses_voltage(case.blocks["protocol"]):
-            settings["actuator"] = self.study.config["actuator"]
-        return settings
+
+    def _driving(self, protocol: dict[str, Any]) -> dict[str, Any]:
+        """A protocol, and the comb drive if it is given in volts."""
+        actuator = {"actuator": self.study.config["actuator"]}
+        return {"protocol": protocol} | (actuator if build.uses_voltage(protocol) else {})
 
     def _gripper(self, case: Case) -> dict[str, Any]:
         """The true gripper where its jaws touch the sample."""

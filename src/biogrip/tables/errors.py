@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identify.identifications import at_noise_floor, read_identifications
+from biogrip.identify.identifications import at_noise_floor, lowest_misfit, read_identifications
 from biogrip.study import build
 from biogrip.tables.layout import Column, Table
 
@@ -42,7 +42,7 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     """
     found = read_identifications(inputs[0])
     model = build.sample_model(settings)
-    best = int(found["misfit_rad"].to_numpy().argmin())
+    best = found.index.get_loc(lowest_misfit(found).name)
     share = float(np.mean(at_noise_floor(found, settings["noise_floor_tolerance"])))
     published = settings["published"]
     rows = []
