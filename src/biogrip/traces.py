@@ -53,7 +53,7 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
     Raises
     ------
     BiogripError
-        If the file is missing or is no target.
+        If the file is missing, is no target, or holds what is no finite number.
     """
     try:
         with path.open() as stream:
@@ -63,9 +63,17 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
                     f"{path}, line 1: found the columns {', '.join(header)}; "
                     f"a target has {', '.join(TARGET_COLUMNS)}."
                 )
-            time_s, torque, rotation = np.loadtxt(stream, delimiter=",", ndmin=2).T
+            values = np.loadtxt(stream, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
+    if values.shape[1] != len(TARGET_COLUMNS):
+        raise BiogripError(f"{path}: found {values.shape[1]} columns in the rows, allowed are 3.")
+    for row, column in np.argwhere(~np.isfinite(values))[:1]:
+        raise BiogripError(
+            f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "
+            "allowed is a finite number."
+        )
+    time_s, torque, rotation = values.T
     return time_s, torque, rotation
 
 
