@@ -1,0 +1,223 @@
+"""Whether a recorded trace can be what a gripper did under a protocol.
+
+What is tested is not the trace itself but the part of it that follows the
+torque. A linear viscoelastic sample makes the gripper a sum of lags with real
+relaxation times: it follows the torque at once (a spring), its integral (a
+damper), or something between. The trace is therefore fitted, in the least
+squares, with the protocol's torque lagged by three times T: next to nothing,
+a tenth of the protocol, and ten protocols. Three lags are too few to identify
+a sample but enough to find its response under noise; a peak of the samples
+themselves would be one of the noise, and means over blocks would lose a
+sinusoid.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.gripper import Gripper
+from biogrip.protocol import TorqueHistory, torque_at
+from biogrip.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
+from biogrip.response.linear import StepResponse, rotation
+
+LARGEST_SHARE = 1.5
+"""Most that a trace may turn, in free rotations.
+
+No sample makes the arm turn further than without it. The excess is for the
+uncertainty of the fit and of the gripper's stiffness.
+"""
+
+SMALLEST_SHARE = 2e-3
+"""Least that a trace must turn, in free rotations.
+
+The paper's stiffest sample, the endothelial cell, turns by 8e-3. Less than
+`LARGEST_SHARE` / `SMALLEST_SHARE` = 750 lies between both limits, so no trace
+can pass both as it is and in a unit a thousand times larger or smaller.
+"""
+
+SHORTEST_SHARE = 0.02
+"""Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""
+
+FALSE_ALARM = 1e-3
+"""Share of traces of mere noise that are taken for a response."""
+
+_TIME_SLACK = 1e-9
+_LAG_SHARES = (1e-6, 0.1, 10.0)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The part of a trace that follows the torque.
+
+    Parameters
+    ----------
+    response_rad : (n_samples,)
+        That part.
+    unknowns
+        How many independent lagged torques it is made of.
+    """
+
+    response_rad: Array
+    unknowns: int
+
+    @property
+    def turn_rad(self) -> float:
+        """Largest rotation."""
+        return float(np.abs(self.response_rad).max())
+
+
+def check_recording(
+    recording: Recording,
+    gripper: Gripper,
+    torque: TorqueHistory,
+    path: Path,
+    columns: Columns,
+    noise_rad: float | None = None,
+) -> None:
+    """Refuse a trace that the gripper cannot have shown under the protocol.
+
+    In this order: times outside the protocol, or covering next to none of it;
+    no response to the torque; a rotation larger than the free gripper's, or so
+    small that the sample would have to be hundreds of times stiffer than the
+    gripper's hinges, whose rotation then tells nothing but the instrument's
+    errors. A trace in a wrong unit ends up in one of them.
+
+    Parameters
+    ----------
+    recording
+        The trace, as read from `path`.
+    gripper, torque
+        What it was recorded with.
+    path, columns
+        Where it was read, for messages.
+    noise_rad
+        Standard deviation of the noise, if known; else it is taken from what
+        the fit leaves over.
+
+    Raises
+    ------
+    BiogripError
+        With file, line, column, what was found and allowed, and the unit in
+        which the trace would do.
+    """
+    _check_times(recording, torque.end_s, path, columns)
+    fit = _fit(recording, torque)
+    if not _responds(recording.rotation_rad, fit, noise_rad):
+        trace = recording.rotation_rad
+        raise BiogripError(
+            f"{_extent(recording, path)}, column '{columns.rotation}': found no response to the "
+            f"torque, but {trace.mean():.3g} rad throughout, give or take {trace.std():.2g} rad; "
+            "allowed is a rotation from zero that follows the torque and stands out of the noise."
+        )
+    _check_turn(recording, fit.turn_rad, free_rotation(gripper, torque), path, columns)
+
+
+def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
+    """Largest static rotation of the left arm in rad that any sample allows.
+
+    Statically phi_2 = (1 - x) tau_2/k_2 + x (tau_2 - tau_4)/(k_2 + k_4), where x
+    goes from 0 without a sample to 1 with a rigid one.
+    """
+    edges = np.append(torque.time_s, torque.end_s)
+    times = np.linspace(edges[:-1], edges[1:], 1000, endpoint=False).ravel()
+    left, right = (torque_at(torque, times, arm) for arm in ("left", "right"))
+    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
+    alone, pushed = np.abs(left) / k_2, np.abs(left - right) / (k_2 + k_4)
+    return float(max(alone.max(), pushed.max()))
+
+
+def _check_times(recording: Recording, end_s: float, path: Path, columns: Columns) -> None:
+    time_s, slack = recording.time_s, _TIME_SLACK * end_s
+    first, last = time_s[0], time_s[-1]
+    shortest = SHORTEST_SHARE * end_s
+
+    def fits(factor: float) -> bool:
+        inside = factor * first >= -slack and factor * last <= end_s + slack
+        return bool(inside and factor * (last - first) >= shortest)
+
+    if fits(1.0):
+        return
+    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
+    hint = _other_units(unit, TIME_UNITS, fits)
+    for sample in np.flatnonzero((time_s < -slack) | (time_s > end_s + slack))[:1]:
+        raise BiogripError(
+            f"{place(path, recording.lines[sample], columns.time)}: found {time_s[sample]:.12g} s, "
+            f"allowed is the protocol's time, 0 to {end_s:g} s.{hint}"
+        )
+    raise BiogripError(
+        f"{_extent(recording, path)}, column '{columns.time}': found only {first:g} to {last:g} s "
+        f"of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of it.{hint}"
+    )
+
+
+def _fit(recording: Recording, torque: TorqueHistory) -> _Fit:
+    """Fit the lagged torques of the left arm and, if that differs, of the difference of both."""
+    drives = 1 if torque.symmetric else 2
+    rates = -1 / (torque.end_s * np.tile(_LAG_SHARES, drives))
+    static = np.repeat(np.eye(drives), len(_LAG_SHARES), axis=0)[:, None, :]
+    lags = StepResponse(static, rates[:, None], -static[..., None])
+    lagged = rotation(lags, torque, recording.time_s).T
+    weights, _, rank, _ = np.linalg.lstsq(lagged, recording.rotation_rad)
+    return _Fit(lagged @ weights, int(rank))
+
+
+def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
+    """Whether the trace follows the torque.
+
+    It does not if it is constant, or better described by a constant; nor if
+    white noise about zero, where the arm stands until the torque sets in,
+    would give as large a fit: an F test, with known noise a chi-squared one.
+    """
+    explained = np.sum(fit.response_rad**2)
+    left_over = np.sum((trace - fit.response_rad) ** 2)
+    if np.ptp(trace) == 0 or np.sum((trace - trace.mean()) ** 2) <= left_over:
+        return False
+    if noise_rad is not None:
+        return bool(explained > noise_rad**2 * chi2.isf(FALSE_ALARM, fit.unknowns))
+    freedom = len(trace) - fit.unknowns
+    ratio = f.isf(FALSE_ALARM, fit.unknowns, freedom)
+    return bool(explained / fit.unknowns > ratio * left_over / freedom)
+
+
+def _check_turn(
+    recording: Recording, turn: float, free: float, path: Path, columns: Columns
+) -> None:
+    smallest, largest = SMALLEST_SHARE * free, LARGEST_SHARE * free
+
+    def fits(factor: float) -> bool:
+        return smallest <= factor * turn <= largest
+
+    if fits(1.0):
+        return
+    limit = (
+        f"at most {largest:.3g} rad: without any sample the arm turns by"
+        if turn > largest
+        else f"at least {smallest:.3g} rad, where without any sample the arm turns by"
+    )
+    unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
+    sample = np.argmax(np.abs(recording.rotation_rad))
+    raise BiogripError(
+        f"{place(path, recording.lines[sample], columns.rotation)}: found "
+        f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
+        f"the largest with the noise smoothed out; allowed is {limit} {free:.3g} rad."
+        + _other_units(unit, ROTATION_UNITS, fits)
+    )
+
+
+def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], bool]) -> str:
+    """Say by which factors the numbers would fit, and which units these would be."""
+    factors = {size / units[unit]: f" (is it in {name}?)" for name, size in units.items()}
+    named = [factor for factor in factors if fits(factor)]
+    unnamed = [factor for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]
+    which = " or ".join(f"{factor:.4g} times{factors[factor]}" for factor in named)
+    which = which or " or ".join(f"{factor:g} times" for factor in unnamed)
+    return f" It would fit if it were {which}." if which else ""
+
+
+def _extent(recording: Recording, path: Path) -> str:
+    return f"{path}, lines {recording.lines[0]} to {recording.lines[-1]}"

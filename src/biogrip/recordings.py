@@ -1,0 +1,398 @@
+"""Recorded traces: the user's own CSV, read with its gaps, its units and its line numbers."""
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from io import StringIO
+from itertools import islice
+from pathlib import Path
+from unicodedata import normalize
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.errors import BiogripError, nearest
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
+
+FEWEST_SAMPLES = 10
+MOST_ROWS = 10_000_000
+
+_SEPARATORS = (",", ";", "\t")
+_GAPS = ("", "-", "na", "n/a", "nan")
+_ROWS_AT_ONCE = 100_000
+_UNIT_AT_END = re.compile(r"(?:_(\w+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Where in a file a trace stands.
+
+    Parameters
+    ----------
+    time, rotation
+        Names of the columns.
+    time_unit, rotation_unit
+        A key of `TIME_UNITS` and one of `ROTATION_UNITS`, or None if the name ends with it.
+    """
+
+    time: str
+    rotation: str
+    time_unit: str | None = None
+    rotation_unit: str | None = None
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A recorded trace.
+
+    Parameters
+    ----------
+    time_s, rotation_rad : (n_samples,)
+        Strictly increasing instants, and the left arm's closing rotation.
+    lines : (n_samples,)
+        Line of the file that each sample stands on, from 1.
+    without_number
+        How many rows were left out as gaps.
+    """
+
+    time_s: Array
+    rotation_rad: Array
+    lines: IntArray
+    without_number: int
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """What the header tells.
+
+    Parameters
+    ----------
+    separator
+        Between cells.
+    width
+        How many columns there are.
+    indices
+        Where the time and the rotation stand, by name and in this order.
+    """
+
+    separator: str
+    width: int
+    indices: dict[str, int]
+
+
+def read_recording(path: Path, columns: Columns) -> Recording:
+    """Read a recorded trace.
+
+    The file is UTF-8 text, with or without byte order mark, its lines ended in
+    any of the usual ways. Lines that start with ``#`` and empty lines are
+    ignored wherever they stand. The first other line is the header; from it
+    follows the separator: comma, semicolon or tab. After the last two, numbers
+    may have a decimal comma. Names and cells may be quoted and padded with
+    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+
+    The unit is that of `columns`, else the end of the column's name, as in
+    ``rotation_urad``, ``phi (mrad)`` or ``time [s]``; it is never guessed. The
+    micro sign may stand for the u.
+
+    A cell that is empty or holds ``nan``, ``NA``, ``N/A`` (capital or not) or
+    ``-`` is a gap. Its row is left out and counted; nothing is interpolated.
+
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Which of its columns to read.
+
+    Returns
+    -------
+    Recording
+        In s and rad.
+
+    Raises
+    ------
+    BiogripError
+        If the file cannot be read as text; lacks a column or has it twice; its
+        unit is unknown or contradicts the name; a row has fewer or more cells
+        than the header, or other text than a finite number or a gap; the time
+        does not increase from sample to sample; there are fewer than
+        `FEWEST_SAMPLES` samples or more than `MOST_ROWS` rows.
+    """
+    try:
+        if not path.is_file():
+            found = "a directory" if path.is_dir() else "no file"
+            raise BiogripError(f"{path}: found {found}, allowed is a text file with a trace.")
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            sizes, values, lines = _read(path, stream, columns)
+    except UnicodeDecodeError as error:
+        raise BiogripError(_not_text(path)) from error
+    except OSError as error:
+        raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
+    gaps = np.any(np.isnan(values), axis=1)
+    kept, kept_lines = values[~gaps], lines[~gaps]
+    without_number = len(lines) - len(kept_lines)
+    _check_count(path, columns, len(kept), without_number)
+    _check_order(path, columns, kept[:, 0], kept_lines)
+    time_s, rotation_rad = kept[:, 0] * sizes[0], kept[:, 1] * sizes[1]
+    return Recording(time_s, rotation_rad, kept_lines, without_number)
+
+
+def place(path: Path, line: int | None = None, column: str | None = None) -> str:
+    """Return where in a file something was found, as messages begin."""
+    where = str(path)
+    if line is not None:
+        where += f", line {line}"
+    if column is not None:
+        where += f", column '{column}'"
+    return where
+
+
+def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, float]) -> str:
+    """Return the unit of a column, a key of `allowed`.
+
+    Parameters
+    ----------
+    path
+        The file, for messages.
+    column
+        Name of the column; it may end with the unit.
+    given
+        The unit as the user states it, or None.
+    allowed
+        The units there are, `TIME_UNITS` or `ROTATION_UNITS`.
+
+    Raises
+    ------
+    BiogripError
+        If neither tells an allowed unit, or they contradict each other.
+    """
+    choices = ", ".join(allowed)
+    named = _unit_at_end(column, allowed)
+    stated = named if given is None else _plain(given)
+    if stated is None:
+        raise BiogripError(
+            f"{place(path, column=column)}: found no unit, neither stated nor at the end of the "
+            f"name, allowed are {choices}."
+        )
+    if stated not in allowed:
+        raise BiogripError(
+            f"{place(path, column=column)}: found the unit '{given}', allowed are {choices}."
+            + nearest(given, allowed)
+        )
+    if named not in (None, stated):
+        raise BiogripError(
+            f"{place(path, column=column)}: found the unit '{given}' where the name says "
+            f"'{named}', allowed is one unit."
+        )
+    return stated
+
+
+def _unit_at_end(column: str, allowed: Mapping[str, float]) -> str | None:
+    ending = _UNIT_AT_END.search(_plain(column))
+    if ending is None:
+        return None
+    # A name may well end with something else, as in rotation_left or phi (2).
+    unit = next(group for group in ending.groups() if group is not None)
+    return next((u for u in allowed if u in (unit.strip(), unit.rpartition("_")[2])), None)
+
+
+def _plain(name: str) -> str:
+    """Return the name without padding, either micro sign written as u."""
+    return normalize("NFKC", name).strip().replace("\u03bc", "u")
+
+
+def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, Array, IntArray]:
+    """Read what the file's units are in s and rad, (2,), the numbers, (n_rows, 2), and their lines.
+
+    The numbers are time and rotation in the file's units, NaN where there is a gap.
+    """
+    at: list[int] = []
+    lines = _significant(path, stream, at)
+    layout = _layout(path, next(lines, None), at, columns)
+    time_unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
+    rotation_unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
+    sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
+    values, row_lines = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
+    for rows in _blocks(path, lines, layout.separator, at):
+        _check_rows(path, at, rows, layout)
+        cells = {name: [row[i] for row in rows] for name, i in layout.indices.items()}
+        numbers = [_numbers(path, at, name, cells[name], layout.separator) for name in cells]
+        values.append(np.stack(numbers, axis=1))
+        row_lines.append(np.array(at))
+    return sizes, np.concatenate(values), np.concatenate(row_lines)
+
+
+def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[str]:
+    """Yield the lines that are neither empty nor comments, and note in `at` where they stand."""
+    for number, line in enumerate(stream, 1):
+        if "\0" in line:
+            raise BiogripError(f"{place(path, number)}: found binary data, allowed is text.")
+        if line.strip(" \r\n") and not line.lstrip(" ").startswith("#"):
+            at.append(number)
+            yield line
+
+
+def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
+    if header is None:
+        raise BiogripError(f"{path}: found no header, allowed is a line with column names.")
+    wanted = (columns.time, columns.rotation)
+    separator, names = _header(header, wanted)
+    time, rotation = (_index(path, at[0], names, column) for column in wanted)
+    if time == rotation:
+        raise BiogripError(
+            f"{place(path, at[0], columns.time)}: found time and rotation in one column, "
+            "allowed are two."
+        )
+    return _Layout(separator, len(names), {columns.time: time, columns.rotation: rotation})
+
+
+def _header(line: str, wanted: tuple[str, str]) -> tuple[str, list[str]]:
+    """Separator and names: those under which most wanted columns, then most columns, show up."""
+    readings = {}
+    for separator in _SEPARATORS:
+        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        readings[separator] = [cell.strip() for cell in cells]
+    plain = {_plain(name) for name in wanted}
+
+    def merit(separator: str) -> tuple[int, int]:
+        names = readings[separator]
+        return len(plain & set(map(_plain, names))), len(names)
+
+    separator = max(readings, key=merit)
+    return separator, readings[separator]
+
+
+def _index(path: Path, line: int, names: list[str], column: str) -> int:
+    indices = [i for i, name in enumerate(names) if _plain(name) == _plain(column)]
+    if not indices:
+        raise BiogripError(
+            f"{place(path, line, column)}: found no such column, allowed are {', '.join(names)}."
+            + nearest(column, names)
+        )
+    if len(indices) > 1:
+        raise BiogripError(
+            f"{place(path, line, column)}: found {len(indices)} columns of this name, "
+            "allowed is one."
+        )
+    return indices[0]
+
+
+def _blocks(
+    path: Path, lines: Iterator[str], separator: str, at: list[int]
+) -> Iterator[list[list[str]]]:
+    """Yield the rows block by block, `at` then telling the lines of the block."""
+    reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
+    count = 0
+    while True:
+        at.clear()
+        rows = list(islice(_one_per_line(path, reader, at), _ROWS_AT_ONCE))
+        count += len(rows)
+        if count > MOST_ROWS:
+            raise BiogripError(f"{path}: found over {MOST_ROWS} rows, allowed are {MOST_ROWS}.")
+        if not rows:
+            return
+        yield rows
+
+
+def _one_per_line(path: Path, reader: Iterator[list[str]], at: list[int]) -> Iterator[list[str]]:
+    """Yield rows, refusing those over several lines.
+
+    A quote that is never closed would swallow the rest of the file unnoticed,
+    were a cell allowed to span lines.
+    """
+    try:
+        for count, row in enumerate(reader, 1):
+            if len(at) != count:
+                raise BiogripError(
+                    f"{place(path, at[count - 1])}: found a quote without its end, "
+                    "allowed are quoted cells that end on their line."
+                )
+            yield row
+    except csv.Error as error:
+        raise BiogripError(f"{place(path, at[-1])}: cannot be read as a row: {error}.") from error
+
+
+def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layout) -> None:
+    """Refuse rows too short for the wanted columns, and those with more than the header names."""
+    for line, row in zip(at, rows, strict=True):
+        if len(row) == layout.width:
+            continue
+        for column, index in layout.indices.items():
+            if len(row) <= index:
+                raise BiogripError(
+                    f"{place(path, line, column)}: found only {len(row)} cells in the row, "
+                    f"allowed are the header's {layout.width}."
+                )
+        # A separator at the end of every row is common, and harmless.
+        if any(cell.strip() for cell in row[layout.width :]):
+            raise BiogripError(
+                f"{place(path, line)}: found {len(row)} cells in the row, allowed are the "
+                f"header's {layout.width}. A decimal comma needs semicolons or tabs as separators."
+            )
+
+
+def _numbers(path: Path, at: list[int], column: str, cells: list[str], separator: str) -> Array:
+    """Cells as numbers, (n_rows,), NaN for gaps."""
+    texts = cells if separator == "," else [cell.replace(",", ".") for cell in cells]
+    try:
+        # Python reads 1_000 as a number; a table that holds it is damaged.
+        values = np.array(texts, dtype=float) if not any("_" in t for t in texts) else None
+    except ValueError:
+        values = None
+    if values is None:
+        values = np.array([_number_or_inf(text) for text in texts])
+    for row in np.flatnonzero(np.isinf(values))[:1]:
+        raise BiogripError(
+            f"{place(path, at[row], column)}: found '{_shortened(cells[row])}', allowed is a "
+            "finite number, or nan, NA, N/A, - or nothing where there is none."
+        )
+    return values
+
+
+def _number_or_inf(text: str) -> float:
+    """Return the number, NaN for a gap, and inf for what is neither."""
+    word = text.strip().lower()
+    if word in _GAPS:
+        return np.nan
+    try:
+        return np.inf if "_" in word else float(word)
+    except ValueError:
+        return np.inf
+
+
+def _shortened(cell: str) -> str:
+    return cell if len(cell) <= 40 else cell[:40] + "..."
+
+
+def _check_count(path: Path, columns: Columns, found: int, without_number: int) -> None:
+    if found < FEWEST_SAMPLES:
+        gaps = f" ({without_number} rows hold NaN)" if without_number else ""
+        raise BiogripError(
+            f"{path}: found {found} rows with a number in both {columns.time} and "
+            f"{columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
+        )
+
+
+def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> None:
+    for row in np.flatnonzero(np.diff(time) <= 0)[:1]:
+        before, now = time[row : row + 2]
+        found = f"{now:.15g} repeated" if now == before else f"{now:.15g} after {before:.15g}"
+        raise BiogripError(
+            f"{place(path, lines[row + 1], columns.time)}: found {found} "
+            f"(line {lines[row]}), allowed are times that increase."
+        )
+
+
+def _not_text(path: Path) -> str:
+    """Say where a file stops being text; the decoder only knows the place within its buffer."""
+    content = path.read_bytes()
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = StringIO(content[: error.start].decode("utf-8") + "?", newline="")
+        line, byte = sum(1 for _ in before), content[error.start]
+        return f"{place(path, line)}: found the byte 0x{byte:02x}, allowed is text in UTF-8."
+    return f"{path}: changed while it was read."

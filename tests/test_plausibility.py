@@ -1,0 +1,358 @@
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.gripper import Gripper
+from biogrip.measurement import Noise, add_noise
+from biogrip.plausibility import LARGEST_SHARE, SMALLEST_SHARE, check_recording, free_rotation
+from biogrip.protocol import (
+    Harmonic,
+    Load,
+    Phase,
+    TorqueHistory,
+    held,
+    sample_times,
+    torque_history,
+)
+from biogrip.recordings import Columns, Recording
+from biogrip.response.linear import rotation, step_response
+from biogrip.sample import generalized_maxwell
+
+FILE = Path("trace.csv")
+SI = Columns("time_s", "rotation_rad")
+SAMPLES = {
+    "endothelial_cell": (35.0, 12.3, 299.9, 1.0e-3),
+    "liquid_drop_1": (9.5, 1.0e-4, 10.0, 1.0e-4),
+    "liquid_drop_2": (1.0, 1.0e-4, 10.0, 1.0e-3),
+}
+FREE_RAD = 1.6e-9 / 4.4e-7
+PROTOCOLS = {
+    "one hold": (held(60.0, 1e-9),),
+    "ramp": (Phase(100.0, Load(0.0, 2e-11), Load(0.0, 2e-11)), held(50.0, 0.0)),
+    "sinusoid": (
+        Phase(
+            200.0,
+            Load(0.0, harmonics=(Harmonic(1e-9, 2.0, 0.3),)),
+            Load(0.0, harmonics=(Harmonic(1e-9, 2.0, 0.3),)),
+        ),
+    ),
+    "one arm": (held(100.0, 1.6e-9, 0.0), held(100.0, 0.0)),
+    "the other arm": (held(100.0, 0.0, 1.6e-9), held(100.0, 0.0)),
+    "opening": (held(100.0, -1.6e-9), held(100.0, 0.0)),
+}
+
+
+def recorded(time_s: Array, rotation_rad: Array) -> Recording:
+    """A trace as from a file with a header, on lines 2, 3, ..."""
+    return Recording(time_s, rotation_rad, np.arange(len(time_s)) + 2, 0)
+
+
+def trace(
+    gripper: Gripper, torque: TorqueHistory, sample: tuple[float, ...], time_s: Array
+) -> Array:
+    response = step_response(gripper, generalized_maxwell(sample), symmetric=torque.symmetric)
+    values: Array = rotation(response, torque, time_s)[0]
+    return values
+
+
+def refusal(
+    recording: Recording, gripper: Gripper, torque: TorqueHistory, columns: Columns = SI
+) -> str:
+    with pytest.raises(BiogripError) as error:
+        check_recording(recording, gripper, torque, FILE, columns)
+    return str(error.value)
+
+
+@pytest.mark.parametrize("sample", SAMPLES)
+@pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
+@pytest.mark.parametrize("level", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("kind", ["gaussian", "uniform"])
+def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
+    gripper: Gripper, steps: TorqueHistory, sample: str, rate_Hz: float, level: float, kind: str
+) -> None:
+    times = sample_times(400.0, rate_Hz)
+    clean = trace(gripper, steps, SAMPLES[sample], times)
+    for seed in range(10):
+        noisy = add_noise(clean, Noise(kind, level, "peak"), np.random.default_rng([7, seed]))
+        check_recording(recorded(times, noisy), gripper, steps, FILE, SI)
+        noise_rad = level * clean.max()
+        check_recording(recorded(times, noisy), gripper, steps, FILE, SI, noise_rad)
+        large = refusal(recorded(times, 1e3 * noisy), gripper, steps)
+        line = np.argmax(np.abs(noisy)) + 2
+        assert large.startswith(f"trace.csv, line {line}, column 'rotation_rad': found ")
+        assert "allowed is at most 0.00545 rad" in large
+        assert "It would fit if it were 0.001 times (is it in mrad?)" in large
+        small = refusal(recorded(times, 1e-3 * noisy), gripper, steps)
+        assert small.startswith(f"trace.csv, line {line}, column 'rotation_rad': found ")
+        assert "allowed is at least 7.27e-06 rad" in small
+        assert small.endswith("It would fit if it were 1000 times.")
+
+
+def test_the_largest_sample_and_the_smoothed_one_are_told(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = 1e3 * trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    values[57] = 7.25
+    said = refusal(recorded(times, values), gripper, steps)
+    assert said.startswith("trace.csv, line 59, column 'rotation_rad': found 7.25 rad as the lar")
+    smoothed = re.search(r"and ([\d.]+) rad as the largest with the noise smoothed out", said)
+    assert smoothed is not None
+    assert float(smoothed[1]) == pytest.approx(3.2, rel=0.15)
+    assert "without any sample the arm turns by 0.00364 rad" in said
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "hint"),
+    [
+        ("rad", 1e6, "1e-06 times (is it in urad?)."),
+        ("rad", 1e3, "0.001 times (is it in mrad?)."),
+        ("rad", 180 / np.pi, "0.001 times (is it in mrad?) or 0.01745 times (is it in deg?)."),
+        ("mrad", 1e-3, "1000 times (is it in rad?) or 17.45 times (is it in deg?)."),
+        ("mrad", 1e3, "0.001 times (is it in urad?)."),
+        ("urad", 1e-6, "1e+06 times (is it in rad?) or 1.745e+04 times (is it in deg?)."),
+        ("urad", 1e3, "0.001 times."),
+    ],
+)
+def test_the_unit_that_would_fit_is_named(
+    gripper: Gripper, steps: TorqueHistory, unit: str, factor: float, hint: str
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = factor * trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    for columns in (Columns("time_s", f"phi_{unit}"), Columns("time_s", "phi", None, unit)):
+        said = refusal(recorded(times, values), gripper, steps, columns)
+        assert f"column '{columns.rotation}'" in said
+        assert said.endswith(f"It would fit if it were {hint}")
+
+
+def test_a_rotation_that_no_unit_explains_has_no_hint(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = 1e12 * trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    assert refusal(recorded(times, values), gripper, steps).endswith("turns by 0.00364 rad.")
+
+
+def test_no_trace_passes_in_two_units_a_thousand_apart(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    assert LARGEST_SHARE / SMALLEST_SHARE < 1000
+    rng = np.random.default_rng(1)
+    times = sample_times(400.0, 1.0)
+    for _ in range(200):
+        values = trace(gripper, steps, tuple(10 ** rng.uniform(-4, 5, 4)), times)
+        values += rng.uniform(0, 0.3) * values.max() * rng.standard_normal(len(times))
+        passed = 0
+        for power in (-9, -6, -3, 0, 3, 6, 9):
+            try:
+                check_recording(recorded(times, 10.0**power * values), gripper, steps, FILE, SI)
+            except BiogripError:
+                continue
+            passed += 1
+        assert passed <= 1
+
+
+@pytest.mark.parametrize("rate_Hz", [10.0, 0.1])
+@pytest.mark.parametrize("sigma_rad", [1e-9, 1e-4, 1.0])
+def test_mere_noise_is_refused(
+    gripper: Gripper, steps: TorqueHistory, rate_Hz: float, sigma_rad: float
+) -> None:
+    times = sample_times(400.0, rate_Hz)
+    for seed in range(50):
+        values = sigma_rad * np.random.default_rng([5, seed]).standard_normal(len(times))
+        said = refusal(recorded(times, values), gripper, steps)
+        assert said.startswith(
+            f"trace.csv, lines 2 to {len(times) + 1}, column 'rotation_rad': found no response to"
+        )
+        for noise_rad in (sigma_rad, 2 * sigma_rad):
+            with pytest.raises(BiogripError, match="found no response"):
+                check_recording(recorded(times, values), gripper, steps, FILE, SI, noise_rad)
+
+
+def test_noise_is_taken_for_a_response_as_rarely_as_said(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 0.1)
+    rng = np.random.default_rng(6)
+    taken = 0
+    for _ in range(5000):
+        try:
+            check_recording(
+                recorded(times, 1e-3 * rng.standard_normal(len(times))), gripper, steps, FILE, SI
+            )
+        except BiogripError:
+            continue
+        taken += 1
+    assert taken <= 12
+
+
+@pytest.mark.parametrize("value", [0.0, 1e-3, -1e-3, 5.0])
+@pytest.mark.parametrize("sigma", [0.0, 0.03])
+def test_a_constant_is_no_response(
+    gripper: Gripper, steps: TorqueHistory, value: float, sigma: float
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = value * (1 + sigma * np.random.default_rng(1).standard_normal(len(times)))
+    said = refusal(recorded(times, values), gripper, steps)
+    assert "found no response to the torque" in said
+    found = re.search(r"but (\S+) rad throughout, give or take (\S+) rad", said)
+    assert found is not None
+    assert float(found[1]) == pytest.approx(value, rel=0.01)
+    assert float(found[2]) == pytest.approx(abs(sigma * value), rel=0.15)
+
+
+def test_a_constant_is_no_response_to_a_constant_torque_either(gripper: Gripper) -> None:
+    times = sample_times(60.0, 1.0)[1:]
+    torque = torque_history((held(60.0, 1e-9),))
+    for value in np.random.default_rng(2).uniform(1e-4, 2e-3, 20):
+        said = refusal(recorded(times, np.full(len(times), value)), gripper, torque)
+        assert "found no response to the torque" in said
+
+
+def test_a_response_below_the_known_noise_is_refused(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 0.1)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    check_recording(recorded(times, values), gripper, steps, FILE, SI, 0.0)
+    check_recording(recorded(times, values), gripper, steps, FILE, SI, 0.4 * values.max())
+    with pytest.raises(BiogripError, match="found no response"):
+        check_recording(recorded(times, values), gripper, steps, FILE, SI, 3 * values.max())
+
+
+@pytest.mark.parametrize("phases", PROTOCOLS.values(), ids=PROTOCOLS)
+@pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
+def test_other_protocols_and_samples_pass(
+    request: pytest.FixtureRequest, phases: tuple[Phase, ...], arms: str
+) -> None:
+    gripper: Gripper = request.getfixturevalue(arms)
+    torque = torque_history(phases)
+    rng = np.random.default_rng(8)
+    times = np.sort(rng.uniform(0, torque.end_s, 3000))
+    for _ in range(20):
+        sample = tuple(10 ** rng.uniform((-2, -2, -2, -3), (1, 0, 2, 0)))
+        values = trace(gripper, torque, sample, times)
+        values += 0.1 * np.abs(values).max() * rng.standard_normal(len(times))
+        check_recording(recorded(times, values), gripper, torque, FILE, SI)
+        with pytest.raises(BiogripError, match="column 'rotation_rad': found"):
+            check_recording(recorded(times, 1e3 * values), gripper, torque, FILE, SI)
+
+
+def test_a_trace_with_a_gap_and_ten_samples_passes(gripper: Gripper, steps: TorqueHistory) -> None:
+    times = np.array([0.0, 5.0, 40.0, 90.0, 190.0, 350.0, 360.0, 370.0, 390.0, 400.0])
+    values = trace(gripper, steps, SAMPLES["liquid_drop_2"], times)
+    check_recording(recorded(times, values), gripper, steps, FILE, SI)
+
+
+@pytest.mark.parametrize(
+    ("phases", "largest_rad"),
+    [
+        ((held(200.0, 1.6e-9), held(200.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
+        ((held(1.0, -1.6e-9), held(1.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
+        ((held(1.0, 0.0), held(1e-9, 1.6e-9), held(1.0, 0.0)), 1.6e-9 / 4.4e-7),
+        ((Phase(7.0, Load(0.0, 2e-10), Load(0.0, 2e-10)),), 1.4e-9 / 4.4e-7),
+        ((held(1.0, 0.0, 1.6e-9),), 1.6e-9 / 9.9e-7),
+        ((held(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
+        (PROTOCOLS["sinusoid"], 1e-9 / 4.4e-7),
+    ],
+)
+def test_the_free_rotation_is_that_of_the_left_arm(
+    unequal_gripper: Gripper, phases: tuple[Phase, ...], largest_rad: float
+) -> None:
+    found = free_rotation(unequal_gripper, torque_history(phases))
+    assert found == pytest.approx(largest_rad, rel=2e-3)
+
+
+def test_no_sample_lets_the_arm_turn_further_than_the_free_rotation(
+    unequal_gripper: Gripper,
+) -> None:
+    rng = np.random.default_rng(9)
+    for phases in ((held(1e4, 1e-9, 2e-9),), (held(1e4, 2e-9, -1e-9),), (held(1e4, 0.0, 1e-9),)):
+        torque = torque_history(phases)
+        largest = free_rotation(unequal_gripper, torque)
+        turned = [
+            abs(
+                trace(unequal_gripper, torque, tuple(10 ** rng.uniform(-4, 4, 4)), np.array([1e4]))[
+                    0
+                ]
+            )
+            for _ in range(100)
+        ]
+        assert 0.9 * largest < max(turned) <= largest * (1 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "found", "hint"),
+    [
+        ("s", 1e3, "line 3, column 'time_s': found 1000 s", "0.001 times (is it in ms?)."),
+        (
+            "ms",
+            1e-3,
+            "lines 2 to 402, column 'time_ms': found only 0 to 0.4 s",
+            "1000 times (is it in s?).",
+        ),
+        (
+            "s",
+            1 / 60,
+            "lines 2 to 402, column 'time_s': found only 0 to 6.66667 s",
+            "60 times (is it in min?).",
+        ),
+        (
+            "s",
+            1 / 3600,
+            "lines 2 to 402, column 'time_s': found only 0 to 0.111111 s",
+            "3600 times (is it in h?).",
+        ),
+        ("min", 60, "line 9, column 'time_min': found 420 s", "0.01667 times (is it in s?)."),
+        ("ms", 1e3, "line 3, column 'time_ms': found 1000 s", "0.001 times."),
+    ],
+)
+def test_times_in_a_wrong_unit_are_refused(
+    gripper: Gripper, steps: TorqueHistory, unit: str, factor: float, found: str, hint: str
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    columns = Columns(f"time_{unit}", "rotation_rad")
+    said = refusal(recorded(factor * times, values), gripper, steps, columns)
+    assert said.startswith(f"trace.csv, {found}")
+    assert "400 s" in said
+    assert said.endswith(f"It would fit if it were {hint}")
+
+
+@pytest.mark.parametrize(
+    ("shift_s", "found"),
+    [
+        (-1.0, "line 2, column 'time_s': found -1 s"),
+        (1.5, "line 401, column 'time_s': found 400.5 s"),
+    ],
+)
+def test_times_outside_the_protocol_are_refused(
+    gripper: Gripper, steps: TorqueHistory, shift_s: float, found: str
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    said = refusal(recorded(times + shift_s, values), gripper, steps)
+    assert said == f"trace.csv, {found}, allowed is the protocol's time, 0 to 400 s."
+
+
+def test_the_last_digit_of_a_time_does_not_matter(gripper: Gripper, steps: TorqueHistory) -> None:
+    times = sample_times(400.0, 1.0)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    check_recording(recorded(times * (1 + 1e-12), values), gripper, steps, FILE, SI)
+    check_recording(recorded(times - 1e-10, values), gripper, steps, FILE, SI)
+
+
+def test_a_share_of_the_protocol_is_enough(gripper: Gripper, steps: TorqueHistory) -> None:
+    times = sample_times(20.0, 10.0)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    check_recording(recorded(times, values), gripper, steps, FILE, SI)
+    check_recording(recorded(times[:81], values[:81]), gripper, steps, FILE, SI)
+    said = refusal(recorded(times[:80], values[:80]), gripper, steps)
+    assert said == (
+        "trace.csv, lines 2 to 81, column 'time_s': found only 0 to 7.9 s of the protocol's 400 s, "
+        "allowed are at least 8 s of it."
+    )
