@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.setup import problem, seconds
 from biogrip.arrays import Array
-from biogrip.identify.genetic import genetic
+from biogrip.identify.genetic import evolve
 from biogrip.response.misfit import misfit_of
 from biogrip.study import build
 
@@ -30,10 +30,10 @@ def _row(name: str, *, nonlinear: bool) -> dict[str, str]:
 
     def identify() -> None:
         spent.append(0.0)
-        genetic(timed, p.genome, settings, np.random.default_rng(0))
+        evolve(timed, p.genome, settings, np.random.default_rng(0))
 
     whole = seconds(identify)
-    answer = genetic(misfit, p.genome, settings, np.random.default_rng(0))
+    answer = evolve(misfit, p.genome, settings, np.random.default_rng(0)).identification
     return {
         "model": name,
         "time (ms)": f"{1e3 * whole:.3g}",

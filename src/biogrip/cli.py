@@ -56,7 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     _seeds(identification)
     _inputs(identification, "measurements")
     _inputs(identification, "calibrated", many=True)
-    _outputs(identification, "output", "history")
+    _outputs(identification, "output", "history", "timing")
 
     collection = _stage(stages, "collection", _collection, "join the batches of a case")
     _inputs(collection, "batches", "histories", many=True)
@@ -161,6 +161,7 @@ def _identification(options: argparse.Namespace) -> None:
         options.measurements,
         options.output,
         options.history,
+        options.timing,
         *options.calibrated,
     )
 

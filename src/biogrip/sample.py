@@ -6,7 +6,9 @@ shortening delta of the sample as
 
     F(s) = [k_p + c_p s + sum_j k_j c_j s / (k_j + c_j s)] delta(s)
 
-A model is one entry of `MODELS`; genome, tables and figures follow from it.
+A model is one entry of `MODELS`; genome, tables and figures follow from it. Its
+network is made by arithmetic alone, so that parameters with a small imaginary
+part carry derivatives through it (`biogrip.response.sensitivity`).
 """
 
 from collections.abc import Callable, Mapping
@@ -127,7 +129,7 @@ MOST_BRANCHES = 8
 
 
 def _columns(parameters: ArrayLike) -> Array:
-    return np.atleast_2d(np.asarray(parameters, dtype=float)).T
+    return np.atleast_2d(np.asarray(parameters) * 1.0).T
 
 
 def generalized_maxwell(parameters: ArrayLike) -> Network:
@@ -235,11 +237,11 @@ def burgers(parameters: ArrayLike) -> Network:
     k_s, c_s, k_v, c_v = _columns(parameters)
     e = c_s * k_v / k_s
     d = c_s + c_v - e
-    root = np.hypot(d, 2 * np.sqrt(c_s * e))
-    larger = 0.5 * (np.abs(d) + root)
+    root = np.sqrt(d * d + 4 * c_s * e)
+    larger = 0.5 * (np.where(d.real >= 0, d, -d) + root)
     smaller = c_s * e / larger
     # q - e and e - q', with q and q' the greater and lesser of (b +- root) / 2.
-    fast, slow = np.where(d >= 0, (larger, smaller), (smaller, larger))
+    fast, slow = np.where(d.real >= 0, (larger, smaller), (smaller, larger))
     q = e + fast
     rates = np.stack((q * k_s / (c_s * c_v), k_v / q), axis=1)
     springs = np.stack((k_s * fast / root, k_s * slow / root), axis=1)
@@ -307,7 +309,7 @@ def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
     free = tuple(p for p in model.parameters if p.name not in fixed)
 
     def network(parameters: ArrayLike) -> Network:
-        given = np.atleast_2d(np.asarray(parameters, dtype=float))
+        given = np.atleast_2d(np.asarray(parameters) * 1.0)
         columns = dict(zip((p.name for p in free), given.T, strict=True))
         filled = [
             columns.get(name, np.full(len(given), fixed.get(name, np.nan))) for name in model.names

@@ -5,7 +5,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
-from biogrip.identify.genetic import GeneticSettings, Identification, _cross, _mutate, genetic
+from biogrip.identify.answer import Identification
+from biogrip.identify.genetic import GeneticSettings, _cross, _mutate, evolve
 from biogrip.identify.genome import GeneRange, genome_of
 from biogrip.measurement import Noise, add_noise, rms
 from biogrip.protocol import TorqueHistory
@@ -27,7 +28,7 @@ def bowl(parameters: Array) -> Array:
 
 
 def run(settings: GeneticSettings = PAPER, seed: int = 0) -> Identification:
-    return genetic(bowl, GENOME, settings, np.random.default_rng(seed))
+    return evolve(bowl, GENOME, settings, np.random.default_rng(seed)).identification
 
 
 def test_finds_the_bottom_of_a_bowl() -> None:
@@ -113,7 +114,7 @@ def test_mutation_waits_for_its_generation() -> None:
         return bowl(parameters)
 
     few = replace(PAPER, population=10, survivors=5, max_generations=60, min_generations=60)
-    genetic(spying, GENOME, few, np.random.default_rng(0))
+    evolve(spying, GENOME, few, np.random.default_rng(0))
     first, before, after = seen[0], set.union(*seen[1:20]), set.union(*seen[20:])
     assert before <= first
     assert not after <= first
@@ -141,7 +142,8 @@ def test_last_bits_of_the_misfit_do_not_matter(
 
     for seed in range(5):
         calm, shaken = (
-            genetic(f, GENOME, PAPER, np.random.default_rng(seed)) for f in (misfit, disturbed)
+            evolve(f, GENOME, PAPER, np.random.default_rng(seed)).identification
+            for f in (misfit, disturbed)
         )
         np.testing.assert_array_equal(calm.history.best_parameters, shaken.history.best_parameters)
 
@@ -156,7 +158,10 @@ def test_about_four_runs_in_ten_find_the_basin_of_table_5(
     target, trace = endothelial
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
     floor = 1.02 * rms(trace - target)
-    answers = [genetic(misfit, GENOME, PAPER, np.random.default_rng([8, s])) for s in range(60)]
+    answers = [
+        evolve(misfit, GENOME, PAPER, np.random.default_rng([8, s])).identification
+        for s in range(60)
+    ]
     good = [answer for answer in answers if answer.misfit_rad <= floor]
     assert 25 - 4 * 3.8 < len(good) < 25 + 4 * 3.8
     k, k_p, c, c_p = np.array([answer.parameters for answer in good]).T
@@ -173,7 +178,7 @@ def test_ties_are_broken_by_the_chromosome_alone() -> None:
         return np.ones(len(parameters))
 
     settings = replace(PAPER, min_generations=3, max_generations=3)
-    answer = genetic(flat, GENOME, settings, np.random.default_rng(0))
+    answer = evolve(flat, GENOME, settings, np.random.default_rng(0)).identification
     drawn = GENOME.draw(500, np.random.default_rng(0))
     lowest = drawn[np.argmin(GENOME.code(drawn)[0])]
     np.testing.assert_array_equal(
@@ -233,6 +238,6 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
     settings = replace(
         PAPER, mutation_start=2, mutation_probability=1.0, mutated_genes=5, max_generations=2
     )
-    genetic(spying, Single(genome.low, genome.high), settings, np.random.default_rng(0))
+    evolve(spying, Single(genome.low, genome.high), settings, np.random.default_rng(0))
     assert seen[:2] == [1, 1]
     assert seen[2] > 1

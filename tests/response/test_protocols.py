@@ -131,7 +131,15 @@ def test_misfits_agree_where_both_ways_apply(gripper: Gripper, nonlinear: bool) 
     time_s = np.linspace(0, 40, 201)
     trace = 1e-5 * np.random.default_rng(0).standard_normal(201)
     samples = random_samples(64, 21)
-    formed = FormedMisfit(gripper, model, torque, time_s, trace, nonlinear=nonlinear)(samples)
+    formed = FormedMisfit(
+        gripper,
+        model,
+        torque,
+        time_s,
+        trace,
+        nonlinear=nonlinear,
+        nuisance=np.zeros((0, len(time_s))),
+    )(samples)
     series = SeriesMisfit(gripper, model, torque, 0.2, trace)(samples)
     # The nonlinear model differs by 1e-3 of the rotation at the very most here.
     np.testing.assert_allclose(formed, series, rtol=5e-3 if nonlinear else 1e-9)

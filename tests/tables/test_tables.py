@@ -14,6 +14,7 @@ from biogrip.tables.layout import Column, Table, write
 SETTINGS = {
     "case": "drop",
     "title": "A drop",
+    "method": "genetic",
     "model": "generalized_maxwell",
     "parameters": {"k": 10.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0},
     "published": {

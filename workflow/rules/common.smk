@@ -7,6 +7,7 @@ from pathlib import Path
 from snakemake.settings.types import ExecMode
 
 from biogrip.errors import BiogripError
+from biogrip.identify.methods import METHODS
 from biogrip.study.config import check_results_folder, load_study
 from biogrip.study.locks import release_dead_locks, sign_locks
 from biogrip.study.modules import source_files

@@ -5,22 +5,25 @@ rule identification:
     input:
         measurements="results/measurements/{case}/{batch}.parquet",
         calibrated=lambda wildcards: calibrations_of(wildcards.case),
-        code=source_files("biogrip.stages.identification"),
+        code=lambda wildcards: source_files(
+            "biogrip.stages.identification", METHODS[wildcards.method].module
+        ),
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
         history="results/histories/{case}/{method}/{batch}.parquet",
+        timing="results/timings/{case}/{method}/{batch}.csv",
     log:
         "results/logs/identification/{case}/{method}/{batch}.log",
     conda:
         "../envs/biogrip.yaml"
     params:
-        settings=lambda wildcards: PLAN.identification(wildcards.case),
+        settings=lambda wildcards: PLAN.identification(wildcards.case, wildcards.method),
     message:
-        "Identifying {wildcards.case}, {wildcards.batch}"
+        "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     shell:
         "biogrip identification --settings {params.settings:q} --seeds {wildcards.batch} "
         "--measurements {input.measurements:q} --calibrated {input.calibrated:q} "
-        "--output {output.parameters:q} --history {output.history:q} 2> {log:q}"
+        "--output {output.parameters:q} --history {output.history:q} --timing {output.timing:q} 2> {log:q}"
 
 
 rule collection:

@@ -18,12 +18,12 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``title``, ``noise_floor_tolerance``, ``mutation_start``.
+        ``method``, ``title``, ``noise_floor_tolerance``, ``mutation_start``.
     inputs
         Identifications (CSV) and histories (Parquet) of the case.
     """
-    found = read_identifications(inputs[0])
-    history = read_history(inputs[1])
+    found = read_identifications(inputs[0], settings["method"])
+    history = read_history(inputs[1], settings["method"])
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else noise * 0 + found["misfit_rad"].min()

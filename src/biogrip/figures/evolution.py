@@ -21,8 +21,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     inputs
         Identifications (CSV) and histories (Parquet) of the case.
     """
-    found = read_identifications(inputs[0])
-    history = read_history(inputs[1])
+    found = read_identifications(inputs[0], settings["method"])
+    history = read_history(inputs[1], settings["method"])
     best = int(lowest_misfit(found)["seed"])
     parameters = build.sample_model(settings).parameters
     identified = settings["published"].get("identified", {})

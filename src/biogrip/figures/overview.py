@@ -33,7 +33,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``cases``: settings of each case; ``noise_floor_tolerance``.
+        ``cases``: settings of each case, with the ``method`` to show;
+        ``noise_floor_tolerance``.
     inputs
         Identifications of all cases in their order (CSV), measurements of the
         first (Parquet).
@@ -91,7 +92,7 @@ def _scatter(
     tolerance: float,
     index: int,
 ) -> None:
-    found = read_identifications(identifications)
+    found = read_identifications(identifications, case["method"])
     reached = at_noise_floor(found, tolerance)
     ticks = []
     for x, (label, columns, target, paper) in enumerate(_quantities(case)):

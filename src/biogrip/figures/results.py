@@ -43,14 +43,14 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     Parameters
     ----------
     settings
-        ``model``, ``branches``, ``gripper``, ``protocol``, ``nonlinear``.
+        ``method``, ``model``, ``branches``, ``gripper``, ``protocol``, ``nonlinear``.
     identifications
         Identifications of the case, CSV.
     others
         Its noisy traces, Parquet, named after their batch of seeds; and its
         calibration, YAML, if it has one.
     """
-    found = read_identifications(identifications)
+    found = read_identifications(identifications, settings["method"])
     best = lowest_misfit(found)
     seed = int(best["seed"])
     recorded = read_measurements(_holding(seed, others), [seed])
@@ -73,8 +73,8 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     )
 
 
-def read_history(path: Path) -> pd.DataFrame:
-    """Read the histories of a case.
+def read_history(path: Path, method: str) -> pd.DataFrame:
+    """Read the histories of a case by one method.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def read_history(path: Path) -> pd.DataFrame:
         If the file cannot be read.
     """
     try:
-        return pd.read_parquet(path)
+        return pd.read_parquet(path, filters=[("method", "==", method)])
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
 

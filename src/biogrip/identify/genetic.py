@@ -1,12 +1,15 @@
 """The paper's genetic algorithm (section 4), every reading of it a setting."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.genome import Genome
+from biogrip.identify.problem import Problem
 
 
 @dataclass(frozen=True)
@@ -51,59 +54,13 @@ class GeneticSettings:
     max_generations: int
 
 
-@dataclass(frozen=True)
-class History:
-    """What happened, generation by generation (the initial population is generation 0).
-
-    Parameters
-    ----------
-    best_misfit, median_misfit : (n_generations + 1,)
-        Misfit in rad of the best individual, and the median over the survivors.
-    best_parameters : (n_generations + 1, n_parameters)
-        Parameters of the best individual.
-    evaluations : (n_generations + 1,)
-        Misfits computed so far.
-    """
-
-    best_misfit: Array
-    median_misfit: Array
-    best_parameters: Array
-    evaluations: IntArray
-
-
-@dataclass(frozen=True)
-class Identification:
-    """The answer of an identifier.
-
-    Parameters
-    ----------
-    parameters : (n_parameters,)
-        The best individual's.
-    misfit_rad
-        Its RMS misfit.
-    generations, evaluations
-        What it took.
-    stop_reason
-        ``"stalled"`` or ``"generation limit"``.
-    history
-        The way there.
-    """
-
-    parameters: Array
-    misfit_rad: float
-    generations: int
-    evaluations: int
-    stop_reason: str
-    history: History
-
-
-def genetic(
-    misfit: Callable[[Array], Array],
-    genome: Genome,
+def identify(
+    problem: Problem,
     settings: GeneticSettings,
     rng: np.random.Generator,
+    progress: Progress = silent,
 ) -> Identification:
-    """Identify a sample with the genetic algorithm.
+    """Identify a sample with the genetic algorithm; a step is a generation.
 
     Individuals are ranked on their misfit in single precision, ties broken by
     the chromosome. Its 24 bits are far finer than noise can tell apart, and far
@@ -112,16 +69,50 @@ def genetic(
 
     Parameters
     ----------
-    misfit
-        RMS misfit in rad of parameters of shape (n, n_parameters).
-    genome
-        What a chromosome may be.
+    problem
+        What is identified.
     settings
         How the population evolves.
     rng
         The only source of randomness.
+    progress
+        Is told after every generation.
     """
+    return evolve(problem.misfit, problem.genome, settings, rng, progress).identification
+
+
+def settings_of(blocks: Mapping[str, Any]) -> GeneticSettings:
+    """Build the settings from the config's ``genetic_algorithm`` block."""
+    return GeneticSettings(**blocks["genetic_algorithm"])
+
+
+@dataclass(frozen=True)
+class Evolution:
+    """A run of the algorithm with the survivors that others start from.
+
+    Parameters
+    ----------
+    identification
+        Its answer.
+    first_survivors, last_survivors : (n_survivors, n_parameters)
+        Parameters of the survivors of the initial and of the last population, best first.
+    """
+
+    identification: Identification
+    first_survivors: Array
+    last_survivors: Array
+
+
+def evolve(
+    misfit: Callable[[Array], Array],
+    genome: Genome,
+    settings: GeneticSettings,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Evolution:
+    """Run the algorithm on any misfit of parameters of shape (n, n_parameters)."""
     population = _evaluated(genome.draw(settings.population, rng), misfit, genome).ranked()
+    first = population.first(settings.survivors)
     evaluations = settings.population
     rows = [_record(population, settings, evaluations)]
     generation = improved = 0
@@ -143,6 +134,7 @@ def genetic(
         if population.ranking[0] < best:
             improved = generation
         rows.append(_record(population, settings, evaluations))
+        progress(evaluations, float(population.ranking[0]))
     chromosomes, best_misfit, median_misfit, counts = zip(*rows, strict=True)
     history = History(
         np.array(best_misfit),
@@ -150,7 +142,7 @@ def genetic(
         genome.decode(np.array(chromosomes)),
         np.array(counts, dtype=np.int64),
     )
-    return Identification(
+    answer = Identification(
         history.best_parameters[-1],
         float(history.best_misfit[-1]),
         generation,
@@ -158,6 +150,8 @@ def genetic(
         reason,
         history,
     )
+    last = population.first(settings.survivors)
+    return Evolution(answer, genome.decode(first.chromosomes), genome.decode(last.chromosomes))
 
 
 @dataclass(frozen=True)

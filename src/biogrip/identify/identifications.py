@@ -10,8 +10,8 @@ from biogrip.errors import BiogripError
 from biogrip.identify.records import LEADING, TRAILING
 
 
-def read_identifications(path: Path) -> pd.DataFrame:
-    """Read a file of identifications.
+def read_identifications(path: Path, method: str | None = None) -> pd.DataFrame:
+    """Read a file of identifications, all of them or one method's.
 
     Raises
     ------
@@ -25,7 +25,12 @@ def read_identifications(path: Path) -> pd.DataFrame:
     wanted = [*LEADING, *TRAILING]
     if not set(wanted) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(wanted)}.")
-    return frame
+    if method is None:
+        return frame
+    chosen = frame[frame["method"] == method].reset_index(drop=True)
+    if chosen.empty:
+        raise BiogripError(f"{path}: holds no identification by {method}.")
+    return chosen
 
 
 def lowest_misfit(found: pd.DataFrame) -> pd.Series:

@@ -51,6 +51,22 @@ class StepResponse:
     weights: NDArray[Any]
 
 
+@dataclass(frozen=True)
+class TransferFunctions:
+    """Rotation over torque of n samples, polynomials in ascending powers of s.
+
+    Parameters
+    ----------
+    numerators : [n_arms][n_drives] of (n, terms)
+        One a way from drive to arm.
+    denominator : (n, terms)
+        The one that all share.
+    """
+
+    numerators: list[list[NDArray[Any]]]
+    denominator: NDArray[Any]
+
+
 def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
     """Combine what the two arms do into the drives of `step_response`.
 
@@ -100,20 +116,38 @@ def step_response(
     both_arms
         Whether the right arm's rotation is wanted too.
     """
+    transfer = transfer_functions(
+        gripper, network, symmetric=symmetric, inertia=inertia, both_arms=both_arms
+    )
+    return partial_fractions(transfer, poles(transfer.denominator, real=not inertia))
+
+
+def transfer_functions(
+    gripper: Gripper,
+    network: Network,
+    *,
+    symmetric: bool,
+    inertia: bool = False,
+    both_arms: bool = False,
+) -> TransferFunctions:
+    """Rotation over torque as rational functions of s; arguments as of `step_response`.
+
+    Parameters may be complex: nothing but arithmetic is done to them.
+    """
     p, q = _sample_polynomials(network)
     z_2 = _arm_polynomial(gripper.left, inertia)
     z_4 = _arm_polynomial(gripper.right, inertia)
     coupling = gripper.lever_m**2
     if symmetric and gripper.left == gripper.right:
         numerators = [[q]] * (2 if both_arms else 1)
-        denominator = _add(_multiply(z_2, q), 2 * coupling * p)
-    else:
-        left, right = _multiply(z_4, q), _multiply(z_2, q)
-        numerators = [[left, coupling * p], [right, -_add(right, coupling * p)]]
-        numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
-        arms = _multiply(z_2, z_4)
-        denominator = _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
-    return _partial_fractions(numerators, denominator, real=not inertia)
+        return TransferFunctions(numerators, _add(_multiply(z_2, q), 2 * coupling * p))
+    left, right = _multiply(z_4, q), _multiply(z_2, q)
+    numerators = [[left, coupling * p], [right, -_add(right, coupling * p)]]
+    numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
+    arms = _multiply(z_2, z_4)
+    return TransferFunctions(
+        numerators, _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
+    )
 
 
 def rotation(
@@ -212,7 +246,7 @@ def _arm_polynomial(arm: Arm, inertia: bool) -> Array:
 
 def _multiply(a: Array, b: Array) -> Array:
     n, terms = max(len(a), len(b)), a.shape[1] + b.shape[1] - 1
-    product = np.zeros((n, terms))
+    product = np.zeros((n, terms), dtype=np.result_type(a, b))
     for i in range(a.shape[1]):
         product[:, i : i + b.shape[1]] += a[:, i, None] * b
     return product
@@ -220,7 +254,7 @@ def _multiply(a: Array, b: Array) -> Array:
 
 def _add(a: Array, b: Array) -> Array:
     terms = max(a.shape[1], b.shape[1])
-    total = np.zeros((max(len(a), len(b)), terms))
+    total = np.zeros((max(len(a), len(b)), terms), dtype=np.result_type(a, b))
     total[:, : a.shape[1]] += a
     total[:, : b.shape[1]] += b
     return total
@@ -233,34 +267,44 @@ def _product(factors: list[Array], one: Array) -> Array:
     return product
 
 
-def _partial_fractions(
-    numerators: list[list[Array]], denominator: Array, *, real: bool
-) -> StepResponse:
-    """Step response of N(s)/D(s): N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
-    rates: NDArray[Any]
+def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
+    """Roots of denominators, shape (n, n_modes), never quite coincident."""
     if denominator.shape[1] == 2:
-        rates = -(denominator[:, :1] / denominator[:, 1:])
-    elif denominator.shape[1] == 3 and real:
-        rates = real_quadratic_roots(denominator)
-    elif real:
-        rates = separate(roots(denominator).real)
-    else:
-        rates = roots(denominator)
-    slope = rates * denominator[:, -1:]
+        rates: NDArray[Any] = -(denominator[:, :1] / denominator[:, 1:])
+        return rates
+    if denominator.shape[1] == 3 and real:
+        return real_quadratic_roots(denominator)
+    found = roots(denominator)
+    return separate(found.real) if real else found
+
+
+def slope_at_poles(denominator: NDArray[Any], rates: NDArray[Any]) -> NDArray[Any]:
+    """Derivative of the denominators at their roots, a product without differences of terms."""
+    slope = np.repeat(denominator[:, -1:], rates.shape[1], axis=1).astype(
+        np.result_type(denominator, rates)
+    )
     for i, j in permutations(range(rates.shape[1]), 2):
         slope[:, i] *= rates[:, i] - rates[:, j]
+    return slope
+
+
+def partial_fractions(transfer: TransferFunctions, rates: NDArray[Any]) -> StepResponse:
+    """Step response of N(s)/D(s): N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
+    numerators, denominator = transfer.numerators, transfer.denominator
+    slope = rates * slope_at_poles(denominator, rates)
     shape = (len(rates), len(numerators), len(numerators[0]))
-    static = np.empty(shape)
-    weights = np.empty((*shape, rates.shape[1]), dtype=rates.dtype)
+    static = np.empty(shape, dtype=denominator.dtype)
+    weights = np.empty((*shape, rates.shape[1]), dtype=slope.dtype)
     for arm, row in enumerate(numerators):
         for drive, numerator in enumerate(row):
             static[:, arm, drive] = numerator[:, 0] / denominator[:, 0]
-            weights[:, arm, drive] = _evaluate(numerator, rates) / slope
+            weights[:, arm, drive] = evaluate(numerator, rates) / slope
     return StepResponse(static, rates, weights)
 
 
-def _evaluate(coefficients: Array, z: NDArray[Any]) -> NDArray[Any]:
-    value = np.zeros_like(z)
+def evaluate(coefficients: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
+    """Polynomials in ascending powers, shape (n, terms), at z of shape (n, n_points)."""
+    value = np.zeros(z.shape, dtype=np.result_type(coefficients, z))
     for coefficient in coefficients.T[::-1]:
         value = value * z + coefficient[:, None]
     return value

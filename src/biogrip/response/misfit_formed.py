@@ -11,6 +11,7 @@ from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import COARSE, correction
+from biogrip.response.nuisance import without
 from biogrip.sample import Network, SampleModel
 
 # Numbers formed at once: what fits a processor's cache is faster than all at once.
@@ -30,6 +31,8 @@ class FormedMisfit:
         The measured closing rotation of the left arm.
     nonlinear
         Whether to simulate the nonlinear model.
+    nuisance : (n_functions, n_samples)
+        Orthonormal functions that the instrument may have added, see `nuisance_basis`.
     """
 
     def __init__(
@@ -41,6 +44,7 @@ class FormedMisfit:
         rotation_rad: Array,
         *,
         nonlinear: bool,
+        nuisance: Array,
     ) -> None:
         self._gripper = gripper
         self._model = model
@@ -48,6 +52,7 @@ class FormedMisfit:
         self._time_s = time_s
         self._rotation_rad = rotation_rad
         self._nonlinear = nonlinear
+        self._nuisance = nuisance
         self._chunk = max(1, _AT_ONCE // len(time_s))
 
     def __call__(self, parameters: Array) -> Array:
@@ -72,12 +77,13 @@ class FormedMisfit:
         difference = rotation(response, self._torque, self._time_s)
         difference -= self._rotation_rad
         if not self._nonlinear:
-            return _rms(difference)
+            return self._rms(difference)
         found = correction(self._gripper, network, self._torque, COARSE)
         difference += found.at(self._time_s)
-        return np.where(found.converged, _rms(difference), np.inf)
+        return np.where(found.converged, self._rms(difference), np.inf)
 
-
-def _rms(difference: Array) -> Array:
-    rms: Array = np.sqrt(np.einsum("nt,nt->n", difference, difference) / difference.shape[1])
-    return rms
+    def _rms(self, difference: Array) -> Array:
+        if len(self._nuisance):
+            difference = without(self._nuisance, difference)
+        rms: Array = np.sqrt(np.einsum("nt,nt->n", difference, difference) / difference.shape[1])
+        return rms

@@ -1,4 +1,4 @@
-"""Stage 4: the batches of a case put together, a row per seed."""
+"""Stage 4: the batches of a case put together, a row per method and seed."""
 
 import csv
 from pathlib import Path
@@ -20,15 +20,16 @@ def run(
     output: Path,
     history: Path,
 ) -> None:
-    """Join batches in the order of their seeds.
+    """Join batches in the order of their methods and seeds.
 
     Parameters
     ----------
     settings
         ``seeds``: how many seeds the study has; batches may hold more, left
-        from a larger study. ``model``, ``branches``: what the columns are.
+        from a larger study. ``methods``: the methods in their order. ``model``,
+        ``branches``: what the columns are.
     batches, histories
-        Files of the identification stage, in the order of their seeds.
+        Files of the identification stage, in the order of methods and seeds.
     output, history
         The same for the whole case.
 
@@ -40,11 +41,13 @@ def run(
     header = columns(build.sample_model(settings))
     rows = [row for batch in batches for row in _rows(batch, header)]
     rows = [row for row in rows if int(row[2]) < settings["seeds"]]
-    if [int(row[2]) for row in rows] != list(range(settings["seeds"])):
+    seeds = range(settings["seeds"])
+    wanted = [(method, seed) for method in settings["methods"] for seed in seeds]
+    if [(row[1], int(row[2])) for row in rows] != wanted:
         names = ", ".join(str(batch) for batch in batches)
         raise BiogripError(
-            f"{names}: do not hold each of the seeds 0 to {settings['seeds'] - 1} once. "
-            "Delete them and run again."
+            f"{names}: do not hold each of the seeds 0 to {seeds[-1]} once for each of "
+            f"{', '.join(settings['methods'])}. Delete them and run again."
         )
     with written_whole(output) as scratch, scratch.open("w", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")

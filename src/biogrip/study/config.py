@@ -13,7 +13,7 @@ from biogrip.study.source import read_places
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
 STAGE_FOLDERS = (
-    *("targets", "measurements", "calibrations", "identifications", "histories"),
+    *("targets", "measurements", "calibrations", "identifications", "histories", "timings"),
     *("tables", "figures", "logs"),
 )
 
@@ -76,6 +76,11 @@ class Study:
     def seeds(self) -> int:
         """Number of noisy traces a case."""
         return int(self.config["seeds"])
+
+    @property
+    def methods(self) -> list[str]:
+        """Identifiers; tables and figures that show one show the first."""
+        return list(self.config["methods"])
 
     @property
     def batch_size(self) -> int:

@@ -13,16 +13,16 @@ import biogrip
 _PACKAGE = Path(biogrip.__file__).parent
 
 
-def source_files(module: str) -> list[str]:
-    """Files of a module and of all package modules that it imports, sorted.
+def source_files(*modules: str) -> list[str]:
+    """Files of modules and of all package modules that they import, sorted.
 
     Parameters
     ----------
-    module
+    modules
         For example ``"biogrip.stages.target"``.
     """
     seen: set[str] = set()
-    waiting = [module]
+    waiting = list(modules)
     while waiting:
         name = waiting.pop()
         if name not in seen:

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from biogrip.identify.methods import METHODS
 from biogrip.study import build
 from biogrip.study.batches import Batch, existing_batches, plan_batches
 from biogrip.study.config import Case, Study, overlaid
-
-METHOD = "genetic"
 
 
 @dataclass(frozen=True)
@@ -28,17 +27,27 @@ class Plan:
     study: Study
     results: Path
 
-    def batches(self, case: str) -> list[Batch]:
-        """Batches of seeds of a case, those with results kept."""
-        folder = self.results / "identifications" / case / METHOD
+    def batches(self, case: str, method: str) -> list[Batch]:
+        """Batches of seeds of a case and method, those with results kept."""
+        folder = self.results / "identifications" / case / method
         return plan_batches(self.study.seeds, self.study.batch_size, existing_batches(folder))
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
-        """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case."""
+        """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case.
+
+        A pattern without a method is filled for the method that is shown.
+        """
+        methods = self.study.methods if "{method}" in pattern else [self.shown]
         return [
-            pattern.format(case=case, method=METHOD, batch=batch.name)
-            for batch in self.batches(case)
+            pattern.format(case=case, method=method, batch=batch.name)
+            for method in methods
+            for batch in self.batches(case, method)
         ]
+
+    @property
+    def shown(self) -> str:
+        """Return the method that tables and figures of one method show."""
+        return self.study.methods[0]
 
     def target(self, case: str) -> str:
         """Settings of the target stage."""
@@ -76,7 +85,7 @@ class Plan:
         """Whether the identification of a case takes its gripper from a calibration."""
         return self._case(case).assumed_gripper == "calibrated"
 
-    def identification(self, case: str) -> str:
+    def identification(self, case: str, method: str) -> str:
         """Settings of the identification stage."""
         c = self._case(case)
         return _json(
@@ -85,26 +94,35 @@ class Plan:
             case=case,
             gripper=self._assumed_gripper(c),
             nonlinear=c.blocks["models"]["identification"] == "nonlinear",
+            offset=False,
+            drift=False,
             fixed=c.fixed,
             search_range=c.blocks["search_range"],
-            genetic_algorithm=c.blocks["genetic_algorithm"],
+            method=method,
+            **{block: c.blocks[block] for block in METHODS[method].blocks},
         )
 
     def collection(self, case: str) -> str:
         """Settings of the collection stage."""
         c = self._case(case)
-        return _json(seeds=self.study.seeds, model=c.model.name, branches=c.branches)
+        return _json(
+            seeds=self.study.seeds,
+            methods=self.study.methods,
+            model=c.model.name,
+            branches=c.branches,
+        )
 
     def errors(self, case: str) -> str:
         """Settings of a case's error table."""
         truth = self._truth(self._case(case))
-        return _json(case=case, noise_floor_tolerance=self._tolerance, **truth)
+        return _json(case=case, method=self.shown, noise_floor_tolerance=self._tolerance, **truth)
 
     def convergence(self, case: str) -> str:
         """Settings of the figure of a case's convergence."""
         c = self._case(case)
         return _json(
             title=c.title,
+            method=self.shown,
             mutation_start=c.blocks["genetic_algorithm"]["mutation_start"],
             noise_floor_tolerance=self._tolerance,
         )
@@ -115,7 +133,7 @@ class Plan:
 
     def evolution(self, case: str) -> str:
         """Settings of the figure of the parameters' evolution."""
-        return _json(**self._truth(self._case(case)))
+        return _json(method=self.shown, **self._truth(self._case(case)))
 
     def overview(self) -> str:
         """Settings of the overview figure."""
@@ -123,7 +141,12 @@ class Plan:
             name: {**self._fit(case), **self._truth(case)}
             for name, case in self.study.cases.items()
         }
-        return json.dumps({"cases": cases, "noise_floor_tolerance": self._tolerance})
+        return json.dumps(
+            {
+                "cases": cases,
+                "noise_floor_tolerance": self._tolerance,
+            }
+        )
 
     def blocks(self, *keys: str) -> str:
         """Study-wide blocks by name, for tables and figures that show them."""
@@ -143,6 +166,7 @@ class Plan:
             cases={
                 name: self._truth(case) for name, case in self.study.cases.items() if case.published
             },
+            method=self.shown,
             **{key: self.study.config[key] for key in ("gripper", "actuator", "search_range")},
         )
 
@@ -166,6 +190,7 @@ class Plan:
     def _fit(self, case: Case) -> dict[str, Any]:
         return {
             **self._simulation(case),
+            "method": self.shown,
             "title": case.title,
             "gripper": self._assumed_gripper(case),
             "nonlinear": case.blocks["models"]["identification"] == "nonlinear",

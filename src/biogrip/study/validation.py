@@ -14,13 +14,15 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from biogrip.errors import BiogripError, nearest
+from biogrip.identify.methods import METHODS
 from biogrip.sample import MODELS, MOST_BRANCHES
 from biogrip.study.meaning import Problem, meaning_problems
 from biogrip.study.source import ConfigFiles, KeyPath
 
 OVERRIDABLE = (
     *("gripper", "protocol", "measurement", "search_range"),
-    *("genetic_algorithm", "models", "calibration"),
+    *("genetic_algorithm", "genetic_refined", "least_squares", "differential_evolution"),
+    *("models", "calibration"),
 )
 """Blocks that hold for all cases, and that a case may change for itself."""
 
@@ -40,12 +42,13 @@ _Validator = extend(
 
 @cache
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of a study, with the sample models that there are."""
+    """Return the JSON Schema of a study, with the sample models and methods that there are."""
     text = resources.files("biogrip.study").joinpath("schema.yaml").read_text(encoding="utf-8")
     loaded: dict[str, Any] = yaml.safe_load(text)
     sample = loaded["$defs"]["sample"]["properties"]
     sample["model"]["enum"] = list(MODELS)
     sample["branches"]["maximum"] = MOST_BRANCHES
+    loaded["properties"]["methods"]["items"]["enum"] = list(METHODS)
     return loaded
 
 
@@ -162,6 +165,8 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
                 path,
                 f"found a list of {len(found)}, allowed are {bound} {limit} items.",
             )
+        case "uniqueItems":
+            yield path, "holds something twice; allowed is every item once."
         case "minProperties":
             yield path, "is empty; at least one is needed."
         case _:

@@ -35,12 +35,12 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``case``, ``title``, ``model``, ``branches``, ``parameters``, ``published``,
+        ``case``, ``method``, ``title``, ``model``, ``branches``, ``parameters``, ``published``,
         ``noise_floor_tolerance``.
     inputs
         The identifications of the case, CSV.
     """
-    found = read_identifications(inputs[0])
+    found = read_identifications(inputs[0], settings["method"])
     model = build.sample_model(settings)
     best = found.index.get_loc(lowest_misfit(found).name)
     share = float(np.mean(at_noise_floor(found, settings["noise_floor_tolerance"])))

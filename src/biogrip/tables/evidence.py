@@ -40,7 +40,9 @@ def evidence(settings: dict[str, Any], inputs: list[Path]) -> Table:
     for name, case in settings["cases"].items():
         traces = [p for p in inputs if p.suffix == ".parquet" and p.parent.name == name]
         identified = [p for p in inputs if p.suffix == ".csv" and p.stem == name]
-        rows += _axis_rows(case, traces) + _generation_rows(case, identified)
+        rows += _axis_rows(case, traces)
+        if settings["method"] == "genetic":
+            rows += _generation_rows(case, identified)
     return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
 
 
@@ -130,6 +132,7 @@ def _generation_rows(case: dict[str, Any], identified: list[Path]) -> list[tuple
     generation = case["published"].get("generation")
     if not generation or not identified:
         return []
-    median = float(np.median(read_identifications(identified[0])["generations"]))
+    found = read_identifications(identified[0], "genetic")
+    median = float(np.median(found["generations"]))
     quantity = f"{case['title']}: generation of the fit"
     return [(quantity, "", str(generation), median, "median generation at which ours stops")]

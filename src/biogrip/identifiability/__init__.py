@@ -1,0 +1,1 @@
+"""What a trace tells about a sample, and what it does not."""

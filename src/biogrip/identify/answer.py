@@ -1,0 +1,61 @@
+"""What every identifier returns."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from biogrip.arrays import Array, IntArray
+
+Progress = Callable[[int, float], None]
+"""Is told, now and then, how many responses were simulated and the lowest misfit in rad."""
+
+
+def silent(evaluations: int, misfit_rad: float) -> None:
+    """Report to nobody."""
+
+
+@dataclass(frozen=True)
+class History:
+    """What happened, step by step; what a step is depends on the method.
+
+    Parameters
+    ----------
+    best_misfit, median_misfit : (n_steps + 1,)
+        Lowest misfit so far in rad, and the median over what the method works with.
+    best_parameters : (n_steps + 1, n_parameters)
+        Parameters of the lowest misfit.
+    evaluations : (n_steps + 1,)
+        Responses simulated so far.
+    """
+
+    best_misfit: Array
+    median_misfit: Array
+    best_parameters: Array
+    evaluations: IntArray
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The answer of one run.
+
+    Parameters
+    ----------
+    parameters : (n_parameters,)
+        Those of lowest misfit.
+    misfit_rad
+        Their misfit.
+    generations
+        Number of steps: generations, or local fits.
+    evaluations
+        Responses simulated; one with its derivatives counts as one.
+    stop_reason
+        Why it stopped there.
+    history
+        The way there.
+    """
+
+    parameters: Array
+    misfit_rad: float
+    generations: int
+    evaluations: int
+    stop_reason: str
+    history: History

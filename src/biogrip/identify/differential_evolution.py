@@ -1,0 +1,105 @@
+"""SciPy's differential evolution on log-parameters, a whole generation evaluated at once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import optimize
+
+from biogrip.arrays import Array
+from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.problem import Problem
+
+
+@dataclass(frozen=True)
+class DifferentialEvolutionSettings:
+    """SciPy's settings of the same names.
+
+    Parameters
+    ----------
+    popsize
+        Individuals per parameter.
+    maxiter
+        Generations at most.
+    tol
+        Stop when the standard deviation of the population's misfits is below
+        this share of their mean.
+    """
+
+    popsize: int
+    maxiter: int
+    tol: float
+
+
+def settings_of(blocks: Mapping[str, Any]) -> DifferentialEvolutionSettings:
+    """Build the settings from the config's ``differential_evolution`` block."""
+    return DifferentialEvolutionSettings(**blocks["differential_evolution"])
+
+
+def identify(
+    problem: Problem,
+    settings: DifferentialEvolutionSettings,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Identification:
+    """Identify a sample with differential evolution; a step is a generation.
+
+    Individuals are ranked on their misfit in single precision, as in `biogrip.identify.genetic`.
+
+    Parameters
+    ----------
+    problem
+        What is identified.
+    settings
+        Its budget.
+    rng
+        The only source of randomness.
+    progress
+        Is told after every generation.
+    """
+    rows: list[tuple[Array, float, float, int]] = []
+    evaluations = 0
+
+    def ranking(columns: Array) -> Array:
+        nonlocal evaluations
+        evaluations += columns.shape[1]
+        return problem.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
+
+    def record(intermediate_result: optimize.OptimizeResult) -> None:
+        lowest, middle = (
+            float(intermediate_result.fun),
+            float(np.median(intermediate_result.population_energies)),
+        )
+        rows.append((np.exp(intermediate_result.x), lowest, middle, evaluations))
+        progress(evaluations, lowest)
+
+    found = optimize.differential_evolution(
+        ranking,
+        optimize.Bounds(problem.low, problem.high),
+        popsize=settings.popsize,
+        maxiter=settings.maxiter,
+        tol=settings.tol,
+        rng=rng,
+        callback=record,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+    )
+    final = np.exp(found.x), float(found.fun), float(np.median(found.population_energies))
+    rows.append((*final, evaluations))
+    parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
+    history = History(
+        np.array(best_misfit),
+        np.array(median_misfit),
+        np.array(parameters),
+        np.array(counts, dtype=np.int64),
+    )
+    return Identification(
+        history.best_parameters[-1],
+        float(found.fun),
+        int(found.nit),
+        evaluations,
+        "converged" if found.success else "generation limit",
+        history,
+    )

@@ -1,0 +1,90 @@
+"""The genetic algorithm, its survivors polished on log-parameters.
+
+The last survivors crowd in one basin. The survivors of the initial population
+are still everywhere, so local fits start from the best of both.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from biogrip.identify import genetic
+from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.multi_start import best_of_starts
+from biogrip.identify.problem import Problem
+
+
+@dataclass(frozen=True)
+class RefinedSettings:
+    """The genetic algorithm's settings, and how many survivors are polished.
+
+    Parameters
+    ----------
+    genetic
+        How the population evolves.
+    first, last
+        Number of survivors polished of the initial and of the last population.
+    """
+
+    genetic: genetic.GeneticSettings
+    first: int
+    last: int
+
+
+def settings_of(blocks: Mapping[str, Any]) -> RefinedSettings:
+    """Build the settings from the config's ``genetic_algorithm`` and ``genetic_refined`` blocks."""
+    return RefinedSettings(genetic.settings_of(blocks), **blocks["genetic_refined"])
+
+
+def identify(
+    problem: Problem,
+    settings: RefinedSettings,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Identification:
+    """Identify a sample with the genetic algorithm and local fits from its survivors.
+
+    A step is a generation, and after them a fit.
+
+    Parameters
+    ----------
+    problem
+        What is identified.
+    settings
+        Its budget.
+    rng
+        The only source of randomness.
+    progress
+        Is told after every generation and every fit.
+    """
+    evolution = genetic.evolve(problem.misfit, problem.genome, settings.genetic, rng, progress)
+    coarse = evolution.identification
+    starts = np.concatenate(
+        (
+            evolution.last_survivors[: settings.last],
+            evolution.first_survivors[: settings.first],
+        )
+    )
+    median = float(coarse.history.median_misfit[-1])
+    before = coarse.parameters, coarse.misfit_rad, median, coarse.evaluations
+    fine = best_of_starts(problem, np.log(starts), before, progress)
+    return Identification(
+        fine.parameters,
+        fine.misfit_rad,
+        coarse.generations + fine.generations,
+        fine.evaluations,
+        f"{coarse.stop_reason}, polished",
+        _joined(coarse.history, fine.history),
+    )
+
+
+def _joined(coarse: History, fine: History) -> History:
+    """Append the fits to the generations; the fits' first row repeats the last generation."""
+    return History(
+        np.concatenate((coarse.best_misfit, fine.best_misfit[1:])),
+        np.concatenate((coarse.median_misfit, fine.median_misfit[1:])),
+        np.concatenate((coarse.best_parameters, fine.best_parameters[1:])),
+        np.concatenate((coarse.evaluations, fine.evaluations[1:])),
+    )

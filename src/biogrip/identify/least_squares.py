@@ -1,0 +1,68 @@
+"""Bounded multi-start least squares on log-parameters."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from biogrip.errors import BiogripError
+from biogrip.identify.answer import Identification, Progress, silent
+from biogrip.identify.multi_start import best_of_starts, screened
+from biogrip.identify.problem import Problem
+
+
+@dataclass(frozen=True)
+class LeastSquaresSettings:
+    """How many points are tried, and how many of them fitted.
+
+    Parameters
+    ----------
+    candidates
+        Points drawn uniformly in the logarithms of the parameters.
+    starts
+        The best so many of them are starting points of a local fit.
+    """
+
+    candidates: int
+    starts: int
+
+
+def settings_of(blocks: Mapping[str, Any]) -> LeastSquaresSettings:
+    """Build the settings from the config's ``least_squares`` block."""
+    return LeastSquaresSettings(**blocks["least_squares"])
+
+
+def identify(
+    problem: Problem,
+    settings: LeastSquaresSettings,
+    rng: np.random.Generator,
+    progress: Progress = silent,
+) -> Identification:
+    """Identify a sample by local fits from the best of many random points; a step is a fit.
+
+    Parameters
+    ----------
+    problem
+        What is identified.
+    settings
+        Its budget.
+    rng
+        The only source of randomness.
+    progress
+        Is told after every fit.
+
+    Raises
+    ------
+    BiogripError
+        If the model has no answer at any of the points.
+    """
+    shape = (settings.candidates, len(problem.low))
+    points, misfit = screened(problem.misfit, rng.uniform(problem.low, problem.high, shape))
+    if not len(points):
+        raise BiogripError(
+            "least_squares: the model has no answer anywhere in the search range; "
+            "allowed are smaller torques, or the linear model."
+        )
+    before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), settings.candidates
+    return best_of_starts(problem, points[: settings.starts], before, progress)

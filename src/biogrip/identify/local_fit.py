@@ -1,0 +1,146 @@
+"""From a starting point down to the optimum it leads to, on log-parameters within bounds."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from biogrip.arrays import Array
+from biogrip.identify.problem import Problem
+from biogrip.measurement import rms
+
+PRIOR_WIDTH = 100.0
+"""Width in e-folds of the prior that every parameter has, about the middle of its range.
+
+Wherever the trace says anything at all it is without effect: it changes an
+estimate by the square of (standard deviation / 100 e-folds). A parameter of which
+the trace says nothing comes out in the middle of the range left to it, not where
+rounding errors leave it, which differs from processor to processor.
+"""
+
+ROUGH, FINE = 1e-5, 1e-8
+"""Stop when a step lowers the cost by less than this share: to tell basins apart; to be there.
+
+Both are far above rounding, so that every machine stops at the same step.
+"""
+
+_MOST_EVALUATIONS = 300
+_MOST_STEPS = 30
+# Steps shrink some tenfold each. Whether one is below 1e-9 every machine sees alike, and a few
+# more take the rest of it below rounding.
+_NEARLY_SETTLED = 1e-9
+_LAST_STEPS = 4
+
+
+@dataclass(frozen=True)
+class LocalFit:
+    """An optimum.
+
+    Parameters
+    ----------
+    log_parameters : (n_parameters,)
+        Where it is.
+    misfit_rad
+        RMS misfit there.
+    evaluations
+        Responses simulated on the way.
+    """
+
+    log_parameters: Array
+    misfit_rad: float
+    evaluations: int
+
+
+class Objective:
+    """Residuals in units of the noise, with the prior and any further rows below them.
+
+    Parameters
+    ----------
+    problem
+        What is fitted.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._residuals = problem.residuals
+        self._middle = 0.5 * (problem.low + problem.high)
+        self._last: tuple[Array, Array, Array] | None = None
+        self.evaluations = 0
+
+    def both(self, x: Array) -> tuple[Array, Array]:
+        """Residual rows and their Jacobian; the last are kept, for both are asked for in turn."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            scale = self._residuals.noise_scale_rad
+            residual, sensitivity = self._residuals(x)
+            prior = np.eye(len(x)) / PRIOR_WIDTH
+            rows = np.concatenate((residual / scale, (x - self._middle) / PRIOR_WIDTH))
+            self._last = x.copy(), rows, np.concatenate((sensitivity.T / scale, prior))
+            self.evaluations += 1
+        return self._last[1], self._last[2]
+
+    def rows(self, x: Array) -> Array:
+        """Residual rows."""
+        return self.both(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        """Their Jacobian."""
+        return self.both(x)[1]
+
+    def misfit_rad(self, x: Array) -> float:
+        """RMS misfit."""
+        return rms(self.both(x)[0][: self._residuals.samples]) * self._residuals.noise_scale_rad
+
+
+def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalFit:
+    """Fit from one starting point with SciPy's bounded trust-region least squares.
+
+    Parameters
+    ----------
+    problem
+        What is fitted.
+    start : (n_parameters,)
+        Log-parameters; moved into the bounds if need be.
+    tolerance
+        `ROUGH` or `FINE`.
+    """
+    objective = Objective(problem)
+    inside = 1e-9 * (problem.high - problem.low)
+    found = least_squares(
+        objective.rows,
+        np.clip(start, problem.low + inside, problem.high - inside),
+        objective.jacobian,
+        (problem.low, problem.high),
+        ftol=tolerance,
+        xtol=FINE,
+        gtol=FINE,
+        max_nfev=_MOST_EVALUATIONS,
+    )
+    return LocalFit(found.x, objective.misfit_rad(found.x), objective.evaluations)
+
+
+def settled(problem: Problem, found: LocalFit) -> LocalFit:
+    """Take Gauss-Newton steps until an optimum stands still to the last digits.
+
+    A trust region compares sums of squares, and so finds an optimum to half the
+    digits; where the gradient vanishes can be found to all of them. Parameters
+    that push against a bound stay on it.
+    """
+    objective = Objective(problem)
+    x, left = found.log_parameters, _MOST_STEPS
+    while left > 0:
+        rows, jacobian = objective.both(x)
+        downhill = -(jacobian.T @ rows)
+        edge = 1e-6 * (problem.high - problem.low)
+        stuck = ((x <= problem.low + edge) & (downhill < 0)) | (
+            (x >= problem.high - edge) & (downhill > 0)
+        )
+        x = np.where(stuck & (downhill < 0), problem.low, x)
+        x = np.where(stuck & (downhill > 0), problem.high, x)
+        step = np.zeros_like(x)
+        step[~stuck] = np.linalg.lstsq(jacobian[:, ~stuck], -rows, rcond=None)[0]
+        x = np.clip(x + step, problem.low, problem.high)
+        nearly = left > _LAST_STEPS and np.max(np.abs(step)) < _NEARLY_SETTLED
+        left = _LAST_STEPS if nearly else left - 1
+    misfit = objective.misfit_rad(x)
+    if not misfit <= found.misfit_rad * (1 + FINE):
+        return replace(found, evaluations=objective.evaluations)
+    return LocalFit(x, misfit, objective.evaluations)

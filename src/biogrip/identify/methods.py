@@ -1,0 +1,72 @@
+"""The identifiers that there are.
+
+Each is a module of its own here, named like the method, with two functions:
+``settings_of(blocks)`` reads its config blocks, and ``identify(problem, settings,
+rng, progress)`` returns an `Identification`. Ranges and traces are the
+problem's, randomness is the generator's, the budget is in the settings.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from biogrip.identify.answer import Identification, Progress
+from biogrip.identify.problem import Problem
+
+Identify = Callable[[Problem, np.random.Generator, Progress], Identification]
+
+
+@dataclass(frozen=True)
+class Method:
+    """What is said of an identifier without loading it.
+
+    Parameters
+    ----------
+    name, title
+        In the config and in files; in print.
+    blocks
+        Config blocks that hold its settings.
+    """
+
+    name: str
+    title: str
+    blocks: tuple[str, ...]
+
+    @property
+    def module(self) -> str:
+        """Name of its module."""
+        return f"biogrip.identify.{self.name}"
+
+
+METHODS: dict[str, Method] = {
+    method.name: method
+    for method in (
+        Method("genetic", "genetic algorithm", ("genetic_algorithm",)),
+        Method("genetic_refined", "genetic, polished", ("genetic_algorithm", "genetic_refined")),
+        Method("least_squares", "multi-start least squares", ("least_squares",)),
+        Method("differential_evolution", "differential evolution", ("differential_evolution",)),
+    )
+}
+
+
+def identifier(name: str, blocks: Mapping[str, Any]) -> Identify:
+    """Load a method with its settings.
+
+    Parameters
+    ----------
+    name
+        One of `METHODS`.
+    blocks
+        Config blocks, at least its own.
+    """
+    module = import_module(METHODS[name].module)
+    settings = module.settings_of(blocks)
+
+    def identify(problem: Problem, rng: np.random.Generator, progress: Progress) -> Identification:
+        answer: Identification = module.identify(problem, settings, rng, progress)
+        return answer
+
+    return identify

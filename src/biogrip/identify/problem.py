@@ -1,0 +1,80 @@
+"""What there is to identify: a trace, a model, and the range that is searched."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.gripper import Gripper
+from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.protocol import TorqueHistory
+from biogrip.response.misfit import misfit_of
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.response.residuals import Residuals
+from biogrip.sample import SampleModel
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The same for every identifier; each uses what it needs of it.
+
+    Parameters
+    ----------
+    misfit
+        RMS misfit in rad of parameters of shape (n, n_parameters).
+    residuals
+        Residuals and exact derivatives, as functions of log-parameters.
+    genome
+        What a chromosome may be.
+    low, high : (n_parameters,)
+        Logarithms of the ends of the search range (Table 4).
+    """
+
+    misfit: Callable[[Array], Array]
+    residuals: Residuals
+    genome: Genome
+    low: Array
+    high: Array
+
+
+def problem_of(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    rotation_rad: Array,
+    ranges: dict[str, GeneRange],
+    *,
+    nonlinear: bool = False,
+    offset: bool = False,
+    drift: bool = False,
+) -> Problem:
+    """Pose the identification of one trace.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated, without inertia.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    ranges
+        Gene ranges by the name of the range, see `Parameter.range_name`.
+    nonlinear
+        Whether to simulate the nonlinear model.
+    offset, drift
+        Whether the instrument may have added a constant, and one linear in time.
+    """
+    nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
+    chosen = [ranges[parameter.range_name] for parameter in model.parameters]
+    return Problem(
+        misfit_of(
+            gripper, model, torque, time_s, rotation_rad, nonlinear=nonlinear, nuisance=nuisance
+        ),
+        Residuals(
+            gripper, model, torque, time_s, rotation_rad, nonlinear=nonlinear, nuisance=nuisance
+        ),
+        genome_of(model, ranges),
+        np.log([genes.low for genes in chosen]),
+        np.log([genes.high for genes in chosen]),
+    )

@@ -1,0 +1,39 @@
+"""How far a long job has come, said every few seconds and not at all in a short one."""
+
+import time
+
+_EVERY_S = 5.0
+
+
+class Progress:
+    """Counts what is done.
+
+    Parameters
+    ----------
+    what
+        Name of the job.
+    total
+        How many pieces it has.
+    """
+
+    def __init__(self, what: str, total: int) -> None:
+        self._what = what
+        self._total = total
+        self._done = 0
+        self._said = time.monotonic()
+
+    def done(self) -> None:
+        """Count one piece."""
+        self._done += 1
+        self._say("")
+
+    def within(self, evaluations: int, misfit_rad: float) -> None:
+        """Follow what an identifier does within a piece."""
+        self._say(f", {evaluations} responses, misfit {misfit_rad:.4g} rad")
+
+    def _say(self, more: str) -> None:
+        now = time.monotonic()
+        if now - self._said >= _EVERY_S:
+            self._said = now
+            # Past the job's log, to whoever waits at the terminal.
+            print(f"{self._what}: {self._done} of {self._total} done{more}", flush=True)
