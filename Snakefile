@@ -11,6 +11,7 @@ report: "workflow/report/study.rst"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/traces.smk"
 include: "workflow/rules/identification.smk"
+include: "workflow/rules/identifiability.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/check.smk"
@@ -19,9 +20,10 @@ include: "workflow/rules/check.smk"
 rule all:
     default_target: True
     input:
-        targets=collect("results/targets/{case}.csv", case=CASES),
+        targets=collect("results/targets/{case}.csv", case=PLAN.simulated),
         identifications=collect("results/identifications/{case}.csv", case=CASES),
         tables=collect("results/tables/{table}.csv", table=TABLES),
+        timings="results/timings/methods.csv",
         figures=collect("results/figures/{figure}.png", figure=FIGURES),
 
 

@@ -58,6 +58,34 @@ def _parser() -> argparse.ArgumentParser:
     _inputs(identification, "calibrated", many=True)
     _outputs(identification, "output", "history", "timing")
 
+    recording = _stage(stages, "recording", _recording, "read and check a recorded trace")
+    _inputs(recording, "recorded")
+    _outputs(recording, "output")
+
+    identifiability = _stage(
+        stages, "identifiability", _identifiability, "judge what a trace of a case tells"
+    )
+    _inputs(identifiability, "measurements")
+    _inputs(identifiability, "calibrated", many=True)
+    _outputs(identifiability, "output")
+
+    expected = _stage(stages, "expected", _expected, "judge what a case's traces should tell")
+    _inputs(expected, "target")
+    _inputs(expected, "calibrated", many=True)
+    _outputs(expected, "output")
+
+    coverage = _stage(stages, "coverage", _coverage, "estimates and intervals of many seeds")
+    _seeds(coverage)
+    _inputs(coverage, "target", "expected")
+    _inputs(coverage, "calibrated", many=True)
+    _outputs(coverage, "output")
+
+    selection = _stage(stages, "selection", _selection, "fit every sample model to noisy traces")
+    _seeds(selection)
+    _inputs(selection, "measurements")
+    _inputs(selection, "calibrated", many=True)
+    _outputs(selection, "output")
+
     collection = _stage(stages, "collection", _collection, "join the batches of a case")
     _inputs(collection, "batches", "histories", many=True)
     _outputs(collection, "output", "history")
@@ -162,6 +190,49 @@ def _identification(options: argparse.Namespace) -> None:
         options.output,
         options.history,
         options.timing,
+        *options.calibrated,
+    )
+
+
+def _recording(options: argparse.Namespace) -> None:
+    from biogrip.stages import recording
+
+    recording.run(options.settings, options.recorded, options.output)
+
+
+def _identifiability(options: argparse.Namespace) -> None:
+    from biogrip.stages import identifiability
+
+    identifiability.run(options.settings, options.measurements, options.output, *options.calibrated)
+
+
+def _expected(options: argparse.Namespace) -> None:
+    from biogrip.stages import identifiability
+
+    identifiability.expected(options.settings, options.target, options.output, *options.calibrated)
+
+
+def _coverage(options: argparse.Namespace) -> None:
+    from biogrip.stages import coverage
+
+    coverage.run(
+        options.settings,
+        _batch(options.seeds),
+        options.target,
+        options.expected,
+        options.output,
+        *options.calibrated,
+    )
+
+
+def _selection(options: argparse.Namespace) -> None:
+    from biogrip.stages import selection
+
+    selection.run(
+        options.settings,
+        _batch(options.seeds),
+        options.measurements,
+        options.output,
         *options.calibrated,
     )
 

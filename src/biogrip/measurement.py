@@ -43,15 +43,21 @@ def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Ar
     -------
     (n_samples,)
     """
-    magnitude = np.abs(rotation_rad)
-    scale = magnitude if noise.reference == "signal" else magnitude.max()
     if noise.kind == "uniform":
         half_width = np.sqrt(3.0)
         unit = rng.uniform(-half_width, half_width, size=len(rotation_rad))
     else:
         unit = rng.standard_normal(len(rotation_rad))
-    noisy: Array = rotation_rad + noise.level * scale * unit
+    noisy: Array = rotation_rad + noise_deviation(rotation_rad, noise) * unit
     return noisy
+
+
+def noise_deviation(rotation_rad: Array, noise: Noise) -> Array:
+    """Standard deviation of the noise at every sample of a noise-free trace, (n_samples,)."""
+    magnitude = np.abs(rotation_rad)
+    if noise.reference == "signal":
+        return noise.level * magnitude
+    return np.full_like(magnitude, noise.level * magnitude.max())
 
 
 def rms(values: Array) -> float:

@@ -24,6 +24,7 @@ from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory, torque_at
 from biogrip.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
 from biogrip.response.linear import StepResponse, rotation
+from biogrip.response.nuisance import without
 
 LARGEST_SHARE = 1.5
 """Most that a trace may turn, in free rotations.
@@ -57,18 +58,16 @@ class _Fit:
     Parameters
     ----------
     response_rad : (n_samples,)
-        That part.
+        That part, without what the instrument may have added.
     unknowns
         How many independent lagged torques it is made of.
+    turn_rad
+        Largest rotation.
     """
 
     response_rad: Array
     unknowns: int
-
-    @property
-    def turn_rad(self) -> float:
-        """Largest rotation."""
-        return float(np.abs(self.response_rad).max())
+    turn_rad: float
 
 
 def check_recording(
@@ -77,6 +76,7 @@ def check_recording(
     torque: TorqueHistory,
     path: Path,
     columns: Columns,
+    nuisance: Array,
     noise_rad: float | None = None,
 ) -> None:
     """Refuse a trace that the gripper cannot have shown under the protocol.
@@ -95,6 +95,8 @@ def check_recording(
         What it was recorded with.
     path, columns
         Where it was read, for messages.
+    nuisance : (n_functions, n_samples)
+        Orthonormal functions that the instrument may have added, see `nuisance_basis`.
     noise_rad
         Standard deviation of the noise, if known; else it is taken from what
         the fit leaves over.
@@ -106,9 +108,9 @@ def check_recording(
         which the trace would do.
     """
     _check_times(recording, torque.end_s, path, columns)
-    fit = _fit(recording, torque)
-    if not _responds(recording.rotation_rad, fit, noise_rad):
-        trace = recording.rotation_rad
+    trace = recording.rotation_rad
+    fit = _fit(recording, torque, nuisance)
+    if not _responds(without(nuisance, trace), fit, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.rotation}': found no response to the "
             f"torque, but {trace.mean():.3g} rad throughout, give or take {trace.std():.2g} rad; "
@@ -155,15 +157,16 @@ def _check_times(recording: Recording, end_s: float, path: Path, columns: Column
     )
 
 
-def _fit(recording: Recording, torque: TorqueHistory) -> _Fit:
+def _fit(recording: Recording, torque: TorqueHistory, nuisance: Array) -> _Fit:
     """Fit the lagged torques of the left arm and, if that differs, of the difference of both."""
     drives = 1 if torque.symmetric else 2
     rates = -1 / (torque.end_s * np.tile(_LAG_SHARES, drives))
     static = np.repeat(np.eye(drives), len(_LAG_SHARES), axis=0)[:, None, :]
     lags = StepResponse(static, rates[:, None], -static[..., None])
     lagged = rotation(lags, torque, recording.time_s).T
-    weights, _, rank, _ = np.linalg.lstsq(lagged, recording.rotation_rad)
-    return _Fit(lagged @ weights, int(rank))
+    seen = without(nuisance, lagged.T).T
+    weights, _, rank, _ = np.linalg.lstsq(seen, without(nuisance, recording.rotation_rad))
+    return _Fit(seen @ weights, int(rank), float(np.abs(lagged @ weights).max()))
 
 
 def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:

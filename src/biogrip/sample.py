@@ -97,6 +97,8 @@ class SampleModel:
     exchangeable
         Parameters whose sum deserves a row of its own in tables, because stiff
         branches make them trade against each other.
+    branches
+        Spring and damper of each Maxwell branch, by name.
     """
 
     name: str
@@ -104,6 +106,7 @@ class SampleModel:
     parameters: tuple[Parameter, ...]
     network: Callable[[ArrayLike], Network]
     exchangeable: tuple[str, ...] = ()
+    branches: tuple[tuple[str, str], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -181,6 +184,19 @@ def kelvin_voigt(parameters: ArrayLike) -> Network:
     k_p, c_p = _columns(parameters)
     none = np.zeros((len(k_p), 0))
     return Network(k_p=k_p, c_p=c_p, k=none, c=none)
+
+
+def damper(parameters: ArrayLike) -> Network:
+    r"""Bare damper, a Newtonian liquid; column c_p.
+
+    ::
+
+        B o---[==]---o C
+               c_p
+    """
+    (c_p,) = _columns(parameters)
+    none = np.zeros((len(c_p), 0))
+    return Network(k_p=np.zeros_like(c_p), c_p=c_p, k=none, c=none)
 
 
 def maxwell(parameters: ArrayLike) -> Network:
@@ -263,12 +279,16 @@ MODELS: dict[str, SampleModel] = {
             SINGLE_BRANCH,
             generalized_maxwell,
             exchangeable=("c", "c_p"),
+            branches=(("k", "c"),),
         ),
         SampleModel(
             "liquid_drop",
             "Maxwell liquid drop with membrane stiffness",
             (K, K_P, C),
             liquid_drop,
+        ),
+        SampleModel(
+            "damper", "bare damper", (replace(C_P, meaning="damper", may_vanish=False),), damper
         ),
         SampleModel("kelvin_voigt", "Kelvin-Voigt solid", (K_P, C_P), kelvin_voigt),
         SampleModel("maxwell", "Maxwell liquid", (K, C), maxwell),
@@ -299,6 +319,7 @@ def model_named(name: str, branches: int = 1) -> SampleModel:
         model,
         parameters=(*springs, K_P, *dampers, C_P),
         exchangeable=(*(damper.name for damper in dampers), "c_p"),
+        branches=tuple((k.name, c.name) for k, c in zip(springs, dampers, strict=True)),
     )
 
 

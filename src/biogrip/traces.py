@@ -22,15 +22,15 @@ class Measurements:
     Parameters
     ----------
     time_s : (n_samples,)
-        Uniform sampling instants.
-    target_rad : (n_samples,)
-        The trace without noise.
+        Sampling instants, ascending.
+    target_rad : (n_samples,) or None
+        The trace without noise; nobody knows it of a recording.
     rotation_rad
         The noisy trace of each seed, (n_samples,) each.
     """
 
     time_s: Array
-    target_rad: Array
+    target_rad: Array | None
     rotation_rad: dict[int, Array]
 
 
@@ -78,8 +78,10 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write noisy traces as Parquet: time_s, target_rad, then seed_0, seed_1, ..."""
-    columns = {"time_s": measurements.time_s, "target_rad": measurements.target_rad}
+    """Write noisy traces as Parquet: time_s, target_rad if known, then seed_0, seed_1, ..."""
+    columns = {"time_s": measurements.time_s}
+    if measurements.target_rad is not None:
+        columns["target_rad"] = measurements.target_rad
     columns |= {f"seed_{seed}": trace for seed, trace in measurements.rotation_rad.items()}
     with written_whole(path) as scratch:
         pq.write_table(pa.table(columns), scratch, use_dictionary=False)
@@ -93,11 +95,13 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     BiogripError
         If the file is missing, damaged, or lacks a seed.
     """
-    wanted = None if seeds is None else ["time_s", "target_rad", *(f"seed_{s}" for s in seeds)]
     try:
+        present = pq.read_schema(path).names
+        kept = [name for name in ("time_s", "target_rad") if name in present]
+        wanted = present if seeds is None else [*kept, *(f"seed_{seed}" for seed in seeds)]
         table = pq.read_table(path, columns=wanted)
-        columns = {name: table[name].to_numpy() for name in wanted or table.column_names}
-        time_s, target = columns.pop("time_s"), columns.pop("target_rad")
+        columns = {name: table[name].to_numpy() for name in wanted}
+        time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
     except (OSError, KeyError, pa.ArrowInvalid) as error:
         raise BiogripError(f"{path}: cannot be read as measurements: {error}.") from error
     traces = {int(name.removeprefix("seed_")): trace for name, trace in columns.items()}

@@ -1,5 +1,6 @@
 """The study that all rules work on."""
 
+import re
 import shlex
 import sys
 from pathlib import Path
@@ -48,6 +49,8 @@ onstart:
     sign_locks(Path(".snakemake"))
 
 
+# Matches no case.
+NONE = "(?!)"
 PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
 PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
@@ -56,6 +59,12 @@ PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
 def calibrations_of(case):
     """The calibration that a case relies on, if it does."""
     return [f"results/calibrations/{case}.yaml"] if PLAN.is_calibrated(case) else []
+
+
+def expectation_of(case):
+    """What the traces of a case should tell, where its truth is known."""
+    known = case in PLAN.simulated
+    return [f"results/identifiability/expected/{case}.json"] if known else []
 
 
 wildcard_constraints:

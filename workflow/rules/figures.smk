@@ -6,24 +6,33 @@ INPUT_FIGURES = {
     "comb": ("actuator", "protocol"),
 }
 FIGURES = [
-    "overview",
     *INPUT_FIGURES,
-    "linearisation",
+    *(["overview", "linearisation"] if PLAN.simulated else []),
     *(
         f"{figure}_{case}"
         for case in CASES
-        for figure in ("convergence", "fit", "evolution")
+        for figure in ("convergence", "fit", "evolution", "profiles")
     ),
+    *(f"{figure}_{case}" for case in PLAN.simulated for figure in ("waterfall", "scatter")),
+    *(f"valley_{case}" for case in CASES if PLAN.has_valley(case)),
 ]
 
 
 rule overview_figure:
     input:
-        identifications=collect("results/identifications/{case}.csv", case=CASES),
-        measurements=PLAN.batch_files(
-            "results/measurements/{case}/{batch}.parquet", CASES[0]
+        identifications=collect(
+            "results/identifications/{case}.csv", case=PLAN.simulated
         ),
-        calibrated=calibrations_of(CASES[0]),
+        measurements=[
+            file
+            for case in PLAN.simulated[:1]
+            for file in PLAN.batch_files(
+                "results/measurements/{case}/{batch}.parquet", case
+            )
+        ],
+        calibrated=[
+            file for case in PLAN.simulated[:1] for file in calibrations_of(case)
+        ],
         code=source_files("biogrip.figures.overview"),
     output:
         png=report(
@@ -154,6 +163,111 @@ rule evolution_figure:
     shell:
         "biogrip figure evolution --settings {params.settings:q} "
         "--inputs {input.identifications:q} {input.history:q} "
+        "--output {output.png:q} 2> {log:q}"
+
+
+rule waterfall_figure:
+    input:
+        identifications="results/identifications/{case}.csv",
+        code=source_files("biogrip.figures.waterfall"),
+    output:
+        png=report(
+            "results/figures/waterfall_{case}.png",
+            caption="../report/waterfall.rst",
+            category="Figures",
+            labels={"case": "{case}", "item": "waterfall", "format": "figure"},
+        ),
+        pdf="results/figures/waterfall_{case}.pdf",
+    log:
+        "results/logs/figures/waterfall_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.waterfall(wildcards.case),
+    message:
+        "Drawing the waterfall of {wildcards.case}"
+    shell:
+        "biogrip figure waterfall --settings {params.settings:q} "
+        "--inputs {input.identifications:q} --output {output.png:q} 2> {log:q}"
+
+
+rule scatter_figure:
+    input:
+        identifications="results/identifications/{case}.csv",
+        target="results/targets/{case}.csv",
+        code=source_files("biogrip.figures.scatter"),
+    output:
+        png=report(
+            "results/figures/scatter_{case}.png",
+            caption="../report/scatter.rst",
+            category="Figures",
+            labels={"case": "{case}", "item": "scatter", "format": "figure"},
+        ),
+        pdf="results/figures/scatter_{case}.pdf",
+    log:
+        "results/logs/figures/scatter_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.scatter(wildcards.case),
+    message:
+        "Drawing the errors over seeds of {wildcards.case}"
+    shell:
+        "biogrip figure scatter --settings {params.settings:q} "
+        "--inputs {input.identifications:q} {input.target:q} "
+        "--output {output.png:q} 2> {log:q}"
+
+
+rule profiles_figure:
+    input:
+        measured="results/identifiability/{case}.json",
+        expected=lambda wildcards: expectation_of(wildcards.case),
+        code=source_files("biogrip.figures.profiles"),
+    output:
+        png=report(
+            "results/figures/profiles_{case}.png",
+            caption="../report/profiles.rst",
+            category="Figures",
+            labels={"case": "{case}", "item": "profiles", "format": "figure"},
+        ),
+        pdf="results/figures/profiles_{case}.pdf",
+    log:
+        "results/logs/figures/profiles_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.profiles(wildcards.case),
+    message:
+        "Drawing the profile likelihoods of {wildcards.case}"
+    shell:
+        "biogrip figure profiles --settings {params.settings:q} "
+        "--inputs {input.measured:q} {input.expected:q} --output {output.png:q} 2> {log:q}"
+
+
+rule valley_figure:
+    input:
+        measured="results/identifiability/{case}.json",
+        identifications="results/identifications/{case}.csv",
+        code=source_files("biogrip.figures.valley"),
+    output:
+        png=report(
+            "results/figures/valley_{case}.png",
+            caption="../report/valley.rst",
+            category="Figures",
+            labels={"case": "{case}", "item": "valley", "format": "figure"},
+        ),
+        pdf="results/figures/valley_{case}.pdf",
+    log:
+        "results/logs/figures/valley_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.valley(wildcards.case),
+    message:
+        "Drawing the valley of {wildcards.case}"
+    shell:
+        "biogrip figure valley --settings {params.settings:q} "
+        "--inputs {input.measured:q} {input.identifications:q} "
         "--output {output.png:q} 2> {log:q}"
 
 

@@ -11,9 +11,11 @@ TABLES = [
     *INPUT_TABLES,
     *(f"errors_{case}" for case in CASES),
     "errors",
-    "evidence",
-    "printed_values",
-    "linearisation",
+    *(f"verdicts_{case}" for case in CASES),
+    "models",
+    *(["methods", "linearisation"] if PLAN.simulated else []),
+    *(["coverage"] if PLAN.covered else []),
+    *(["evidence", "printed_values"] if PUBLISHED_CASES else []),
 ]
 
 
@@ -96,6 +98,153 @@ rule all_errors_table:
     shell:
         "biogrip table all_errors --settings '{{}}' "
         "--inputs {input.tables:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule verdicts_table:
+    input:
+        measured="results/identifiability/{case}.json",
+        expected=lambda wildcards: expectation_of(wildcards.case),
+        code=source_files("biogrip.tables.verdicts"),
+    output:
+        csv="results/tables/verdicts_{case}.csv",
+        text=multiext("results/tables/verdicts_{case}", ".md", ".tex"),
+        html=report(
+            "results/tables/verdicts_{case}.html",
+            caption="../report/verdicts.rst",
+            category="Tables",
+            labels={"case": "{case}", "item": "verdicts", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/verdicts_{case}.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.verdicts(wildcards.case),
+    message:
+        "Writing the verdicts on {wildcards.case}"
+    shell:
+        "biogrip table verdicts --settings {params.settings:q} "
+        "--inputs {input.measured:q} {input.expected:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule models_table:
+    input:
+        fits=[
+            f"results/selection/{case}/{batch.name}.csv"
+            for case in CASES
+            for batch in PLAN.selection_batches(case)
+        ],
+        code=source_files("biogrip.tables.models"),
+    output:
+        csv="results/tables/models.csv",
+        text=multiext("results/tables/models", ".md", ".tex"),
+        html=report(
+            "results/tables/models.html",
+            caption="../report/models.rst",
+            category="Tables",
+            labels={"case": "all", "item": "sample models", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/models.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.models_table(),
+    message:
+        "Counting which sample model is the simplest adequate one"
+    shell:
+        "biogrip table models --settings {params.settings:q} "
+        "--inputs {input.fits:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule methods_table:
+    input:
+        identifications=collect(
+            "results/identifications/{case}.csv", case=PLAN.simulated
+        ),
+        code=source_files("biogrip.tables.methods"),
+    output:
+        csv="results/tables/methods.csv",
+        text=multiext("results/tables/methods", ".md", ".tex"),
+        html=report(
+            "results/tables/methods.html",
+            caption="../report/methods.rst",
+            category="Tables",
+            labels={"case": "all", "item": "methods", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/methods.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.methods(),
+    message:
+        "Comparing the methods"
+    shell:
+        "biogrip table methods --settings {params.settings:q} "
+        "--inputs {input.identifications:q} --output {output.csv:q} 2> {log:q}"
+
+
+rule coverage_table:
+    input:
+        targets=collect("results/targets/{case}.csv", case=PLAN.covered),
+        intervals=[
+            f"results/coverage/{case}/{batch.name}.csv"
+            for case in PLAN.covered
+            for batch in PLAN.coverage_batches(case)
+        ],
+        code=source_files("biogrip.tables.coverage"),
+    output:
+        csv="results/tables/coverage.csv",
+        text=multiext("results/tables/coverage", ".md", ".tex"),
+        html=report(
+            "results/tables/coverage.html",
+            caption="../report/coverage.rst",
+            category="Tables",
+            labels={"case": "all", "item": "coverage", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/coverage.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.coverage_table(),
+    message:
+        "Holding estimates and intervals against truth and bound"
+    shell:
+        "biogrip table coverage --settings {params.settings:q} "
+        "--inputs {input.targets:q} {input.intervals:q} --output {output.csv:q} 2> {log:q}"
+
+
+# Outside tables/, for times are not the same on every machine.
+rule timings_table:
+    input:
+        timings=[
+            file
+            for case in CASES
+            for file in PLAN.batch_files(
+                "results/timings/{case}/{method}/{batch}.csv", case
+            )
+        ],
+        code=source_files("biogrip.tables.timings"),
+    output:
+        csv="results/timings/methods.csv",
+        text=multiext("results/timings/methods", ".md", ".tex"),
+        html=report(
+            "results/timings/methods.html",
+            caption="../report/timings.rst",
+            category="Tables",
+            labels={"case": "all", "item": "processor times", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/timings.log",
+    conda:
+        "../envs/biogrip.yaml"
+    message:
+        "Writing what the methods cost on this machine"
+    shell:
+        "biogrip table timings --settings '{{}}' "
+        "--inputs {input.timings:q} --output {output.csv:q} 2> {log:q}"
 
 
 rule evidence_table:

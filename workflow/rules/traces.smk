@@ -19,6 +19,8 @@ rule target:
 
 
 rule measurement:
+    wildcard_constraints:
+        case="|".join(map(re.escape, PLAN.simulated)) or NONE,
     input:
         target="results/targets/{case}.csv",
         code=source_files("biogrip.stages.measurement"),
@@ -35,6 +37,27 @@ rule measurement:
     shell:
         "biogrip measurement --settings {params.settings:q} --seeds {wildcards.batch} "
         "--target {input.target:q} --output {output:q} 2> {log:q}"
+
+
+rule recording:
+    input:
+        recorded=lambda wildcards: PLAN.recorded_file(wildcards.case),
+        code=source_files("biogrip.stages.recording"),
+    output:
+        "results/measurements/{case}/seeds_0-0.parquet",
+    log:
+        "results/logs/recording/{case}.log",
+    wildcard_constraints:
+        case="|".join(map(re.escape, PLAN.recorded)) or NONE,
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.recording(wildcards.case),
+    message:
+        "Reading the recorded trace of {wildcards.case}"
+    shell:
+        "biogrip recording --settings {params.settings:q} --recorded {input.recorded:q} "
+        "--output {output:q} 2> {log:q}"
 
 
 rule calibration:

@@ -21,13 +21,14 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         Identifications (CSV), then measurements (Parquet) of the case.
     """
     fit = best_fit(settings, inputs[0], inputs[1:])
-    factor, unit = scale_of(fit.target_rad, "rad")
+    factor, unit = scale_of(fit.fitted_rad, "rad")
     drawn = figure(COLUMN_IN, 3.4)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
     traces.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **style)
     traces.plot([], [], ".", color=MEASURED, markersize=4, label="noisy measurement")
-    traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    if fit.target_rad is not None:
+        traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     label = f"best fit (seed {fit.seed}, generation {fit.generations})"
     traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
     traces.set_ylabel(f"closing rotation ({unit})")
@@ -38,7 +39,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     traces.set_title(settings["title"])
     residual = factor * (fit.measured_rad - fit.fitted_rad)
     residuals.plot(fit.time_s, residual, color=MEASURED, **style)
-    residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
+    if fit.target_rad is not None:
+        residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)

@@ -65,7 +65,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
 
 def _fit(axes: Axes, case: dict[str, Any], identifications: Path, others: list[Path]) -> None:
     fit = best_fit(case, identifications, others)
-    factor, unit = scale_of(fit.target_rad, "rad")
+    factor, unit = scale_of(fit.fitted_rad, "rad")
     axes.plot(
         fit.time_s,
         factor * fit.measured_rad,
@@ -75,7 +75,8 @@ def _fit(axes: Axes, case: dict[str, Any], identifications: Path, others: list[P
         rasterized=True,
     )
     axes.plot([], [], ".", color=MEASURED, label="noisy measurement", markersize=4)
-    axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    if fit.target_rad is not None:
+        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label="best fit")
     axes.set_ylim(top=1.55 * factor * fit.measured_rad.max())
     axes.set_xlim(fit.time_s[0], fit.time_s[-1])

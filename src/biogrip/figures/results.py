@@ -11,6 +11,7 @@ from biogrip.arrays import Array
 from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.errors import BiogripError
 from biogrip.identify.identifications import lowest_misfit, read_identifications
+from biogrip.response.nuisance import nuisance_basis, within
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study import build
 from biogrip.study.batches import parse_batch
@@ -25,14 +26,16 @@ class Fit:
     ----------
     seed, generations
         Which one it is and when it stopped.
-    time_s, target_rad, measured_rad, fitted_rad : (n_samples,)
+    time_s, measured_rad, fitted_rad : (n_samples,)
         The traces.
+    target_rad : (n_samples,) or None
+        The trace without noise, unless it was recorded.
     """
 
     seed: int
     generations: int
     time_s: Array
-    target_rad: Array
+    target_rad: Array | None
     measured_rad: Array
     fitted_rad: Array
 
@@ -43,7 +46,8 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     Parameters
     ----------
     settings
-        ``method``, ``model``, ``branches``, ``gripper``, ``protocol``, ``nonlinear``.
+        ``method``, ``model``, ``branches``, ``gripper``, ``protocol``, ``nonlinear``,
+        ``offset``, ``drift``.
     identifications
         Identifications of the case, CSV.
     others
@@ -60,16 +64,19 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     for path in others:
         if path.suffix == ".yaml":
             gripper = read_calibrated_arms(path, gripper)
-    fitted = simulated_rotation(
+    simulated = simulated_rotation(
         gripper, network, torque, recorded.time_s, nonlinear=settings["nonlinear"]
-    )
+    )[0]
+    measured = recorded.rotation_rad[seed]
+    nuisance = nuisance_basis(recorded.time_s, offset=settings["offset"], drift=settings["drift"])
+    fitted = simulated + within(nuisance, measured - simulated)
     return Fit(
         seed,
         int(best["generations"]),
         recorded.time_s,
         recorded.target_rad,
-        recorded.rotation_rad[seed],
-        fitted[0],
+        measured,
+        fitted,
     )
 
 

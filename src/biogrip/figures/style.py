@@ -17,10 +17,18 @@ PAGE_IN = 7.2
 # Okabe and Ito's palette.
 BLACK, GREY = "#000000", "#999999"
 BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
-SKY = "#56B4E9"
+SKY, PURPLE = "#56B4E9", "#CC79A7"
+SHADE = "#DCE6EE"
 
 # What a colour means, everywhere.
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
+
+METHOD_STYLES: dict[str, dict[str, Any]] = {
+    "genetic": {"color": GREY, "linestyle": "-"},
+    "genetic_refined": {"color": ORANGE, "linestyle": "-"},
+    "least_squares": {"color": BLUE, "linestyle": "--"},
+    "differential_evolution": {"color": PURPLE, "linestyle": "-."},
+}
 
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",

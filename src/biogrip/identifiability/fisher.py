@@ -4,7 +4,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import PRIOR_WIDTH
+
+# A share of a sum this small, and whatever uncertainty it has, does not show.
+_NEGLIGIBLE = 1e-2
 
 
 def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
@@ -14,9 +16,11 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     information J J^T / sigma^2: the Cramer-Rao bound, which no unbiased
     estimator undercuts. With noise that changes along the trace it is what
     unweighted least squares comes to, A J diag(sigma^2) J^T A with
-    A = (J J^T)^-1, and no longer a bound. The information of the prior that all
-    local fits have is added; where a parameter has no other, it shows as a
-    standard deviation of that many e-folds.
+    A = (J J^T)^-1, and no longer a bound.
+
+    A parameter that would not be known to within a factor e even if all others
+    were known carries no information. It is taken as known: near zero on a
+    logarithmic scale, a straight line says nothing of it or of what it does to others.
 
     Parameters
     ----------
@@ -28,14 +32,24 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     Returns
     -------
     (n_parameters, n_parameters)
+        Infinite on the diagonal for parameters without information.
     """
     sigma = np.broadcast_to(noise_rad, sensitivity.shape[1])
     scale = float(np.sqrt(np.mean(sigma**2)))
-    prior = np.eye(len(sensitivity)) / PRIOR_WIDTH**2
     relative = sensitivity / scale
-    inverse = np.linalg.inv(relative @ relative.T + prior)
-    scattered = relative * (sigma / scale)
-    return inverse @ (scattered @ scattered.T + prior) @ inverse
+    told = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
+    found = np.diag(np.full(len(sensitivity), np.inf))
+    if len(told) == 0:
+        return found
+    j = relative[told]
+    # Columns of length one, for parameters may differ by decades in what is told of them.
+    length = np.sqrt(np.sum(j**2, axis=1))
+    j = j / length[:, None]
+    inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
+    scattered = j * (sigma / scale)
+    within = inverse @ (scattered @ scattered.T) @ inverse / np.outer(length, length)
+    found[np.ix_(told, told)] = within
+    return found
 
 
 def bound(
@@ -43,4 +57,10 @@ def bound(
 ) -> float:
     """Standard deviation of the logarithm of a quantity, to first order; see `covariance`."""
     slope = q.gradient(log_parameters)
-    return float(np.sqrt(slope @ covariance(sensitivity, noise_rad) @ slope))
+    members = np.abs(slope) > _NEGLIGIBLE
+    if not np.any(members):
+        return float("inf")
+    found = covariance(sensitivity, noise_rad)[np.ix_(members, members)]
+    if np.any(np.isinf(found)):
+        return float("inf")
+    return float(np.sqrt(slope[members] @ found @ slope[members]))

@@ -4,7 +4,7 @@ All are positive, and known through their logarithm as a function of the
 logarithms of the parameters.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -28,6 +28,10 @@ class Quantity:
     form
         ``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of
         reciprocals.
+    branches
+        Spring and damper, by index, of branches that have to relax within the
+        experiment for the quantity to mean anything: the damper of a branch too
+        weak and slow to be seen could be of any size.
     """
 
     label: str
@@ -36,6 +40,7 @@ class Quantity:
     members: tuple[int, ...]
     form: str = "product"
     sign: tuple[int, ...] = (1,)
+    branches: tuple[tuple[int, int], ...] = ()
 
     def log(self, log_parameters: Array) -> float:
         """Logarithm of the quantity, from log-parameters of shape (n_parameters,)."""
@@ -90,7 +95,15 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     together = tuple(
         index for index, p in enumerate(model.parameters) if p.name in model.exchangeable
     )
-    return single + ([_sum(model, together)] if len(together) > 1 else [])
+    if len(together) < 2:
+        return single
+    places = {p.name: index for index, p in enumerate(model.parameters)}
+    branches = tuple(
+        (places[spring], places[damper])
+        for spring, damper in model.branches
+        if spring in places and damper in places
+    )
+    return [*single, replace(_sum(model, together), branches=branches)]
 
 
 def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:

@@ -1,5 +1,6 @@
 """From a starting point down to the optimum it leads to, on log-parameters within bounds."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,16 +52,22 @@ class LocalFit:
     evaluations: int
 
 
+Rows = Callable[[Array], tuple[Array, Array]]
+
+
 class Objective:
-    """Residuals in units of the noise, with the prior and any further rows below them.
+    """Residuals in units of the noise, with the prior and perhaps further rows below them.
 
     Parameters
     ----------
     problem
         What is fitted.
+    held
+        Values, and derivatives by the log-parameters, of rows that hold the fit to something.
     """
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, held: Rows | None = None) -> None:
+        self._held = held
         self._residuals = problem.residuals
         self._middle = 0.5 * (problem.low + problem.high)
         self._last: tuple[Array, Array, Array] | None = None
@@ -72,8 +79,13 @@ class Objective:
             scale = self._residuals.noise_scale_rad
             residual, sensitivity = self._residuals(x)
             prior = np.eye(len(x)) / PRIOR_WIDTH
-            rows = np.concatenate((residual / scale, (x - self._middle) / PRIOR_WIDTH))
-            self._last = x.copy(), rows, np.concatenate((sensitivity.T / scale, prior))
+            rows = [residual / scale, (x - self._middle) / PRIOR_WIDTH]
+            slopes = [sensitivity.T / scale, prior]
+            if self._held is not None:
+                values, derivatives = self._held(x)
+                rows.append(values)
+                slopes.append(derivatives)
+            self._last = x.copy(), np.concatenate(rows), np.concatenate(slopes)
             self.evaluations += 1
         return self._last[1], self._last[2]
 
@@ -90,7 +102,9 @@ class Objective:
         return rms(self.both(x)[0][: self._residuals.samples]) * self._residuals.noise_scale_rad
 
 
-def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalFit:
+def local_fit(
+    problem: Problem, start: Array, tolerance: float = FINE, held: Rows | None = None
+) -> LocalFit:
     """Fit from one starting point with SciPy's bounded trust-region least squares.
 
     Parameters
@@ -101,8 +115,10 @@ def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalF
         Log-parameters; moved into the bounds if need be.
     tolerance
         `ROUGH` or `FINE`.
+    held
+        What the fit is held to, see `Objective`.
     """
-    objective = Objective(problem)
+    objective = Objective(problem, held)
     inside = 1e-9 * (problem.high - problem.low)
     found = least_squares(
         objective.rows,

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identify.answer import History, Identification, Progress
+from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.local_fit import ROUGH, LocalFit, local_fit, settled
 from biogrip.identify.problem import Problem
 
@@ -76,6 +76,12 @@ def _row(found: list[LocalFit], evaluations: int) -> Row:
     best = min(found, key=_rank)
     median = float(np.median([fit.misfit_rad for fit in found]))
     return np.exp(best.log_parameters), best.misfit_rad, median, evaluations
+
+
+def fitted_from(problem: Problem, start: Array) -> Identification:
+    """Fit from a single point, (n_parameters,) log-parameters."""
+    misfit = float(problem.misfit(np.exp(start)[None])[0])
+    return best_of_starts(problem, [start], (np.exp(start), misfit, misfit, 1), silent)
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:

@@ -49,6 +49,7 @@ def problem_of(
     nonlinear: bool = False,
     offset: bool = False,
     drift: bool = False,
+    noise_rad: float | None = None,
 ) -> Problem:
     """Pose the identification of one trace.
 
@@ -63,7 +64,9 @@ def problem_of(
     nonlinear
         Whether to simulate the nonlinear model.
     offset, drift
-        Whether the instrument may have added a constant, and one linear in time.
+        Whether the instrument may have added a constant, and a drift linear in time.
+    noise_rad
+        Standard deviation of the noise, if it is known.
     """
     nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
@@ -72,7 +75,14 @@ def problem_of(
             gripper, model, torque, time_s, rotation_rad, nonlinear=nonlinear, nuisance=nuisance
         ),
         Residuals(
-            gripper, model, torque, time_s, rotation_rad, nonlinear=nonlinear, nuisance=nuisance
+            gripper,
+            model,
+            torque,
+            time_s,
+            rotation_rad,
+            nonlinear=nonlinear,
+            nuisance=nuisance,
+            noise_rad=noise_rad,
         ),
         genome_of(model, ranges),
         np.log([genes.low for genes in chosen]),

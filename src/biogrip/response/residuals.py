@@ -1,5 +1,7 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
+from copy import copy
+
 import numpy as np
 
 from biogrip.arrays import Array
@@ -23,6 +25,8 @@ class Residuals:
         Whether to simulate the nonlinear model.
     nuisance : (n_functions, n_samples)
         Orthonormal functions that the instrument may have added, see `nuisance_basis`.
+    noise_rad
+        Standard deviation of the noise; by default what neighbouring samples suggest.
     """
 
     def __init__(
@@ -35,6 +39,7 @@ class Residuals:
         *,
         nonlinear: bool,
         nuisance: Array,
+        noise_rad: float | None = None,
     ) -> None:
         self._gripper = gripper
         self._model = model
@@ -44,14 +49,23 @@ class Residuals:
         self._nuisance = nuisance
         self._rotation_rad = without(nuisance, rotation_rad)
         self.samples = len(time_s)
-        # What remains of the signal between neighbours is far below this, or there is no noise.
-        jumps = float(np.sqrt(np.mean(np.diff(self._rotation_rad) ** 2) / 2))
-        self.noise_scale_rad = max(jumps, 1e-9 * float(np.max(np.abs(rotation_rad))))
+        self.duration_s = float(time_s[-1])
+        if noise_rad is None:
+            # Between neighbours the signal changes by less than noise, unless there is none.
+            jumps = float(np.sqrt(np.mean(np.diff(self._rotation_rad) ** 2) / 2))
+            noise_rad = max(jumps, 1e-9 * float(np.max(np.abs(rotation_rad))))
+        self.noise_scale_rad = noise_rad
 
     @property
     def free(self) -> int:
         """Degrees of freedom that samples and nuisance leave to parameters and noise."""
         return self.samples - len(self._nuisance)
+
+    def of_model(self, model: SampleModel) -> "Residuals":
+        """Return the same trace for another model."""
+        other = copy(self)
+        other._model = model
+        return other
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
         """Residuals and their derivatives.

@@ -132,8 +132,8 @@ def _in_time(modes: Modes, torque: TorqueHistory, time_s: Array) -> tuple[Array,
         torque.harmonic_time_s, torque.omega_rad_per_s, amplitudes.T, strict=True
     ):
         first = np.searchsorted(time_s, start)
-        swing, slope = _swing(omega, rate, time_s[first:] - start)
-        rows[:, first:] += _mix(modes, a, swing, slope).real
+        swung = _swing(omega, rate, time_s[first:] - start)
+        rows[:, first:] += _mix(modes, a, *swung).real
     return rows[0], rows[1:]
 
 

@@ -9,6 +9,7 @@ from biogrip.errors import BiogripError, nearest
 MODULES = (
     *("overview", "torque", "linkage", "comb"),
     *("convergence", "fit", "evolution", "linearisation"),
+    *("waterfall", "scatter", "profiles", "valley"),
 )
 """Each module draws the figure of its name in its function ``draw``."""
 

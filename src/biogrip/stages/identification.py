@@ -4,9 +4,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.identify.methods import identifier
-from biogrip.identify.problem import problem_of
 from biogrip.identify.records import (
     Record,
     write_histories,
@@ -16,8 +14,7 @@ from biogrip.identify.records import (
 from biogrip.measurement import rms
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
-from biogrip.sample import with_fixed
-from biogrip.study import build
+from biogrip.study.case_problem import case_problem
 from biogrip.traces import read_measurements
 
 
@@ -35,9 +32,8 @@ def run(
     Parameters
     ----------
     settings
-        ``study_seed``, ``case``, ``method``, ``gripper``, ``protocol`` (and
-        ``actuator``, if that is in volts), ``model``, ``branches``, ``nonlinear``,
-        ``offset``, ``drift``, ``fixed``, ``search_range``, and the method's blocks.
+        ``study_seed``, ``case``, ``method``, what `case_problem` needs, and the
+        method's blocks.
     seeds
         The batch.
     measurements
@@ -49,13 +45,8 @@ def run(
     calibrated
         A calibration, YAML, whose arms replace the gripper's.
     """
-    case, method, fixed = settings["case"], settings["method"], settings["fixed"]
-    model = build.sample_model(settings)
-    searched = with_fixed(model, fixed)
-    gripper = build.gripper(settings["gripper"])
-    if calibrated is not None:
-        gripper = read_calibrated_arms(calibrated, gripper)
-    torque, ranges = build.torque(settings), build.gene_ranges(settings["search_range"])
+    case, method = settings["case"], settings["method"]
+    posed = case_problem(settings, calibrated)
     identify = identifier(method, settings)
     recorded = read_measurements(measurements, seeds)
     progress = Progress(f"{case}, {method}", len(seeds))
@@ -63,22 +54,15 @@ def run(
     for seed in seeds:
         trace = recorded.rotation_rad[seed]
         start = time.process_time()
-        problem = problem_of(
-            gripper,
-            searched,
-            torque,
-            recorded.time_s,
-            trace,
-            ranges,
-            nonlinear=settings["nonlinear"],
-            offset=settings["offset"],
-            drift=settings["drift"],
-        )
         rng = stream(settings["study_seed"], case, seed, method)
-        answer = identify(problem, rng, progress.within)
+        answer = identify(posed.of(recorded.time_s, trace), rng, progress.within)
         cpu_s = time.process_time() - start
         noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
-        records.append(Record(case, method, seed, model, searched, fixed, answer, noise, cpu_s))
+        records.append(
+            Record(
+                case, method, seed, posed.model, posed.searched, posed.fixed, answer, noise, cpu_s
+            )
+        )
         progress.done()
     write_identifications(output, records)
     write_histories(history, records)

@@ -17,6 +17,11 @@ MODULES = {
     "printed_values": "printed_values",
     "linearisation": "linearisation",
     "contact": "contact",
+    "methods": "methods",
+    "timings": "timings",
+    "verdicts": "verdicts",
+    "coverage": "coverage",
+    "models": "models",
 }
 """The module that makes each table, in a function of the table's name."""
 

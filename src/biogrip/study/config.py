@@ -14,6 +14,7 @@ from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
 STAGE_FOLDERS = (
     *("targets", "measurements", "calibrations", "identifications", "histories", "timings"),
+    *("identifiability", "coverage", "selection"),
     *("tables", "figures", "logs"),
 )
 
@@ -29,7 +30,7 @@ class Case:
     model
         Constitutive model.
     parameters
-        True values by name, SI units.
+        True values by name, SI units; nobody knows them of a recorded trace.
     blocks
         The case's own version of every block of `OVERRIDABLE`, as in the config.
     branches
@@ -55,6 +56,11 @@ class Case:
     fixed: dict[str, float]
     assumed_gripper: str | dict[str, Any]
     published: dict[str, Any]
+
+    @property
+    def recorded(self) -> bool:
+        """Whether its trace was recorded, not simulated."""
+        return "file" in self.blocks["measurement"]
 
 
 @dataclass(frozen=True)
@@ -151,7 +157,7 @@ def _case(name: str, block: dict[str, Any]) -> Case:
         name=name,
         title=block.get("title", name),
         model=model,
-        parameters={symbol: float(sample[symbol]) for symbol in model.names},
+        parameters={symbol: float(sample[symbol]) for symbol in model.names if symbol in sample},
         blocks={key: block[key] for key in OVERRIDABLE},
         branches=sample.get("branches", 1),
         size_m=sample.get("size_m"),

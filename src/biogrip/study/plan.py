@@ -29,8 +29,24 @@ class Plan:
 
     def batches(self, case: str, method: str) -> list[Batch]:
         """Batches of seeds of a case and method, those with results kept."""
-        folder = self.results / "identifications" / case / method
-        return plan_batches(self.study.seeds, self.study.batch_size, existing_batches(folder))
+        return self._batches(self.seeds(case), "identifications", case, method)
+
+    def coverage_batches(self, case: str) -> list[Batch]:
+        """Batches of the seeds that intervals are tested with."""
+        seeds = self._case(case).blocks["identifiability"]["coverage_seeds"]
+        return self._batches(seeds, "coverage", case)
+
+    def selection_batches(self, case: str) -> list[Batch]:
+        """Batches of the seeds that sample models are compared on."""
+        return self._batches(self.seeds(case), "selection", case)
+
+    def seeds(self, case: str) -> int:
+        """Number of traces of a case; of a recorded one there is one."""
+        return 1 if self._case(case).recorded else self.study.seeds
+
+    def _batches(self, seeds: int, *folder: str) -> list[Batch]:
+        existing = existing_batches(self.results.joinpath(*folder))
+        return plan_batches(seeds, self.study.batch_size, existing)
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
         """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case.
@@ -43,6 +59,10 @@ class Plan:
             for method in methods
             for batch in self.batches(case, method)
         ]
+
+    def first_batch(self, pattern: str, case: str) -> str:
+        """Fill ``{case}`` and ``{batch}`` of a path for the batch of the first seed."""
+        return self.batch_files(pattern, case)[0]
 
     @property
     def shown(self) -> str:
@@ -85,28 +105,46 @@ class Plan:
         """Whether the identification of a case takes its gripper from a calibration."""
         return self._case(case).assumed_gripper == "calibrated"
 
+    def recording(self, case: str) -> str:
+        """Settings of the recording stage."""
+        c = self._case(case)
+        keys = ("time", "rotation", "time_unit", "rotation_unit", "noise_rad", "offset", "drift")
+        measurement = c.blocks["measurement"]
+        return _json(
+            gripper=self._gripper(c),
+            measurement={key: measurement[key] for key in keys if key in measurement},
+            **self._driving(c.blocks["protocol"]),
+        )
+
     def identification(self, case: str, method: str) -> str:
         """Settings of the identification stage."""
+        return _json(**self._identified(self._case(case), method), method=method)
+
+    def identifiability(self, case: str) -> str:
+        """Settings of the identifiability stage, on a case's trace."""
+        return _json(**self._judged(self._case(case)))
+
+    def expected(self, case: str) -> str:
+        """Settings of the identifiability stage, on a case's target."""
         c = self._case(case)
-        return _json(
-            **self._simulation(c),
-            study_seed=self.study.config["study_seed"],
-            case=case,
-            gripper=self._assumed_gripper(c),
-            nonlinear=c.blocks["models"]["identification"] == "nonlinear",
-            offset=False,
-            drift=False,
-            fixed=c.fixed,
-            search_range=c.blocks["search_range"],
-            method=method,
-            **{block: c.blocks[block] for block in METHODS[method].blocks},
-        )
+        noise = c.blocks["measurement"]["noise"]
+        return _json(**self._judged(c), parameters=c.parameters, noise=noise)
+
+    def coverage(self, case: str) -> str:
+        """Settings of the coverage stage."""
+        c = self._case(case)
+        return _json(**self._judged(c), noise=c.blocks["measurement"]["noise"])
+
+    def selection(self, case: str) -> str:
+        """Settings of the selection stage."""
+        models = self.study.config["model_selection"]["models"]
+        return _json(**self._identified(self._case(case), "least_squares"), models=models)
 
     def collection(self, case: str) -> str:
         """Settings of the collection stage."""
         c = self._case(case)
         return _json(
-            seeds=self.study.seeds,
+            seeds=self.seeds(case),
             methods=self.study.methods,
             model=c.model.name,
             branches=c.branches,
@@ -135,11 +173,95 @@ class Plan:
         """Settings of the figure of the parameters' evolution."""
         return _json(method=self.shown, **self._truth(self._case(case)))
 
+    def methods(self) -> str:
+        """Settings of the comparison of methods."""
+        cases = {
+            name: {**self._truth(self._case(name)), "samples": self._samples(name)}
+            for name in self.simulated
+        }
+        return json.dumps({"cases": cases, **self.study.config["evaluation"]})
+
+    def waterfall(self, case: str) -> str:
+        """Settings of the waterfall of a case."""
+        c = self._case(case)
+        return _json(title=c.title, samples=self._samples(case), **self.study.config["evaluation"])
+
+    def scatter(self, case: str) -> str:
+        """Settings of the figure of a case's errors over seeds."""
+        c = self._case(case)
+        noise = c.blocks["measurement"]["noise"]
+        return _json(**{**self._posed(c), **self._truth(c)}, noise=noise)
+
+    def profiles(self, case: str) -> str:
+        """Settings of the figure of a case's profile likelihoods."""
+        c = self._case(case)
+        return _json(title=c.title, parameters=c.parameters)
+
+    def has_valley(self, case: str) -> bool:
+        """Whether two exchangeable parameters of a case are searched, among others."""
+        c = self._case(case)
+        pair = [name for name in c.model.exchangeable if name not in c.fixed]
+        return len(pair) == 2 and len(c.model.names) - len(c.fixed) > 2
+
+    def valley(self, case: str) -> str:
+        """Settings of the figure of a case's valley."""
+        c = self._case(case)
+        methods = self.study.methods
+        method = "least_squares" if "least_squares" in methods else self.shown
+        return _json(title=c.title, method=method, parameters=c.parameters, published=c.published)
+
+    def verdicts(self, case: str) -> str:
+        """Settings of the table of verdicts on a case."""
+        c = self._case(case)
+        return _json(case=case, title=c.title, parameters=c.parameters)
+
+    def coverage_table(self) -> str:
+        """Settings of the table of coverage."""
+        cases = {}
+        for name in self.covered:
+            c = self._case(name)
+            cases[name] = {
+                **self._posed(c),
+                "parameters": c.parameters,
+                "noise": c.blocks["measurement"]["noise"],
+                "seeds": c.blocks["identifiability"]["coverage_seeds"],
+            }
+        return json.dumps({"cases": cases})
+
+    def models_table(self) -> str:
+        """Settings of the table of sample models."""
+        cases = {name: case.model.name for name, case in self.study.cases.items()}
+        return json.dumps({"cases": cases})
+
+    @property
+    def simulated(self) -> list[str]:
+        """Cases with a target."""
+        return [name for name, case in self.study.cases.items() if not case.recorded]
+
+    @property
+    def recorded(self) -> list[str]:
+        """Cases whose trace was recorded."""
+        return [name for name, case in self.study.cases.items() if case.recorded]
+
+    def recorded_file(self, case: str) -> str:
+        """Return the user's file of a recorded case."""
+        return str(self._case(case).blocks["measurement"]["file"])
+
+    @property
+    def covered(self) -> list[str]:
+        """Simulated cases whose intervals are tested."""
+        return [
+            name
+            for name in self.simulated
+            if self._case(name).blocks["identifiability"]["coverage_seeds"] > 0
+        ]
+
     def overview(self) -> str:
         """Settings of the overview figure."""
         cases = {
             name: {**self._fit(case), **self._truth(case)}
             for name, case in self.study.cases.items()
+            if not case.recorded
         }
         return json.dumps(
             {
@@ -157,6 +279,7 @@ class Plan:
         cases = {
             name: {**self._truth(case), "gripper": self._gripper(case)}
             for name, case in self.study.cases.items()
+            if not case.recorded
         }
         return json.dumps({"cases": cases, **self._driving(self.study.config["protocol"])})
 
@@ -188,13 +311,40 @@ class Plan:
         }
 
     def _fit(self, case: Case) -> dict[str, Any]:
+        return {**self._posed(case), "method": self.shown, "title": case.title}
+
+    def _identified(self, case: Case, method: str) -> dict[str, Any]:
+        """What an identification needs, with a method's blocks."""
+        return {
+            **self._posed(case),
+            "study_seed": self.study.config["study_seed"],
+            "case": case.name,
+            **{block: case.blocks[block] for block in METHODS[method].blocks},
+        }
+
+    def _judged(self, case: Case) -> dict[str, Any]:
+        confidence = case.blocks["identifiability"]["confidence"]
+        return {**self._identified(case, "least_squares"), "confidence": confidence}
+
+    def _posed(self, case: Case) -> dict[str, Any]:
+        """What the identification of a case assumes, see `case_problem`."""
+        measurement = case.blocks["measurement"]
         return {
             **self._simulation(case),
-            "method": self.shown,
-            "title": case.title,
             "gripper": self._assumed_gripper(case),
             "nonlinear": case.blocks["models"]["identification"] == "nonlinear",
+            "offset": measurement.get("offset", False),
+            "drift": measurement.get("drift", False),
+            "noise_rad": measurement.get("noise_rad"),
+            "fixed": case.fixed,
+            "search_range": case.blocks["search_range"],
         }
+
+    def _samples(self, name: str) -> int:
+        """Samples in each trace of a simulated case."""
+        c = self._case(name)
+        torque = build.torque(self._driving(c.blocks["protocol"]))
+        return len(build.sampling(c.blocks["measurement"], torque.end_s))
 
     def _simulation(self, case: Case) -> dict[str, Any]:
         """What every simulation of a case needs, but for the gripper."""

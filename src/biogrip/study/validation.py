@@ -22,7 +22,7 @@ from biogrip.study.source import ConfigFiles, KeyPath
 OVERRIDABLE = (
     *("gripper", "protocol", "measurement", "search_range"),
     *("genetic_algorithm", "genetic_refined", "least_squares", "differential_evolution"),
-    *("models", "calibration"),
+    *("models", "calibration", "identifiability"),
 )
 """Blocks that hold for all cases, and that a case may change for itself."""
 
@@ -49,6 +49,8 @@ def schema() -> dict[str, Any]:
     sample["model"]["enum"] = list(MODELS)
     sample["branches"]["maximum"] = MOST_BRANCHES
     loaded["properties"]["methods"]["items"]["enum"] = list(METHODS)
+    selection = loaded["properties"]["model_selection"]["properties"]
+    selection["models"]["items"]["enum"] = list(MODELS)
     return loaded
 
 
@@ -148,7 +150,12 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
                 text = "a letter, then up to 63 letters, digits, '_' or '-' (it names files)."
                 yield (*path, found), f"not a usable case name: {text}"
         case "type":
-            words = {"object": "a block of keys", "array": "a list", "string": "text"}
+            words = {
+                "object": "a block of keys",
+                "array": "a list",
+                "string": "text",
+                "boolean": "true or false",
+            }
             kinds = [limit] if isinstance(limit, str) else limit
             article = "an" if limit == "integer" else "a"
             wanted = " or ".join(words.get(kind, f"{article} {kind}") for kind in kinds)

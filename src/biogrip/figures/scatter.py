@@ -1,0 +1,139 @@
+"""Errors over seeds as distributions, beside the Cramer-Rao bound and the paper's value."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from biogrip.arrays import Array
+from biogrip.figures.style import (
+    METHOD_STYLES,
+    PAGE_IN,
+    PAPER,
+    SHADE,
+    TARGET,
+    figure,
+    panel,
+)
+from biogrip.identifiability.fisher import bound
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identify.identifications import read_identifications
+from biogrip.identify.methods import METHODS
+from biogrip.measurement import Noise, noise_deviation
+from biogrip.study.case_problem import case_problem
+from biogrip.traces import read_target
+
+# Beyond this bound (of a logarithm) an axis covers decades, not percents.
+_LOOSE = 0.25
+_WIDTHS = 8.0
+_DECADES = 1e4
+
+
+def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
+    """Draw identified over target for every quantity and method.
+
+    Parameters
+    ----------
+    settings
+        What `case_problem` needs; ``title``, ``parameters``, ``noise``, ``published``.
+    inputs
+        Identifications of the case, CSV, and its target, CSV.
+    """
+    found = read_identifications(inputs[0])
+    posed = case_problem(settings)
+    time_s, _, rotation = read_target(inputs[1])
+    log_truth = posed.logs(settings["parameters"])
+    _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
+    noise_rad = noise_deviation(rotation, Noise(**settings["noise"]))
+    quantities = parameters_and_sum(posed.searched)
+    drawn = figure(PAGE_IN, 3.1)
+    grid = drawn.subplots(1, len(quantities), squeeze=False)[0]
+    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
+        names = [posed.searched.parameters[i] for i in quantity.members]
+        target = sum(settings["parameters"][p.name] for p in names)
+        if target == 0:
+            axes.axis("off")
+            continue
+        ratios = found[[p.column for p in names]].sum(axis=1) / target
+        limit = bound(sensitivity, noise_rad, log_truth, quantity)
+        _quantity(axes, found["method"], ratios.to_numpy(float), limit)
+        _paper(axes, settings["published"], [p.name for p in names], target)
+        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, limit), 60)
+        if index == 0:
+            axes.set_ylabel("identified / target")
+    _legend(drawn, settings, list(found["method"].unique()))
+    return drawn
+
+
+def _quantity(axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float) -> None:
+    """One column of points a method; what lies beyond the axis stands on its edge."""
+    loose = limit > _LOOSE
+    top = _DECADES if loose else 1 + _WIDTHS * limit
+    bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
+    names = list(methods.unique())
+    for place, name in enumerate(names):
+        mine = ratios[(methods == name).to_numpy()]
+        # A fixed sideways scatter keeps points apart.
+        x = place + 0.6 * ((np.arange(len(mine)) * 0.618034) % 1 - 0.5)
+        style = METHOD_STYLES[name]
+        inside = (mine > bottom) & (mine < top)
+        dots: dict[str, Any] = {
+            "color": style["color"],
+            "linestyle": "",
+            "markeredgewidth": 0,
+            "alpha": 0.55,
+        }
+        axes.plot(x[inside], mine[inside], marker="o", markersize=2, **dots)
+        for outside, marker, edge in ((mine >= top, "^", top), (mine <= bottom, "v", bottom)):
+            height = np.full(int(outside.sum()), edge)
+            (line,) = axes.plot(
+                x[outside], height, marker=marker, markersize=3, clip_on=False, **dots
+            )
+            line.set_in_layout(False)
+        low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
+        axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
+        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
+    if not loose:
+        axes.axhspan(1 - 1.96 * limit, 1 + 1.96 * limit, color=SHADE, zorder=0, linewidth=0)
+    axes.axhline(1, color=TARGET, linewidth=0.6)
+    if loose:
+        axes.set_yscale("log")
+        axes.set_yticks([1e-4, 1e-2, 1, 1e2, 1e4])
+        axes.minorticks_off()
+    else:
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.set_ylim(bottom, top)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_xticks([])
+
+
+def _paper(axes: Axes, published: dict[str, Any], names: list[str], target: float) -> None:
+    identified = published.get("identified", {})
+    if all(name in identified for name in names):
+        low, high = axes.get_ylim()
+        value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
+        axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
+
+
+def _title(quantity: Quantity, limit: float) -> str:
+    known = f"{100 * limit:.2g} %" if limit < 1 else "none"
+    return f"{quantity.symbol}, bound {known}"
+
+
+def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str]) -> None:
+    handles: list[Any] = []
+    axes = drawn.axes[0]
+    for name in methods:
+        color = METHOD_STYLES[name]["color"]
+        handles += axes.plot(
+            [], [], "o", color=color, markersize=4, label=METHODS[name].title, markeredgewidth=0
+        )
+    handles.append(axes.fill([], [], color=SHADE, label="95 % by the Cramér-Rao bound")[0])
+    if settings["published"]:
+        handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
+    drawn.legend(handles=handles, loc="outside lower left", ncols=3)
+    drawn.suptitle(settings["title"], x=0.01, ha="left", fontsize=8)

@@ -1,0 +1,91 @@
+"""Everything that one trace tells: the best fit, a verdict on every quantity, and what to doubt."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
+from biogrip.identify.answer import Identification
+from biogrip.identify.problem import Problem
+from biogrip.sample import SampleModel
+
+# A misfit that exceeds what neighbouring samples scatter by so much is not noise.
+_TOO_MUCH = 1.2
+# Correlation of neighbouring residuals, in standard deviations of that of white noise.
+_CORRELATED = 5.0
+# A residual so far below the noise is that of a trace without noise.
+_NOISE_FREE = 0.01
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What a trace tells about its sample.
+
+    Parameters
+    ----------
+    likelihood
+        Best fit and noise.
+    findings
+        A verdict on every parameter and on the sum of the exchangeable ones.
+    trades
+        Parameters of which only a combination is determined.
+    notes
+        What should be doubted, in sentences.
+    """
+
+    likelihood: Likelihood
+    findings: list[Finding]
+    trades: list[Trade]
+    notes: list[str]
+
+
+def diagnose(
+    problem: Problem,
+    model: SampleModel,
+    found: Identification,
+    *,
+    confidence: float,
+    noise_rad: float | None = None,
+) -> Diagnosis:
+    """Judge what is identified from one trace.
+
+    Parameters
+    ----------
+    problem, model
+        The trace, and the model whose parameters were searched.
+    found
+        Its global optimum.
+    confidence
+        Of the limits, e.g. 0.95.
+    noise_rad
+        Standard deviation of the noise, if it is known; else that of the residual.
+    """
+    best = np.log(found.parameters)
+    likelihood = likelihood_of(
+        problem, best, found.misfit_rad, confidence=confidence, noise_rad=noise_rad
+    )
+    findings = findings_of(likelihood, model)
+    trades = trades_of(likelihood, model, findings)
+    return Diagnosis(likelihood, findings, trades, _notes(likelihood, found.misfit_rad))
+
+
+def _notes(likelihood: Likelihood, misfit_rad: float) -> list[str]:
+    residual, _ = likelihood.problem.residuals(likelihood.best)
+    if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
+        return []
+    notes = []
+    correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
+    if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
+        notes.append(
+            f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
+            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the model, "
+            "the protocol or the gripper is not the right one."
+        )
+    scale = likelihood.problem.residuals.noise_scale_rad
+    if misfit_rad > _TOO_MUCH * scale:
+        notes.append(
+            f"The misfit is {misfit_rad / scale:.2g} times the noise of the trace: the model, the "
+            "protocol, the gripper or the unit is not the right one."
+        )
+    return notes

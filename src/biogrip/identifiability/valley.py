@@ -1,0 +1,82 @@
+"""The valley in which a damper of a branch and the parallel damper trade against each other."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.document import rounded
+from biogrip.identifiability.profile import Likelihood
+from biogrip.identify.local_fit import local_fit
+from biogrip.sample import SampleModel, with_fixed
+
+# Shares of the first in the sum, and sums over the best sum: fine where the valley is.
+_SHARES = np.linspace(0.002, 0.998, 25)
+_BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
+_SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
+
+
+def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | None:
+    """Rise of chi^2 over two exchangeable parameters, the others fitted at every point.
+
+    Parameters
+    ----------
+    likelihood
+        Best fit and noise.
+    model
+        The model whose parameters were searched.
+
+    Returns
+    -------
+    dict or None
+        ``x`` and ``y``, names and units; and on a grid that follows the valley
+        ``x_values``, ``y_values`` and ``rises``, nested lists (n_sums, n_shares).
+        None unless exactly two exchangeable parameters were searched, among others.
+    """
+    pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
+    if len(pair) != 2 or len(model.parameters) == 2:
+        return None
+    best = np.exp(likelihood.best[pair])
+    sums = best.sum() * _SUMS[:, None]
+    x_values, y_values = sums * _SHARES, sums * (1 - _SHARES)
+    rises = np.empty_like(x_values)
+    start = np.delete(likelihood.best, pair)
+    for i in range(len(rises)):
+        # Back and forth, so that each point starts from a neighbour's fit.
+        for j in range(rises.shape[1])[:: 1 if i % 2 else -1]:
+            here = (float(x_values[i, j]), float(y_values[i, j]))
+            rises[i, j], start = _rest_fitted(likelihood, model, pair, here, start)
+    x, y = (model.parameters[index] for index in pair)
+    return {
+        "x": {"name": x.name, "symbol": x.symbol, "unit": x.unit},
+        "y": {"name": y.name, "symbol": y.symbol, "unit": y.unit},
+        "x_values": _listed(x_values),
+        "y_values": _listed(y_values),
+        "rises": _listed(rises),
+        "best": [rounded(float(value)) for value in best],
+    }
+
+
+def _listed(values: Array) -> list[list[float | None]]:
+    return [[rounded(float(value)) for value in row] for row in values]
+
+
+def _rest_fitted(
+    likelihood: Likelihood,
+    model: SampleModel,
+    pair: list[int],
+    values: tuple[float, float],
+    start: Array,
+) -> tuple[float, Array]:
+    problem = likelihood.problem
+    fixed = {model.parameters[i].name: value for i, value in zip(pair, values, strict=True)}
+    rest = replace(
+        problem,
+        residuals=problem.residuals.of_model(with_fixed(model, fixed)),
+        low=np.delete(problem.low, pair),
+        high=np.delete(problem.high, pair),
+    )
+    starts = (start, np.delete(likelihood.best, pair))
+    found = min((local_fit(rest, x) for x in starts), key=lambda fit: fit.misfit_rad)
+    return likelihood.rise(found.misfit_rad), found.log_parameters

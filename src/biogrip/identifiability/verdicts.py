@@ -1,0 +1,138 @@
+"""What a trace says about every parameter, in words that can be relied on."""
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from biogrip.identifiability.profile import Likelihood, Profile, profile
+from biogrip.identifiability.quantities import (
+    Quantity,
+    combinations_of,
+    parameters_and_sum,
+)
+from biogrip.sample import SampleModel
+
+DETERMINED = "determined"
+BOUNDED_BELOW = "bounded below"
+BOUNDED_ABOVE = "bounded above"
+NOT_DETERMINED = "not determined"
+
+# A combination of parameters that are not determined is looked at if, near the
+# optimum, it is known to better than this (standard deviation of its logarithm).
+_WORTH_A_LOOK = 0.5
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A quantity, its profile, and the verdict on it.
+
+    Parameters
+    ----------
+    quantity, profile
+        Which one, and how chi^2 rises away from the optimum.
+    deviation
+        Standard deviation of its logarithm to first order (Cramer-Rao), at most 1.
+    """
+
+    quantity: Quantity
+    profile: Profile
+    deviation: float
+
+    @property
+    def verdict(self) -> str:
+        """One of the four verdicts."""
+        below, above = self.profile.low is not None, self.profile.high is not None
+        if below and above:
+            return DETERMINED
+        if below:
+            return BOUNDED_BELOW
+        return BOUNDED_ABOVE if above else NOT_DETERMINED
+
+    @property
+    def value(self) -> float:
+        """Best estimate in SI units; means little unless the quantity is determined."""
+        return math.exp(self.profile.best)
+
+    @property
+    def low(self) -> float | None:
+        """Lower confidence limit in SI units."""
+        return None if self.profile.low is None else math.exp(self.profile.low)
+
+    @property
+    def high(self) -> float | None:
+        """Upper confidence limit in SI units."""
+        return None if self.profile.high is None else math.exp(self.profile.high)
+
+    def words(self) -> str:
+        """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        unit = self.quantity.unit
+        if self.verdict == DETERMINED:
+            return f"determined: {self.value:.3g} {unit} ({self.low:.3g} to {self.high:.3g})"
+        if self.verdict == BOUNDED_BELOW:
+            return f"only bounded below: at least {self.low:.2g} {unit}"
+        if self.verdict == BOUNDED_ABOVE:
+            return f"only bounded above: at most {self.high:.2g} {unit}"
+        return "not determined: the trace fits with any value"
+
+
+@dataclass(frozen=True)
+class Trade:
+    """Parameters of which only a combination is determined.
+
+    Parameters
+    ----------
+    members
+        Names of parameters that can be exchanged against each other.
+    finding
+        The combination that is determined.
+    """
+
+    members: tuple[str, ...]
+    finding: Finding
+
+    def words(self) -> str:
+        """Return the trade as a sentence."""
+        names = " and ".join(self.members)
+        what = self.finding.words().removeprefix("determined: ")
+        return (
+            f"{names} trade against each other; determined is {self.finding.quantity.label}: {what}"
+        )
+
+
+def findings_of(likelihood: Likelihood, model: SampleModel) -> list[Finding]:
+    """Judge every parameter, and the sum of those that the model calls exchangeable."""
+    return [_finding(likelihood, quantity) for quantity in parameters_and_sum(model)]
+
+
+def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding]) -> list[Trade]:
+    """Find determined combinations of parameters that are not determined themselves."""
+    open_ones = [
+        finding.quantity.members[0]
+        for finding in findings
+        if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
+    ]
+    trades = []
+    for finding in findings:
+        members = [index for index in finding.quantity.members if index in open_ones]
+        if len(finding.quantity.members) > 1 and len(members) > 1:
+            if finding.verdict == DETERMINED:
+                trades.append(_trade(model, members, finding))
+            open_ones = [index for index in open_ones if index not in members]
+    for pair in combinations(open_ones, 2):
+        candidates = combinations_of(model, list(pair))
+        deviations = [likelihood.deviation(quantity) for quantity in candidates]
+        if min(deviations) < _WORTH_A_LOOK:
+            finding = _finding(likelihood, candidates[int(np.argmin(deviations))])
+            if finding.verdict == DETERMINED:
+                trades.append(_trade(model, list(pair), finding))
+    return trades
+
+
+def _trade(model: SampleModel, members: list[int], finding: Finding) -> Trade:
+    return Trade(tuple(model.parameters[index].name for index in members), finding)
+
+
+def _finding(likelihood: Likelihood, quantity: Quantity) -> Finding:
+    return Finding(quantity, profile(likelihood, quantity), likelihood.deviation(quantity))
