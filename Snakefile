@@ -14,6 +14,7 @@ include: "workflow/rules/identification.smk"
 include: "workflow/rules/identifiability.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/summaries.smk"
 include: "workflow/rules/check.smk"
 
 
@@ -24,6 +25,7 @@ rule all:
         identifications=collect("results/identifications/{case}.csv", case=CASES),
         tables=collect("results/tables/{table}.csv", table=TABLES),
         timings="results/timings/methods.csv",
+        summaries=collect("results/summaries/{case}.html", case=CASES),
         figures=collect("results/figures/{figure}.png", figure=FIGURES),
 
 

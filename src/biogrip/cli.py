@@ -1,4 +1,4 @@
-"""The ``biogrip`` command: one subcommand per stage, the same that the workflow calls."""
+"""The ``biogrip`` command: one subcommand per stage, as the workflow calls them, and `identify`."""
 
 import argparse
 import json
@@ -39,6 +39,13 @@ def _parser() -> argparse.ArgumentParser:
     _seeds(measurement)
     _inputs(measurement, "target")
     _outputs(measurement, "output")
+
+    text = "write one noisy trace as CSV"
+    export = stages.add_parser("export", help=text, description=text)
+    export.set_defaults(command=_export)
+    export.add_argument("--seed", type=int, required=True, help="which trace")
+    _inputs(export, "measurements")
+    _outputs(export, "output")
 
     calibration = _stage(
         stages, "calibration", _calibration, "calibrate a gripper without a sample"
@@ -100,6 +107,13 @@ def _parser() -> argparse.ArgumentParser:
     _inputs(figure, "inputs", many=True)
     _outputs(figure, "output")
 
+    summary = _stage(stages, "summary", _summary, "write what a trace tells on one page")
+    _inputs(summary, "verdicts")
+    _inputs(summary, "figures", many=True)
+    _outputs(summary, "output")
+
+    _identify_parser(stages)
+
     compare = stages.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
     compare.add_argument("published", type=Path, help="folder of published tables")
@@ -109,6 +123,29 @@ def _parser() -> argparse.ArgumentParser:
     reference.set_defaults(command=_reference)
     reference.add_argument("config", type=Path, help="YAML file that gives the defaults")
     return parser
+
+
+def _identify_parser(stages: Any) -> None:
+    text = "identify the sample in a recorded trace, without a workflow"
+    identify = stages.add_parser("identify", help=text, description=text)
+    identify.set_defaults(command=_identify)
+    identify.add_argument("trace", type=Path, help="CSV file with a header")
+    identify.add_argument("--time", default="time_s", help="column of times [%(default)s]")
+    identify.add_argument(
+        "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
+    )
+    identify.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
+    identify.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    identify.add_argument(
+        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
+    )
+    identify.add_argument(
+        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
+    )
+    identify.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
+    identify.add_argument("--offset", action="store_true", help="fit an offset along")
+    identify.add_argument("--drift", action="store_true", help="fit a linear drift along")
+    identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
 
 
 def _stage(stages: Any, name: str, command: Any, text: str) -> argparse.ArgumentParser:
@@ -166,6 +203,12 @@ def _measurement(options: argparse.Namespace) -> None:
     from biogrip.stages import measurement
 
     measurement.run(options.settings, _batch(options.seeds), options.target, options.output)
+
+
+def _export(options: argparse.Namespace) -> None:
+    from biogrip.stages import export
+
+    export.run(options.seed, options.measurements, options.output)
 
 
 def _calibration(options: argparse.Namespace) -> None:
@@ -259,6 +302,31 @@ def _figure(options: argparse.Namespace) -> None:
     from biogrip.stages import figure
 
     figure.run(options.name, options.settings, options.inputs, options.output)
+
+
+def _summary(options: argparse.Namespace) -> None:
+    from biogrip import summary
+
+    summary.run(options.settings, options.verdicts, options.figures, options.output)
+
+
+def _identify(options: argparse.Namespace) -> None:
+    from biogrip.study.one_trace import Wanted, identify_trace, in_words
+
+    output = options.output or options.trace.with_suffix(".identified.json")
+    measurement = {
+        "time": options.time,
+        "rotation": options.rotation,
+        "time_unit": options.time_unit,
+        "rotation_unit": options.rotation_unit,
+        "noise_rad": options.noise,
+        "offset": options.offset,
+        "drift": options.drift,
+    }
+    given = {key: value for key, value in measurement.items() if value is not None}
+    found = identify_trace(Wanted(options.trace, options.model, given, options.config), output)
+    print(in_words(found))
+    print(f"Written to {output}.")
 
 
 def _compare(options: argparse.Namespace) -> None:

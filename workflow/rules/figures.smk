@@ -13,7 +13,11 @@ FIGURES = [
         for case in CASES
         for figure in ("convergence", "fit", "evolution", "profiles")
     ),
-    *(f"{figure}_{case}" for case in PLAN.simulated for figure in ("waterfall", "scatter")),
+    *(
+        f"{figure}_{case}"
+        for case in PLAN.simulated
+        for figure in ("waterfall", "scatter")
+    ),
     *(f"valley_{case}" for case in CASES if PLAN.has_valley(case)),
 ]
 

@@ -3,8 +3,8 @@
 
 rule identifiability:
     input:
-        measurements=lambda wildcards: PLAN.first_batch(
-            "results/measurements/{case}/{batch}.parquet", wildcards.case
+        measurements=lambda wildcards: PLAN.batch_of_seed(
+            "results/measurements/{case}/{batch}.parquet", wildcards.case, 0
         ),
         calibrated=lambda wildcards: calibrations_of(wildcards.case),
         code=source_files(

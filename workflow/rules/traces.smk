@@ -19,8 +19,6 @@ rule target:
 
 
 rule measurement:
-    wildcard_constraints:
-        case="|".join(map(re.escape, PLAN.simulated)) or NONE,
     input:
         target="results/targets/{case}.csv",
         code=source_files("biogrip.stages.measurement"),
@@ -28,6 +26,8 @@ rule measurement:
         "results/measurements/{case}/{batch}.parquet",
     log:
         "results/logs/measurement/{case}/{batch}.log",
+    wildcard_constraints:
+        case="|".join(map(re.escape, PLAN.simulated)) or NONE,
     conda:
         "../envs/biogrip.yaml"
     params:
@@ -57,6 +57,29 @@ rule recording:
         "Reading the recorded trace of {wildcards.case}"
     shell:
         "biogrip recording --settings {params.settings:q} --recorded {input.recorded:q} "
+        "--output {output:q} 2> {log:q}"
+
+
+rule export:
+    input:
+        measurements=lambda wildcards: PLAN.batch_of_seed(
+            "results/measurements/{case}/{batch}.parquet",
+            wildcards.case,
+            int(wildcards.seed),
+        ),
+        code=source_files("biogrip.stages.export"),
+    output:
+        "results/traces/{case}/seed_{seed}.csv",
+    log:
+        "results/logs/export/{case}/seed_{seed}.log",
+    wildcard_constraints:
+        seed=r"\d+",
+    conda:
+        "../envs/biogrip.yaml"
+    message:
+        "Writing trace {wildcards.seed} of {wildcards.case} as CSV"
+    shell:
+        "biogrip export --seed {wildcards.seed} --measurements {input.measurements:q} "
         "--output {output:q} 2> {log:q}"
 
 

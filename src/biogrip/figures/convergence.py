@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from matplotlib.figure import Figure
 
 from biogrip.figures.results import read_history
@@ -18,7 +19,8 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``method``, ``title``, ``noise_floor_tolerance``, ``mutation_start``.
+        ``method``, ``title``, ``noise_floor_tolerance``, ``mutation_start``, None for
+        a method without.
     inputs
         Identifications (CSV) and histories (Parquet) of the case.
     """
@@ -26,7 +28,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     history = read_history(inputs[1], settings["method"])
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
-    unit = noise if noisy else noise * 0 + found["misfit_rad"].min()
+    unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
     best = int(lowest_misfit(found)["seed"])
     reached = at_noise_floor(found, settings["noise_floor_tolerance"])
     drawn = figure(COLUMN_IN, 2.5)
@@ -41,15 +43,16 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
-    axes.axvline(settings["mutation_start"], color=TARGET, linestyle=":", linewidth=0.8)
-    axes.annotate(
-        "mutation starts",
-        (settings["mutation_start"], 0.62),
-        xycoords=("data", "axes fraction"),
-        xytext=(3, 0),
-        textcoords="offset points",
-        fontsize=7,
-    )
+    if settings["mutation_start"] is not None:
+        axes.axvline(settings["mutation_start"], color=TARGET, linestyle=":", linewidth=0.8)
+        axes.annotate(
+            "mutation starts",
+            (settings["mutation_start"], 0.62),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, 0),
+            textcoords="offset points",
+            fontsize=7,
+        )
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
@@ -58,6 +61,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     axes.set_xlim(0, history["generation"].max())
     axes.set_xlabel("generation")
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
-    axes.set_title(f"{settings['title']}: {reached.sum()} of {len(found)} at the noise floor")
+    share = f": {reached.sum()} of {len(found)} at the noise floor" if noisy else ""
+    axes.set_title(settings["title"] + share)
     axes.legend(loc="upper right")
     return drawn

@@ -34,7 +34,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
             if seed == best:
                 style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
             axes.step(rows["generation"], rows[parameter.column], where="post", **style)
-        if settings["parameters"][parameter.name] > 0:
+        if settings["parameters"].get(parameter.name, 0) > 0:
             axes.axhline(settings["parameters"][parameter.name], color=TARGET, linestyle="--")
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
@@ -51,9 +51,11 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     lines = [
         grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
         grid[0].plot([], [], color=FITTED)[0],
-        grid[0].plot([], [], color=TARGET, linestyle="--")[0],
     ]
-    labels = [f"all {len(found)} seeds", f"seed {best}, lowest misfit", "target"]
+    labels = [f"all {len(found)} seeds", f"seed {best}, lowest misfit"]
+    if settings["parameters"]:
+        lines.append(grid[0].plot([], [], color=TARGET, linestyle="--")[0])
+        labels.append("target")
     if identified:
         lines.append(grid[0].plot([], [], color=PAPER, linestyle=":")[0])
         labels.append("identified in the paper")

@@ -121,7 +121,7 @@ def _paper(axes: Axes, published: dict[str, Any], names: list[str], target: floa
 
 def _title(quantity: Quantity, limit: float) -> str:
     known = f"{100 * limit:.2g} %" if limit < 1 else "none"
-    return f"{quantity.symbol}, bound {known}"
+    return f"{quantity.symbol}: {known}"
 
 
 def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str]) -> None:
@@ -132,7 +132,9 @@ def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str]) -> None
         handles += axes.plot(
             [], [], "o", color=color, markersize=4, label=METHODS[name].title, markeredgewidth=0
         )
-    handles.append(axes.fill([], [], color=SHADE, label="95 % by the Cramér-Rao bound")[0])
+    handles.append(
+        axes.fill([], [], color=SHADE, label="95 % by the Cramér-Rao bound, named above")[0]
+    )
     if settings["published"]:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)

@@ -14,7 +14,7 @@ from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
 STAGE_FOLDERS = (
     *("targets", "measurements", "calibrations", "identifications", "histories", "timings"),
-    *("identifiability", "coverage", "selection"),
+    *("identifiability", "coverage", "selection", "summaries", "traces"),
     *("tables", "figures", "logs"),
 )
 

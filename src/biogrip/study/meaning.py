@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError, nearest
@@ -17,6 +18,7 @@ _DRIVING = (
     *("torque_Nm", "to_torque_Nm", "torque_right_Nm"),
     *("voltage_V", "to_voltage_V", "voltage_right_V"),
 )
+_OF_A_FILE = ("time", "rotation", "time_unit", "rotation_unit", "noise_rad")
 _NO_PARAMETERS = ("model", "branches", "size_m")
 
 
@@ -35,7 +37,8 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     """
     for name, case in config["cases"].items():
         path = ("cases", name)
-        found = list(_sample_problems((*path, "sample"), case["sample"]))
+        found = list(_recording_problems((*path, "measurement"), case["measurement"]))
+        found += _sample_problems((*path, "sample"), case)
         found += _phase_problems((*path, "protocol", "phases"), case["protocol"]["phases"])
         found += _genetic_problems((*path, "genetic_algorithm"), case["genetic_algorithm"])
         found += _range_problems((*path, "search_range"), case["search_range"])
@@ -56,7 +59,25 @@ def _model(case: Mapping[str, Any]) -> SampleModel:
     return build.sample_model(case["sample"])
 
 
-def _sample_problems(path: KeyPath, sample: Mapping[str, Any]) -> Iterator[Problem]:
+def _recording_problems(path: KeyPath, measurement: Mapping[str, Any]) -> Iterator[Problem]:
+    """A recorded trace needs a file that is there, and the names of its columns."""
+    if "file" not in measurement:
+        for key in _OF_A_FILE:
+            if key in measurement:
+                yield (*path, key), "is only for a recorded trace, whose measurement has a file."
+        return
+    for key in ("time", "rotation"):
+        if key not in measurement:
+            yield (*path, key), f"is missing: a recorded trace needs the name of its {key} column."
+    file = Path(measurement["file"])
+    if not file.is_file():
+        names = [str(other) for other in file.parent.glob("*") if other.is_file()]
+        hint = nearest(str(file), names)
+        yield (*path, "file"), f"found '{file}', allowed is a file that exists.{hint}"
+
+
+def _sample_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    sample, recorded = case["sample"], "file" in case["measurement"]
     if "branches" in sample and sample["model"] != "generalized_maxwell":
         yield (*path, "branches"), "only generalized_maxwell has a number of branches."
         return
@@ -67,6 +88,10 @@ def _sample_problems(path: KeyPath, sample: Mapping[str, Any]) -> Iterator[Probl
             hint = nearest(name, model.names)
             yield (*path, name), f"is no parameter of {model.name}, which has {names}.{hint}"
     for parameter in model.parameters:
+        if recorded:
+            if parameter.name in sample:
+                yield (*path, parameter.name), "is what a recorded trace is to tell; leave it out."
+            continue
         if parameter.name not in sample:
             yield (*path, parameter.name), f"is missing: {model.name} needs {names}."
             continue
@@ -204,6 +229,8 @@ def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Probl
     if not any(phase.get(key) for phase in phases for key in _DRIVING):
         text = "no phase has a torque, so nothing would move; allowed is at least one above 0 N m."
         yield (*path, "protocol", "phases"), text
+    if "file" in case["measurement"]:
+        return
     here = (*path, "measurement")
     needed = len(_model(case).names) + 1
     end = sum(phase["duration_s"] for phase in phases)

@@ -60,9 +60,12 @@ class Plan:
             for batch in self.batches(case, method)
         ]
 
-    def first_batch(self, pattern: str, case: str) -> str:
-        """Fill ``{case}`` and ``{batch}`` of a path for the batch of the first seed."""
-        return self.batch_files(pattern, case)[0]
+    def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
+        """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
+        batches = self.batches(case, self.shown)
+        found = [batch for batch in batches if batch.first <= seed <= batch.last]
+        batch = found[0] if found else Batch(seed, seed)
+        return pattern.format(case=case, batch=batch.name)
 
     @property
     def shown(self) -> str:
@@ -158,10 +161,11 @@ class Plan:
     def convergence(self, case: str) -> str:
         """Settings of the figure of a case's convergence."""
         c = self._case(case)
+        mutates = "genetic_algorithm" in METHODS[self.shown].blocks
         return _json(
             title=c.title,
             method=self.shown,
-            mutation_start=c.blocks["genetic_algorithm"]["mutation_start"],
+            mutation_start=c.blocks["genetic_algorithm"]["mutation_start"] if mutates else None,
             noise_floor_tolerance=self._tolerance,
         )
 
@@ -197,6 +201,16 @@ class Plan:
         c = self._case(case)
         return _json(title=c.title, parameters=c.parameters)
 
+    def summary(self, case: str) -> str:
+        """Settings of a case's summary."""
+        c = self._case(case)
+        trace = c.blocks["measurement"]["file"] if c.recorded else "seed 0 of the simulated traces"
+        return _json(case=case, title=c.title, model=c.model.title, trace=trace)
+
+    def summary_figures(self, case: str) -> list[str]:
+        """Figures that a case's summary shows."""
+        return ["fit", "profiles", *(["valley"] if self.has_valley(case) else [])]
+
     def has_valley(self, case: str) -> bool:
         """Whether two exchangeable parameters of a case are searched, among others."""
         c = self._case(case)
@@ -230,7 +244,10 @@ class Plan:
 
     def models_table(self) -> str:
         """Settings of the table of sample models."""
-        cases = {name: case.model.name for name, case in self.study.cases.items()}
+        cases = {
+            name: None if case.recorded else case.model.name
+            for name, case in self.study.cases.items()
+        }
         return json.dumps({"cases": cases})
 
     @property

@@ -43,12 +43,14 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     found = read_identifications(inputs[0], settings["method"])
     model = build.sample_model(settings)
     best = found.index.get_loc(lowest_misfit(found).name)
-    share = float(np.mean(at_noise_floor(found, settings["noise_floor_tolerance"])))
+    known = bool(found["noise_rms_rad"].notna().all())
+    reached = at_noise_floor(found, settings["noise_floor_tolerance"])
+    share = float(np.mean(reached)) if known else None
     published = settings["published"]
     rows = []
     for names in model.quantities:
         label = " + ".join(parameter.name for parameter in names)
-        target = sum(settings["parameters"][parameter.name] for parameter in names)
+        target = _target(settings["parameters"], [parameter.name for parameter in names])
         values = found[[parameter.column for parameter in names]].sum(axis=1).to_numpy(float)
         error = error_percent(target, values)
         low, median, high = np.percentile(values, [5, 50, 95])
@@ -74,19 +76,26 @@ def errors(settings: dict[str, Any], inputs: list[Path]) -> Table:
     caption = (
         f"{number}{settings['title']}: target and identified parameters over {len(found)} seeds. "
         "Best is the seed of lowest misfit. Error = (target - identified) / target."
+        if settings["parameters"]
+        else f"{settings['title']}: parameters identified in the recorded trace."
     )
     return Table(caption, TABLE_COLUMNS, rows)
 
 
-def error_percent(target: float, identified: Array) -> Array:
-    """Signed error (target - identified) / target in percent; NaN for a target of zero."""
-    if target == 0:
+def error_percent(target: float | None, identified: Array) -> Array:
+    """Signed error (target - identified) / target in percent; NaN for a target of zero or none."""
+    if not target:
         return np.full_like(identified, np.nan)
     return 100 * (target - identified) / target
 
 
+def _target(parameters: dict[str, float], names: list[str]) -> float | None:
+    """Return the true value of a parameter or a sum, unless the trace was recorded."""
+    return sum(parameters[name] for name in names) if parameters else None
+
+
 def _paper(
-    published: dict[str, Any], names: list[str], target: float
+    published: dict[str, Any], names: list[str], target: float | None
 ) -> tuple[float | None, str | float | None]:
     """Return the paper's value and error; the error of a sum is computed from its values."""
     identified = published.get("identified", {})

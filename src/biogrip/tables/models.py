@@ -31,7 +31,7 @@ def models(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``cases``: the sample models that made the traces, by case.
+        ``cases``: the sample models that made the traces, by case; None of a recorded one.
     inputs
         Fits of all models, CSV.
     """
