@@ -20,6 +20,7 @@ from biogrip.protocol import (
 )
 from biogrip.recordings import Columns, Recording
 from biogrip.response.linear import rotation, step_response
+from biogrip.response.nuisance import nuisance_basis
 from biogrip.sample import generalized_maxwell
 
 FILE = Path("trace.csv")
@@ -46,6 +47,19 @@ PROTOCOLS = {
 }
 
 
+def check(
+    recording: Recording,
+    gripper: Gripper,
+    torque: TorqueHistory,
+    path: Path,
+    columns: Columns,
+    noise_rad: float | None = None,
+    offset: bool = False,
+) -> None:
+    nuisance = nuisance_basis(recording.time_s, offset=offset, drift=False)
+    check_recording(recording, gripper, torque, path, columns, nuisance, noise_rad)
+
+
 def recorded(time_s: Array, rotation_rad: Array) -> Recording:
     """A trace as from a file with a header, on lines 2, 3, ..."""
     return Recording(time_s, rotation_rad, np.arange(len(time_s)) + 2, 0)
@@ -63,7 +77,7 @@ def refusal(
     recording: Recording, gripper: Gripper, torque: TorqueHistory, columns: Columns = SI
 ) -> str:
     with pytest.raises(BiogripError) as error:
-        check_recording(recording, gripper, torque, FILE, columns)
+        check(recording, gripper, torque, FILE, columns)
     return str(error.value)
 
 
@@ -78,9 +92,9 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
     clean = trace(gripper, steps, SAMPLES[sample], times)
     for seed in range(10):
         noisy = add_noise(clean, Noise(kind, level, "peak"), np.random.default_rng([7, seed]))
-        check_recording(recorded(times, noisy), gripper, steps, FILE, SI)
+        check(recorded(times, noisy), gripper, steps, FILE, SI)
         noise_rad = level * clean.max()
-        check_recording(recorded(times, noisy), gripper, steps, FILE, SI, noise_rad)
+        check(recorded(times, noisy), gripper, steps, FILE, SI, noise_rad)
         large = refusal(recorded(times, 1e3 * noisy), gripper, steps)
         line = np.argmax(np.abs(noisy)) + 2
         assert large.startswith(f"trace.csv, line {line}, column 'rotation_rad': found ")
@@ -149,7 +163,7 @@ def test_no_trace_passes_in_two_units_a_thousand_apart(
         passed = 0
         for power in (-9, -6, -3, 0, 3, 6, 9):
             try:
-                check_recording(recorded(times, 10.0**power * values), gripper, steps, FILE, SI)
+                check(recorded(times, 10.0**power * values), gripper, steps, FILE, SI)
             except BiogripError:
                 continue
             passed += 1
@@ -170,7 +184,7 @@ def test_mere_noise_is_refused(
         )
         for noise_rad in (sigma_rad, 2 * sigma_rad):
             with pytest.raises(BiogripError, match="found no response"):
-                check_recording(recorded(times, values), gripper, steps, FILE, SI, noise_rad)
+                check(recorded(times, values), gripper, steps, FILE, SI, noise_rad)
 
 
 def test_noise_is_taken_for_a_response_as_rarely_as_said(
@@ -181,9 +195,7 @@ def test_noise_is_taken_for_a_response_as_rarely_as_said(
     taken = 0
     for _ in range(5000):
         try:
-            check_recording(
-                recorded(times, 1e-3 * rng.standard_normal(len(times))), gripper, steps, FILE, SI
-            )
+            check(recorded(times, 1e-3 * rng.standard_normal(len(times))), gripper, steps, FILE, SI)
         except BiogripError:
             continue
         taken += 1
@@ -218,10 +230,10 @@ def test_a_response_below_the_known_noise_is_refused(
 ) -> None:
     times = sample_times(400.0, 0.1)
     values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
-    check_recording(recorded(times, values), gripper, steps, FILE, SI, 0.0)
-    check_recording(recorded(times, values), gripper, steps, FILE, SI, 0.4 * values.max())
+    check(recorded(times, values), gripper, steps, FILE, SI, 0.0)
+    check(recorded(times, values), gripper, steps, FILE, SI, 0.4 * values.max())
     with pytest.raises(BiogripError, match="found no response"):
-        check_recording(recorded(times, values), gripper, steps, FILE, SI, 3 * values.max())
+        check(recorded(times, values), gripper, steps, FILE, SI, 3 * values.max())
 
 
 @pytest.mark.parametrize("phases", PROTOCOLS.values(), ids=PROTOCOLS)
@@ -237,15 +249,15 @@ def test_other_protocols_and_samples_pass(
         sample = tuple(10 ** rng.uniform((-2, -2, -2, -3), (1, 0, 2, 0)))
         values = trace(gripper, torque, sample, times)
         values += 0.1 * np.abs(values).max() * rng.standard_normal(len(times))
-        check_recording(recorded(times, values), gripper, torque, FILE, SI)
+        check(recorded(times, values), gripper, torque, FILE, SI)
         with pytest.raises(BiogripError, match="column 'rotation_rad': found"):
-            check_recording(recorded(times, 1e3 * values), gripper, torque, FILE, SI)
+            check(recorded(times, 1e3 * values), gripper, torque, FILE, SI)
 
 
 def test_a_trace_with_a_gap_and_ten_samples_passes(gripper: Gripper, steps: TorqueHistory) -> None:
     times = np.array([0.0, 5.0, 40.0, 90.0, 190.0, 350.0, 360.0, 370.0, 390.0, 400.0])
     values = trace(gripper, steps, SAMPLES["liquid_drop_2"], times)
-    check_recording(recorded(times, values), gripper, steps, FILE, SI)
+    check(recorded(times, values), gripper, steps, FILE, SI)
 
 
 @pytest.mark.parametrize(
@@ -342,17 +354,29 @@ def test_times_outside_the_protocol_are_refused(
 def test_the_last_digit_of_a_time_does_not_matter(gripper: Gripper, steps: TorqueHistory) -> None:
     times = sample_times(400.0, 1.0)
     values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
-    check_recording(recorded(times * (1 + 1e-12), values), gripper, steps, FILE, SI)
-    check_recording(recorded(times - 1e-10, values), gripper, steps, FILE, SI)
+    check(recorded(times * (1 + 1e-12), values), gripper, steps, FILE, SI)
+    check(recorded(times - 1e-10, values), gripper, steps, FILE, SI)
 
 
 def test_a_share_of_the_protocol_is_enough(gripper: Gripper, steps: TorqueHistory) -> None:
     times = sample_times(20.0, 10.0)
     values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
-    check_recording(recorded(times, values), gripper, steps, FILE, SI)
-    check_recording(recorded(times[:81], values[:81]), gripper, steps, FILE, SI)
+    check(recorded(times, values), gripper, steps, FILE, SI)
+    check(recorded(times[:81], values[:81]), gripper, steps, FILE, SI)
     said = refusal(recorded(times[:80], values[:80]), gripper, steps)
     assert said == (
         "trace.csv, lines 2 to 81, column 'time_s': found only 0 to 7.9 s of the protocol's 400 s, "
         "allowed are at least 8 s of it."
     )
+
+
+def test_an_offset_is_no_response_and_no_hindrance(gripper: Gripper, steps: TorqueHistory) -> None:
+    times, rng = sample_times(400.0, 1.0), np.random.default_rng(0)
+    noise = 3e-4 * rng.standard_normal(len(times))
+    sample = generalized_maxwell([[1.0, 1e-4, 10.0, 1e-3]])
+    values = rotation(step_response(gripper, sample), steps, times)[0] + noise + 0.02
+    with pytest.raises(BiogripError, match="found no response"):
+        check(recorded(times, values), gripper, steps, FILE, SI)
+    check(recorded(times, values), gripper, steps, FILE, SI, offset=True)
+    with pytest.raises(BiogripError, match="found no response"):
+        check(recorded(times, noise + 0.02), gripper, steps, FILE, SI, offset=True)

@@ -16,6 +16,7 @@ _BOUNDS = {
     "maximum": "≤ {}",
 }
 _NO_DEFAULT = "–"
+_MOST_LISTED = 6
 
 
 def reference(config: Path) -> str:
@@ -82,6 +83,8 @@ def _allowed(leaf: Mapping[str, Any]) -> str:
         low, high = leaf.get("minItems"), leaf.get("maxItems")
         count = "" if low is None else f"{low} " if low == high else f"{low} to {high} "
         inner = _resolved(leaf["items"])
+        if "enum" in inner:
+            return f"list of {', '.join(f'`{value}`' for value in inner['enum'])}"
         return f"list of {count}{inner.get('type', 'values')} {_allowed_bounds(inner)}".strip()
     words = {"string": "text", "object": "block"}
     kinds = leaf["type"] if isinstance(leaf["type"], list) else [leaf["type"]]
@@ -94,7 +97,8 @@ def _allowed_bounds(leaf: Mapping[str, Any]) -> str:
 
 def _shown(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], str):
-        return f"{len(value)} keys"
+        listed = ", ".join(value)
+        return f"`[{listed}]`" if len(value) <= _MOST_LISTED else f"{len(value)} keys"
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
 
 

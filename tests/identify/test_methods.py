@@ -1,0 +1,163 @@
+"""All identifiers on the same problems."""
+
+import functools
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.arrays import Array
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
+from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.problem import Problem, problem_of
+from biogrip.measurement import Noise, add_noise, rms
+from biogrip.protocol import sample_times
+from biogrip.response.linear import rotation, step_response
+from biogrip.sample import MODELS
+from biogrip.study import build
+
+CONFIG: dict[str, Any] = yaml.safe_load(
+    (Path(__file__).parents[2] / "config" / "config.yaml").read_text()
+)
+MODEL = MODELS["generalized_maxwell"]
+SAMPLES = {name: case["sample"] for name, case in CONFIG["cases"].items()}
+CONTINUOUS = ("genetic_refined", "least_squares")
+
+
+@functools.cache
+def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
+    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    times = sample_times(400.0, rate_Hz)
+    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
+    return times, rotation(step_response(gripper, network), torque, times)[0]
+
+
+def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
+    times, response = clean(case, rate_Hz)
+    rng = np.random.default_rng([seed, 7])
+    trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
+    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    ranges = build.gene_ranges(CONFIG["search_range"])
+    return problem_of(gripper, MODEL, torque, times, trace, ranges)
+
+
+def run(method: str, posed: Problem, seed: int = 0) -> Identification:
+    return identifier(method, CONFIG)(posed, np.random.default_rng(seed), silent)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_an_answer_is_what_it_says(method: str) -> None:
+    posed = problem("liquid_drop_2", 0)
+    told: list[tuple[int, float]] = []
+    identify = identifier(method, CONFIG)
+    answer = identify(posed, np.random.default_rng(0), lambda n, misfit: told.append((n, misfit)))
+    history = answer.history
+    assert posed.misfit(answer.parameters[None])[0] == pytest.approx(answer.misfit_rad, rel=1e-6)
+    assert len(history.best_misfit) == answer.generations + 1
+    np.testing.assert_array_equal(history.best_parameters[-1], answer.parameters)
+    assert np.all(np.diff(history.best_misfit) <= 1e-7 * answer.misfit_rad)
+    assert np.all(np.diff(history.evaluations) >= 0)
+    assert history.evaluations[-1] == answer.evaluations
+    assert np.all(np.log(answer.parameters) >= posed.low - 1e-9)
+    assert np.all(np.log(answer.parameters) <= posed.high + 1e-9)
+    assert told
+    assert told[-1][0] <= answer.evaluations
+    again = run(method, posed)
+    np.testing.assert_array_equal(again.parameters, answer.parameters)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_evaluations_are_counted(method: str) -> None:
+    posed = problem("liquid_drop_2", 1)
+    counted = [0]
+
+    def misfit(parameters: Array) -> Array:
+        counted[0] += len(parameters)
+        return posed.misfit(parameters)
+
+    residuals = posed.residuals
+
+    class Counting:
+        samples, free = residuals.samples, residuals.free
+        noise_scale_rad, duration_s = residuals.noise_scale_rad, residuals.duration_s
+
+        def __call__(self, x: Array) -> tuple[Array, Array]:
+            counted[0] += 1
+            return residuals(x)
+
+    watched: Any = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)  # type: ignore[arg-type]
+    assert run(method, watched).evaluations == counted[0]
+
+
+@pytest.mark.parametrize("case", SAMPLES)
+def test_local_fits_reach_the_global_optimum(case: str) -> None:
+    """Against the best of both and a fit from the truth, at the study's sampling.
+
+    In 100 seeds of each case neither missed once, so a rate of misses above 3 % is
+    excluded at 95 %, and two misses in 8 seeds would be one in 300.
+    """
+    misses = 0
+    for seed in range(8):
+        posed = problem(case, seed, rate_Hz=10.0)
+        truth = np.log([SAMPLES[case][name] for name in MODEL.names])
+        found = [run(method, posed, seed).misfit_rad for method in CONTINUOUS]
+        best = min(*found, settled(posed, local_fit(posed, truth)).misfit_rad)
+        rises = posed.residuals.samples * ((np.array(found) / best) ** 2 - 1)
+        misses += int(np.sum(rises > 1))
+    assert misses <= 1
+
+
+@pytest.mark.parametrize("method", [name for name in METHODS if name != "genetic"])
+def test_a_trace_without_noise_gives_the_truth_back(method: str) -> None:
+    posed = problem("endothelial_cell", 0, level=0.0)
+    answer = run(method, posed)
+    k, k_p, c, _ = (SAMPLES["endothelial_cell"][name] for name in MODEL.names)
+    # Any c_p below some N s/m makes a mode that dies out within 0.1 s, before the second
+    # sample; the other parameters make up for it exactly, by up to 1 %.
+    np.testing.assert_allclose(answer.parameters[:3], [k, k_p, c], rtol=1e-2)
+    assert answer.parameters[1] == pytest.approx(k_p, rel=1e-5)
+    assert answer.misfit_rad < 1e-7 * np.abs(clean("endothelial_cell")[1]).max()
+
+
+def test_the_optimum_is_settled_to_the_last_digits() -> None:
+    """Where the gradient vanishes, from wherever one comes."""
+    posed = problem("endothelial_cell", 3)
+    best = np.log(run("least_squares", posed).parameters)
+    rng = np.random.default_rng(0)
+    ends = [
+        settled(posed, local_fit(posed, best + 0.01 * rng.standard_normal(4))).log_parameters
+        for _ in range(4)
+    ]
+    assert np.max(np.ptp(ends, axis=0)) < 1e-9
+    residual, sensitivity = posed.residuals(ends[0])
+    prior = (ends[0] - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
+    gradient = sensitivity @ residual / posed.residuals.noise_scale_rad**2 + prior
+    assert np.max(np.abs(gradient)) < 1e-6
+
+
+def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
+    """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
+    posed = problem("endothelial_cell", 2)
+    answer = run("least_squares", posed)
+    c_p = np.log(answer.parameters[3])
+    assert posed.low[3] + 3 < c_p < posed.high[3] - 3
+
+
+def test_offset_and_drift_are_fitted_along() -> None:
+    times, response = clean("liquid_drop_2")
+    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    ranges = build.gene_ranges(CONFIG["search_range"])
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
+    trace = response + 2e-3 - 4e-6 * times + noise
+    posed = problem_of(gripper, MODEL, torque, times, trace, ranges, offset=True, drift=True)
+    for method in METHODS:
+        answer = run(method, posed)
+        assert answer.misfit_rad < 1.1 * rms(noise) or method == "genetic"
+        k, _, c, c_p = answer.parameters
+        assert k == pytest.approx(1.0, rel=0.15 if method == "genetic" else 0.05)
+        assert c + c_p == pytest.approx(10.0, rel=0.03)
+    plain = problem_of(gripper, MODEL, torque, times, trace, ranges)
+    assert run("least_squares", plain).misfit_rad > 10 * rms(noise)
