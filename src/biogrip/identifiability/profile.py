@@ -15,7 +15,7 @@ from scipy.stats import chi2, f
 from biogrip.arrays import Array
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import local_fit
+from biogrip.identify.local_fit import FINE, local_fit
 from biogrip.identify.problem import Problem
 
 # Steps away from the best fit, in standard deviations, that every profile has.
@@ -27,6 +27,19 @@ _CERTAIN = 0.999
 # A branch may relax within twice the experiment at the price of chi^2 rising by some 50.
 _HINGE = 10.0
 _MOST_DOUBLINGS = 12
+
+
+@dataclass(frozen=True)
+class _Accuracy:
+    """Of a fit, as the share of its cost that ends it; of a limit, as a share of its bracket."""
+
+    fit: float
+    limit: float
+
+
+_EXACT = _Accuracy(FINE, 1e-5)
+# Chi^2 to 0.004, and limits to a thousandth of a standard deviation or two: enough to count.
+_FAST = _Accuracy(1e-6, 1e-3)
 
 
 @dataclass(frozen=True)
@@ -126,7 +139,7 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     Each point is fitted from its neighbour's fit, outwards from the optimum and
     back again, so that a basin which is lower further out is followed inwards.
     """
-    fits = _Held(likelihood, quantity)
+    fits = _Held(likelihood, quantity, _EXACT)
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
     near = start + likelihood.deviation(quantity) * _NEAR
@@ -158,7 +171,7 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
 
 def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | None, float | None]:
     """Confidence limits of the optimum's own basin, much faster than a whole profile."""
-    fits = _Held(likelihood, quantity)
+    fits = _Held(likelihood, quantity, _FAST)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start, step = quantity.log(likelihood.best), likelihood.deviation(quantity)
     found = []
@@ -183,7 +196,8 @@ def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | Non
 class _Held:
     """Fits with one quantity held."""
 
-    def __init__(self, likelihood: Likelihood, quantity: Quantity) -> None:
+    def __init__(self, likelihood: Likelihood, quantity: Quantity, accuracy: _Accuracy) -> None:
+        self._accuracy = accuracy
         self._likelihood = likelihood
         self._quantity = quantity
         self._stiffness = _STIFFNESS / likelihood.deviation(quantity)
@@ -205,7 +219,7 @@ class _Held:
             return np.array(values), np.array(slopes)
 
         start = self._quantity.moved(near, target)
-        found = local_fit(self._likelihood.problem, start, held=held)
+        found = local_fit(self._likelihood.problem, start, self._accuracy.fit, held)
         return self._likelihood.rise(found.misfit_rad), found.log_parameters
 
     def crossing(
@@ -226,7 +240,8 @@ class _Held:
             return float(np.sqrt(max(rise, 0.0)) - wanted)
 
         width = abs(float(grid[inside] - grid[outside]))
-        return float(brentq(excess, grid[inside], grid[outside], xtol=1e-5 * width, rtol=1e-12))
+        xtol = self._accuracy.limit * width
+        return float(brentq(excess, grid[inside], grid[outside], xtol=xtol, rtol=1e-12))
 
 
 def _best_of(
