@@ -16,6 +16,9 @@ from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.traces import read_measurements
 
+# A line a seed: more than these cannot be told apart, and make a figure too large to open.
+MOST_SEEDS_DRAWN = 1000
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -73,8 +76,8 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     )
 
 
-def read_history(path: Path) -> pd.DataFrame:
-    """Read the histories of a case.
+def read_history(path: Path, best: int) -> pd.DataFrame:
+    """Read the histories of a case: of the first `MOST_SEEDS_DRAWN` seeds and of the best.
 
     Raises
     ------
@@ -82,9 +85,18 @@ def read_history(path: Path) -> pd.DataFrame:
         If the file cannot be read.
     """
     try:
-        return pd.read_parquet(path)
+        return pd.read_parquet(
+            path, filters=[[("seed", "<", MOST_SEEDS_DRAWN)], [("seed", "==", best)]]
+        )
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
+
+
+def seeds_drawn(found: pd.DataFrame) -> str:
+    """Return what a legend says of the lines from `read_history`."""
+    if len(found) <= MOST_SEEDS_DRAWN:
+        return f"all {len(found)} seeds"
+    return f"{MOST_SEEDS_DRAWN} of {len(found)} seeds"
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:
