@@ -16,6 +16,17 @@ include: "workflow/rules/figures.smk"
 include: "workflow/rules/check.smk"
 
 
+# On a cluster these run where Snakemake does: each is less work than submitting it.
+localrules:
+    target,
+    input_table,
+    input_figure,
+    all_errors_table,
+    printed_values_table,
+    linearisation_table,
+    linearisation_figure,
+
+
 rule all:
     default_target: True
     input:
