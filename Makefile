@@ -5,7 +5,10 @@ JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.installed
 
-.PHONY: study test check publish lint format bench report docs clean
+LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --python-version 3.11 \
+  --generate-hashes --no-header --no-annotate --quiet
+
+.PHONY: study test check publish lint format bench report docs lock clean
 
 study: $(READY)
 	$(BIN)/snakemake -j$(JOBS)
@@ -40,6 +43,12 @@ report: $(READY)
 # Config keys described from the schema; the tests fail if this is forgotten.
 docs: $(READY)
 	$(BIN)/python -m tests.generated_docs
+
+# Needs uv. The second lock holds only what running on Slurm adds to the first.
+lock:
+	$(LOCK) --extra dev --output-file requirements.lock
+	$(LOCK) --extra slurm --constraints requirements.lock --output-file requirements-slurm.lock \
+	  $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock)
 
 clean:
 	rm -rf .venv .snakemake results/targets results/measurements results/identifications \

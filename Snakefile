@@ -18,6 +18,24 @@ include: "workflow/rules/summaries.smk"
 include: "workflow/rules/check.smk"
 
 
+# On a cluster these run where Snakemake does: each is less work than submitting it.
+localrules:
+    target,
+    recording,
+    export,
+    input_table,
+    input_figure,
+    all_errors_table,
+    printed_values_table,
+    linearisation_table,
+    linearisation_figure,
+    methods_table,
+    models_table,
+    coverage_table,
+    timings_table,
+    summary,
+
+
 rule all:
     default_target: True
     input:

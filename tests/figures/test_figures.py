@@ -5,13 +5,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 from matplotlib.figure import Figure
 
-from biogrip.figures import comb, linkage, torque
+from biogrip.figures import comb, convergence, linkage, torque
 from biogrip.figures.results import scale_of
-from biogrip.figures.style import save, styled
+from biogrip.figures.style import ALL_SEEDS, FITTED, save, styled
 
 CONFIG = Path(__file__).parents[2] / "config" / "config.yaml"
 SETTINGS: dict[str, Any] = yaml.safe_load(CONFIG.read_text())
@@ -53,6 +54,36 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
             save(torque.draw(SETTINGS, []), tmp_path / f"{name}.png")
     for suffix in (".png", ".pdf"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("seeds", "best", "others", "label"),
+    [
+        (50, 7, 49, "all 50 seeds"),
+        (1500, 7, 999, "1000 of 1500 seeds"),
+        (1500, 1400, 1000, "1000 of 1500 seeds"),
+    ],
+)
+def test_no_more_seeds_are_drawn_than_can_be_seen(
+    tmp_path: Path, seeds: int, best: int, others: int, label: str
+) -> None:
+    numbers = np.arange(seeds)
+    misfit = np.where(numbers == best, 1.0, 1.5)
+    found = pd.DataFrame({"seed": numbers, "misfit_rad": misfit, "noise_rms_rad": 1.0})
+    for column in ("case", "method", "generations", "evaluations", "stop_reason"):
+        found[column] = 1
+    found.to_csv(tmp_path / "found.csv", index=False)
+    history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
+    history["best_misfit_rad"] = np.repeat(misfit, 2)
+    pd.DataFrame(history).to_parquet(tmp_path / "history.parquet")
+    settings = {"title": "A cell", "noise_floor_tolerance": 0.02, "mutation_start": 20}
+    axes = convergence.draw(settings, [tmp_path / "found.csv", tmp_path / "history.parquet"]).axes
+    filled = [line for line in axes[0].lines if len(np.asarray(line.get_xdata()))]
+    assert sum(line.get_color() == ALL_SEEDS for line in filled) == others
+    assert sum(line.get_color() == FITTED for line in filled) == 1
+    legend = axes[0].get_legend()
+    assert legend
+    assert legend.get_texts()[0].get_text() == label
 
 
 @pytest.mark.parametrize(

@@ -114,9 +114,8 @@ def test_quantities_and_their_gradients(form: str) -> None:
     moved = quantity.moved(x, quantity.log(x) + 0.7)
     assert quantity.log(moved) == pytest.approx(quantity.log(x) + 0.7, rel=1e-12)
     low, high = quantity.range(x - 1, x + 2)
-    corners = [
-        quantity.log(x + np.array(c)) for c in np.ndindex(2, 2, 2, 2) for c in [3 * np.array(c) - 1]
-    ]
+    places = (3 * np.array(place) - 1 for place in np.ndindex(2, 2, 2, 2))
+    corners = [quantity.log(x + place) for place in places]
     assert low == pytest.approx(min(corners))
     assert high == pytest.approx(max(corners))
 

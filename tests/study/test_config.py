@@ -1,5 +1,6 @@
 import copy
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -176,6 +177,12 @@ def test_files_that_are_no_good_yaml(tmp_path: Path, text: str, message: str) ->
 def test_missing_config_file(tmp_path: Path) -> None:
     with pytest.raises(BiogripError, match=r"nowhere.yaml: cannot be read: No such file"):
         load_study({}, [tmp_path / "nowhere.yaml"])
+
+
+def test_jobs_of_a_cluster_may_try_the_results_folder_at_once(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(check_results_folder, [tmp_path / "results"] * 200))
+    assert not list((tmp_path / "results").iterdir())
 
 
 def test_results_folder_must_be_a_folder(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def snakemake(
     """Run the repository's workflow in a folder of its own, over a config laid on the default."""
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
-    jobs = () if any(argument.startswith("-j") for argument in arguments) else ("-j2",)
+    jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
     command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
     command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
     command += ["--configfile", str(overlay)]

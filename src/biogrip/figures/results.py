@@ -17,6 +17,9 @@ from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.traces import read_measurements
 
+# A line a seed: more than these cannot be told apart, and make a figure too large to open.
+MOST_SEEDS_DRAWN = 1000
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -80,8 +83,8 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     )
 
 
-def read_history(path: Path, method: str) -> pd.DataFrame:
-    """Read the histories of a case by one method.
+def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
+    """Read a method's histories: of the first `MOST_SEEDS_DRAWN` seeds and of the best.
 
     Raises
     ------
@@ -89,9 +92,18 @@ def read_history(path: Path, method: str) -> pd.DataFrame:
         If the file cannot be read.
     """
     try:
-        return pd.read_parquet(path, filters=[("method", "==", method)])
+        mine = ("method", "==", method)
+        drawn = [mine, ("seed", "<", MOST_SEEDS_DRAWN)]
+        return pd.read_parquet(path, filters=[drawn, [mine, ("seed", "==", best)]])
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
+
+
+def seeds_drawn(found: pd.DataFrame) -> str:
+    """Return what a legend says of the lines from `read_history`."""
+    if len(found) <= MOST_SEEDS_DRAWN:
+        return f"all {len(found)} seeds"
+    return f"{MOST_SEEDS_DRAWN} of {len(found)} seeds"
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

@@ -4,6 +4,7 @@ import copy
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 from biogrip.errors import BiogripError
@@ -178,11 +179,11 @@ def check_results_folder(folder: Path) -> None:
     for place in (folder, *(folder / stage for stage in STAGE_FOLDERS)):
         if place != folder and not place.exists():
             continue
-        probe = place / ".writable"
         try:
             place.mkdir(parents=True, exist_ok=True)
-            probe.touch()
-            probe.unlink()
+            # Jobs of a cluster try this at once: a name of its own for each, or none.
+            with TemporaryFile(dir=place):
+                pass
         except OSError as error:
             raise BiogripError(
                 f"{place}: results cannot be written here: {error.strerror}. Allowed is a folder "

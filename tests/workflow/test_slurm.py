@@ -1,0 +1,82 @@
+"""The study on a real Slurm, started for the test: `profiles/slurm` and its resources."""
+
+import importlib.util
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NoReturn
+
+import pytest
+
+from tests.workflow.conftest import ROOT, snakemake, tables
+from tests.workflow.slurm.cluster import SlurmError, missing_packages, one_node_slurm
+
+PLUGIN = "snakemake_executor_plugin_slurm"
+# Of the site, not of the study: no accounting to ask, and nobody else who would mind the asking.
+SITE = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "6")
+
+
+@pytest.fixture
+def slurm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """Environment in which Snakemake reaches a Slurm; skips where there can be none."""
+    if packages := missing_packages():
+        _cannot_run(f"Slurm is not installed: apt-get install {' '.join(packages)}")
+    plugin = _installed_plugin(tmp_path_factory.mktemp("plugin"))
+    with ExitStack() as cluster:
+        try:
+            environment = cluster.enter_context(one_node_slurm())
+        except SlurmError as error:
+            _cannot_run(f"Slurm does not start: {error}")
+        yield {**environment, "PYTHONPATH": plugin}
+
+
+def _cannot_run(reason: str) -> NoReturn:
+    """Skip, unless this machine is one where the test has to run."""
+    if os.environ.get("BIOGRIP_REQUIRE_SLURM"):
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+def _installed_plugin(folder: Path) -> str:
+    """Python path with Snakemake's executor for Slurm, as locked, beside this environment."""
+    path = os.environ.get("PYTHONPATH", "")
+    if importlib.util.find_spec(PLUGIN):
+        return path
+    install = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--require-hashes"]
+    install += ["--target", str(folder), "-r", str(ROOT / "requirements-slurm.lock")]
+    done = subprocess.run(install, capture_output=True, text=True)
+    if done.returncode:
+        _cannot_run(f"requirements-slurm.lock cannot be installed: {done.stderr.strip()}")
+    return os.pathsep.join([str(folder), *filter(None, [path])])
+
+
+def test_slurm_gives_the_same_bytes(finished: Path, tmp_path: Path, slurm: dict[str, str]) -> None:
+    """Even if a job is lost on the way."""
+    arguments = ("--profile", "profiles/slurm", *SITE, "--config", "batch_size=2")
+    with ThreadPoolExecutor() as pool:
+        running = pool.submit(snakemake, tmp_path, *arguments, environment=slurm)
+        while not running.done() and not _cancel_a_batch(slurm):
+            time.sleep(0.2)
+        run = running.result()
+    assert run.status == 0, run.output
+    assert run.output.count("Trying to restart job") == 1
+    assert tables(tmp_path) == tables(finished)
+    # Slurm's executor says so where a rule has no resources.
+    for missing in ("No wall time information", "No job memory information"):
+        assert missing not in run.output
+
+
+def _cancel_a_batch(slurm: dict[str, str]) -> bool:
+    """Cancel a running batch of identifications; whether there was one."""
+    queue = ["squeue", "--noheader", "--states=RUNNING", "--format=%i %k"]
+    for line in subprocess.check_output(queue, env=slurm, text=True).splitlines():
+        number, comment = line.split(maxsplit=1)
+        if comment.startswith("rule_batch"):
+            subprocess.run(["scancel", number], env=slurm, check=True)
+            return True
+    return False
