@@ -9,18 +9,21 @@ import numpy as np
 
 from biogrip.files import written_whole
 from biogrip.identifiability.document import read_verdicts
+from biogrip.identifiability.fisher import covariance
 from biogrip.identifiability.profile import likelihood_of, limits_near
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import silent
+from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.methods import identifier
-from biogrip.measurement import Noise, add_noise
+from biogrip.measurement import Noise, add_noise, noise_deviation
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
+from biogrip.sample import with_fixed
 from biogrip.study.case_problem import case_problem
 from biogrip.traces import read_target
 
-COLUMNS = ("case", "quantity", "seed", "estimate", "low", "high")
+COLUMNS = ("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known")
 
 
 def run(
@@ -33,13 +36,15 @@ def run(
 ) -> None:
     """Identify a batch of seeds by least squares, with intervals for what should be determined.
 
-    The noise of a seed is the same as in its measurement.
+    The noise of a seed is the same as in its measurement. A second estimate has
+    the parameters of which the trace carries no information at their true values,
+    as the Cramer-Rao bound has them.
 
     Parameters
     ----------
     settings
-        ``study_seed``, ``case``, ``confidence``, ``noise``, what `case_problem`
-        needs, and ``least_squares``.
+        ``study_seed``, ``case``, ``confidence``, ``noise``, ``parameters`` (the
+        true ones), what `case_problem` needs, and ``least_squares``.
     seeds
         The batch.
     target
@@ -62,6 +67,13 @@ def run(
     wanted = _determined(expected)
     quantities = [q for q in parameters_and_sum(posed.searched) if q.label in wanted]
     noise, case = Noise(**settings["noise"]), settings["case"]
+    truth = posed.logs(settings["parameters"])
+    _, sensitivity = posed.of(time_s, rotation).residuals(truth)
+    spread = np.diag(covariance(sensitivity, noise_deviation(rotation, noise)))
+    told = np.flatnonzero(np.isfinite(spread))
+    names = posed.searched.names
+    given = {name: settings["parameters"][name] for i, name in enumerate(names) if i not in told}
+    rest_known = with_fixed(posed.searched, given)
     progress = Progress(f"{case}, intervals", len(seeds))
     with written_whole(output) as scratch, scratch.open("w", newline="") as sink:
         writer = csv.writer(sink, lineterminator="\n")
@@ -77,9 +89,13 @@ def run(
                 found.misfit_rad,
                 confidence=settings["confidence"],
             )
+            simpler = posed.of(time_s, trace, rest_known)
+            bottom = settled(simpler, local_fit(simpler, truth[told]))
+            known = truth.copy()
+            known[told] = bottom.log_parameters
             for quantity in quantities:
                 limits = limits_near(likelihood, quantity)
-                numbers = (quantity.log(likelihood.best), *limits)
+                numbers = (quantity.log(likelihood.best), *limits, quantity.log(known))
                 texts = ["" if u is None else f"{math.exp(u):.5g}" for u in numbers]
                 writer.writerow((case, quantity.label, seed, *texts))
             progress.done()

@@ -136,7 +136,8 @@ class Plan:
     def coverage(self, case: str) -> str:
         """Settings of the coverage stage."""
         c = self._case(case)
-        return _json(**self._judged(c), noise=c.blocks["measurement"]["noise"])
+        noise = c.blocks["measurement"]["noise"]
+        return _json(**self._judged(c), parameters=c.parameters, noise=noise)
 
     def selection(self, case: str) -> str:
         """Settings of the selection stage."""
