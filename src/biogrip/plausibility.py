@@ -47,7 +47,8 @@ SHORTEST_SHARE = 0.02
 FALSE_ALARM = 1e-3
 """Share of traces of mere noise that are taken for a response."""
 
-_TIME_SLACK = 1e-9
+# Times are written to some digits.
+_TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-6, 0.1, 10.0)
 
 

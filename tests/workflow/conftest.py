@@ -15,6 +15,11 @@ seeds: 4
 batch_size: 2
 measurement: {rate_Hz: 1.0}
 genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
+genetic_refined: {first: 2, last: 1}
+least_squares: {candidates: 200, starts: 3}
+differential_evolution: {popsize: 5, maxiter: 40}
+identifiability: {coverage_seeds: 4}
+model_selection: {models: [damper, liquid_drop]}
 cases:
   liquid_drop_1: null
 """

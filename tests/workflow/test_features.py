@@ -13,6 +13,10 @@ from tests.workflow.conftest import ROOT, snakemake
 CASES = """
 seeds: 2
 genetic_algorithm: {population: 300, survivors: 150}
+methods: [genetic]
+least_squares: {candidates: 100, starts: 2}
+identifiability: {coverage_seeds: 0}
+model_selection: {models: [damper]}
 measurement: {rate_Hz: 1.0, noise: {level: 0.01}}
 cases:
   endothelial_cell: null

@@ -1,0 +1,161 @@
+"""`biogrip identify`: one recorded trace from file to verdicts, and what is wrong with bad ones."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.arrays import Array
+from tests.identify.test_methods import clean
+from tests.workflow.conftest import ROOT
+
+EXAMPLE = ROOT / "data" / "example_trace.csv"
+TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
+
+
+def identify(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "biogrip", "identify", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+
+
+def written(path: Path, times: Array, values: Array, header: str = "time_s,rotation_rad") -> Path:
+    lines = [header, *(f"{t:.6g},{v:.8e}" for t, v in zip(times, values, strict=True))]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+@pytest.fixture(scope="module")
+def trace() -> tuple[Array, Array]:
+    """Table 7's sample at 1 Hz with 5 % noise."""
+    times, response = clean("liquid_drop_2")
+    noise = 0.05 * response.max() * np.random.default_rng(0).standard_normal(len(times))
+    return times, response + noise
+
+
+def test_the_example_gives_its_truth(tmp_path: Path) -> None:
+    output = tmp_path / "found.json"
+    done = identify(EXAMPLE, "--output", output)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(output.read_text())
+    quantities = {item["quantity"]: item for item in found["quantities"]}
+    truth = {name: value for name, value in TRUTH["sample"].items() if name != "model"}
+    truth["c + c_p"] = truth["c"] + truth["c_p"]
+    for name in ("k", "k_p", "c", "c + c_p"):
+        item = quantities[name]
+        assert item["verdict"] == "determined"
+        # Three standard deviations on either side of the estimate.
+        low, high = (item["value"] * (item[end] / item["value"]) ** 1.5 for end in ("low", "high"))
+        assert low < truth[name] < high
+        assert f"{name:<7}" in done.stdout
+        assert item["in_words"] in done.stdout
+    assert quantities["c_p"]["verdict"] == "bounded above"
+    assert quantities["c_p"]["high"] > truth["c_p"]
+    assert found["noise_rad"] == pytest.approx(0.05 * 6.7e-5, rel=0.3)
+    assert found["notes"] == []
+
+
+def test_units_separators_offset_and_drift(tmp_path: Path, trace: tuple[Array, Array]) -> None:
+    times, values = trace
+    plain = tmp_path / "plain.json"
+    assert identify(written(tmp_path / "a.csv", times, values), "--output", plain).returncode == 0
+    other = written(
+        tmp_path / "b.csv", times / 60, 1e3 * (values + 5e-4 + 1e-6 * times), "t;phi_mrad;note"
+    )
+    other.write_text(other.read_text().replace(",", ";"))
+    shifted = tmp_path / "shifted.json"
+    options = ("--time", "t", "--time-unit", "min", "--rotation", "phi_mrad")
+    done = identify(other, *options, "--offset", "--drift", "--output", shifted)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(shifted.read_text())
+    # Fitted along, both are known to some per cent of the rotation.
+    assert found["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
+    assert found["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)
+    total, before = (
+        next(q for q in json.loads(file.read_text())["quantities"] if q["quantity"] == "c + c_p")
+        for file in (shifted, plain)
+    )
+    assert total["high"] - total["low"] > before["high"] - before["low"]
+    assert total["low"] < before["value"] < total["high"]
+
+
+def test_a_config_gives_gripper_and_protocol(tmp_path: Path, trace: tuple[Array, Array]) -> None:
+    """Half the torque and half the rotation are the same sample."""
+    times, values = trace
+    config = tmp_path / "mine.yaml"
+    config.write_text(
+        "protocol: {phases: [{duration_s: 200, torque_Nm: 0.8e-9},"
+        " {duration_s: 200, torque_Nm: 0.16e-9}]}\n"
+    )
+    files = [tmp_path / "whole.json", tmp_path / "half.json"]
+    assert (
+        identify(written(tmp_path / "a.csv", times, values), "--output", files[0]).returncode == 0
+    )
+    half = written(tmp_path / "b.csv", times, values / 2)
+    assert identify(half, "--config", config, "--output", files[1]).returncode == 0
+    whole, halved = (
+        [q["value"] for q in json.loads(file.read_text())["quantities"]] for file in files
+    )
+    assert whole[0] == pytest.approx(halved[0], rel=1e-3)
+    assert whole[4] == pytest.approx(halved[4], rel=1e-3)
+    config.write_text("gripper: {arm_lenght_m: 2e-3}\n")
+    done = identify(half, "--config", config)
+    assert done.returncode == 1
+    assert "mine.yaml, line 1: gripper.arm_lenght_m: unknown key" in done.stderr
+    assert "Did you mean 'arm_length_m'?" in done.stderr
+
+
+def _bad(folder: Path, times: Array, values: Array) -> dict[str, tuple[Path, str]]:
+    lines = written(folder / "good.csv", times, values).read_text().splitlines()
+    text, back, alone = lines.copy(), lines.copy(), lines[:3]
+    text[7] = "6,high"
+    back[9], back[10] = back[10], back[9]
+    files = {"empty": "", "text": "\n".join(text), "back": "\n".join(back)}
+    files |= {"two rows": "\n".join(alone)}
+    files |= {"all NaN": "\n".join([lines[0], *(f"{t:g},nan" for t in times)])}
+    for name, content in files.items():
+        (folder / f"{name}.csv").write_text(content)
+    written(folder / "too large.csv", times, 1e3 * values)
+    written(folder / "too small.csv", times, 1e-3 * values)
+    rng = np.random.default_rng(1)
+    written(folder / "no response.csv", times, 1e-4 * rng.standard_normal(len(times)))
+    return {
+        name: (folder / f"{name}.csv", message)
+        for name, message in {
+            "empty": "empty.csv",
+            "text": "text.csv, line 8, column 'rotation_rad': found 'high'",
+            "back": "back.csv, line 11, column 'time_s'",
+            "two rows": "two rows.csv",
+            "all NaN": "all NaN.csv",
+            "too large": "too large.csv, line ",
+            "too small": "too small.csv, line",
+            "no response": "found no response to the torque",
+        }.items()
+    }
+
+
+def test_bad_traces_are_refused_with_their_place(
+    tmp_path: Path, trace: tuple[Array, Array]
+) -> None:
+    for name, (file, message) in _bad(tmp_path, *trace).items():
+        done = identify(file)
+        assert done.returncode == 1, name
+        assert message in done.stderr, name
+        assert "Traceback" not in done.stderr, name
+        assert not file.with_suffix(".identified.json").exists()
+
+
+def test_what_is_not_there_is_named_with_what_is(tmp_path: Path) -> None:
+    (tmp_path / "trace.csv").write_text("time_s,rotation_rad\n")
+    done = identify(tmp_path / "trcae.csv")
+    assert done.returncode == 1
+    assert "trcae.csv: there is no such file. Did you mean" in done.stderr
+    done = identify(EXAMPLE, "--model", "maxwel", "--output", tmp_path / "x.json")
+    assert done.returncode == 1
+    assert "--model: found 'maxwel'. Did you mean 'maxwell'?" in done.stderr
+    done = identify(EXAMPLE, "--rotation", "rotaton_rad", "--output", tmp_path / "x.json")
+    assert "Did you mean 'rotation_rad'?" in done.stderr
+    assert not (tmp_path / "x.json").exists()
