@@ -13,6 +13,7 @@ include: "workflow/rules/traces.smk"
 include: "workflow/rules/identification.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/robustness.smk"
 include: "workflow/rules/check.smk"
 
 

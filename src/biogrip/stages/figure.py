@@ -8,7 +8,7 @@ from biogrip.errors import BiogripError, nearest
 
 MODULES = (
     *("overview", "torque", "linkage", "comb"),
-    *("convergence", "fit", "evolution", "linearisation"),
+    *("convergence", "fit", "evolution", "linearisation", "robustness"),
 )
 """Each module draws the figure of its name in its function ``draw``."""
 

@@ -17,6 +17,7 @@ MODULES = {
     "printed_values": "printed_values",
     "linearisation": "linearisation",
     "contact": "contact",
+    "robustness": "robustness",
 }
 """The module that makes each table, in a function of the table's name."""
 
