@@ -1,7 +1,7 @@
 """Sweeps: how the identification stands up to noise, sampling and another gripper."""
 
 SWEEPS = [f"robustness_{sweep}" for sweep in STUDY.sweeps]
-TABLES += SWEEPS
+TABLES += ["sampling_evidence", *SWEEPS]
 FIGURES += SWEEPS
 
 
@@ -80,3 +80,28 @@ rule robustness_figure:
     shell:
         "biogrip figure robustness --settings {params.settings:q} "
         "--inputs {input.points:q} --output {output.png:q} 2> {log:q}"
+
+
+rule sampling_evidence_table:
+    input:
+        code=source_files("biogrip.tables.sampling_evidence"),
+    output:
+        csv="results/tables/sampling_evidence.csv",
+        text=multiext("results/tables/sampling_evidence", ".md", ".tex"),
+        html=report(
+            "results/tables/sampling_evidence.html",
+            caption="../report/sampling_evidence.rst",
+            category="Tables",
+            labels={"case": "all", "item": "evidence: sampling", "format": "table"},
+        ),
+    log:
+        "results/logs/tables/sampling_evidence.log",
+    conda:
+        "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.sampling_evidence(),
+    message:
+        "Holding the paper's errors against what noise allows at several sampling rates"
+    shell:
+        "biogrip table sampling_evidence --settings {params.settings:q} "
+        "--output {output.csv:q} 2> {log:q}"

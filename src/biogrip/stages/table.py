@@ -17,6 +17,7 @@ MODULES = {
     "printed_values": "printed_values",
     "linearisation": "linearisation",
     "contact": "contact",
+    "sampling_evidence": "sampling_evidence",
     "robustness": "robustness",
 }
 """The module that makes each table, in a function of the table's name."""
