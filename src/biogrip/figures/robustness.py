@@ -92,8 +92,10 @@ def _errors(axes: Axes, settings: dict[str, Any], points: pd.DataFrame, height_i
     first = points[points["method"] == settings["methods"][0]]
     error = _grid(settings, first, "median_absolute_error_percent")
     bound = _grid(settings, first, "bound_percent")
-    _heat_map(axes, settings, error / bound, _RATIO, "cividis_r")
-    _write(axes, [error, bound], _RATIO(error / bound), "cividis_r", height_in)
+    # An error of exactly zero has no logarithm, but a colour: the best.
+    ratio = np.clip(error / bound, _RATIO.vmin, _RATIO.vmax)
+    _heat_map(axes, settings, ratio, _RATIO, "cividis_r")
+    _write(axes, [error, bound], _RATIO(ratio), "cividis_r", height_in)
 
 
 def _grid(settings: dict[str, Any], points: pd.DataFrame, column: str) -> Array:
