@@ -52,7 +52,7 @@ lock:
 
 clean:
 	rm -rf .venv .snakemake results/targets results/measurements results/identifications \
-	  results/histories results/calibrations results/linearisation.csv results/tables \
+	  results/histories results/calibrations results/linearisation.csv results/robustness results/tables \
 	  results/figures results/logs report.html
 
 $(READY): requirements.lock pyproject.toml

@@ -15,6 +15,7 @@ include: "workflow/rules/identifiability.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/summaries.smk"
+include: "workflow/rules/robustness.smk"
 include: "workflow/rules/check.smk"
 
 

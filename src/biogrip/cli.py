@@ -97,6 +97,12 @@ def _parser() -> argparse.ArgumentParser:
     _inputs(collection, "batches", "histories", many=True)
     _outputs(collection, "output", "history")
 
+    robustness = _stage(
+        stages, "robustness", _robustness, "judge the identifications of a sweep over a case"
+    )
+    _inputs(robustness, "identifications", many=True)
+    _outputs(robustness, "output")
+
     table = _stage(stages, "table", _table, "write a table as CSV, Markdown, LaTeX and HTML")
     table.add_argument("name", help="which table")
     _inputs(table, "inputs", many=True)
@@ -290,6 +296,12 @@ def _collection(options: argparse.Namespace) -> None:
         options.output,
         options.history,
     )
+
+
+def _robustness(options: argparse.Namespace) -> None:
+    from biogrip.stages import robustness
+
+    robustness.run(options.settings, options.identifications, options.output)
 
 
 def _table(options: argparse.Namespace) -> None:

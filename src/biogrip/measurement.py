@@ -48,16 +48,28 @@ def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Ar
         unit = rng.uniform(-half_width, half_width, size=len(rotation_rad))
     else:
         unit = rng.standard_normal(len(rotation_rad))
-    noisy: Array = rotation_rad + noise_deviation(rotation_rad, noise) * unit
+    noisy: Array = rotation_rad + standard_deviation(rotation_rad, noise) * unit
     return noisy
 
 
-def noise_deviation(rotation_rad: Array, noise: Noise) -> Array:
-    """Standard deviation of the noise at every sample of a noise-free trace, (n_samples,)."""
+def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
+    """Return the noise's standard deviation in rad at every sample of a noise-free trace.
+
+    Parameters
+    ----------
+    rotation_rad : (n_samples,)
+        Noise-free rotation.
+    noise
+        What is added to it.
+
+    Returns
+    -------
+    (n_samples,)
+    """
     magnitude = np.abs(rotation_rad)
-    if noise.reference == "signal":
-        return noise.level * magnitude
-    return np.full_like(magnitude, noise.level * magnitude.max())
+    scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())
+    deviation: Array = noise.level * scale
+    return deviation
 
 
 def rms(values: Array) -> float:

@@ -44,6 +44,7 @@ rule publish:
         "Running the default study afresh and publishing its tables and figures"
     shell:
         f"{RUN_AFRESH}; "
-        "mkdir -p {params.published:q}; rm -rf {params.published:q}/*; "
+        "mkdir -p {params.published:q}; "
+        "rm -rf {params.published:q}/tables {params.published:q}/figures; "
         'cp -r "$scratch/results/tables" "$scratch/results/figures" {params.published:q}; '
         "rm {params.published:q}/tables/*.html"

@@ -27,7 +27,7 @@ rule measurement:
     log:
         "results/logs/measurement/{case}/{batch}.log",
     wildcard_constraints:
-        case="|".join(map(re.escape, PLAN.simulated)) or NONE,
+        case="|".join(map(re.escape, [*PLAN.simulated, *STUDY.points])) or NONE,
     conda:
         "../envs/biogrip.yaml"
     params:

@@ -23,7 +23,7 @@ from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.identifications import read_identifications
 from biogrip.identify.methods import METHODS
-from biogrip.measurement import Noise, noise_deviation
+from biogrip.measurement import Noise, standard_deviation
 from biogrip.study.case_problem import case_problem
 from biogrip.traces import read_target
 
@@ -48,7 +48,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     time_s, _, rotation = read_target(inputs[1])
     log_truth = posed.logs(settings["parameters"])
     _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
-    noise_rad = noise_deviation(rotation, Noise(**settings["noise"]))
+    noise_rad = standard_deviation(rotation, Noise(**settings["noise"]))
     quantities = parameters_and_sum(posed.searched)
     drawn = figure(PAGE_IN, 3.1)
     grid = drawn.subplots(1, len(quantities), squeeze=False)[0]

@@ -16,7 +16,7 @@ from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import silent
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.methods import identifier
-from biogrip.measurement import Noise, add_noise, noise_deviation
+from biogrip.measurement import Noise, add_noise, standard_deviation
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
 from biogrip.sample import with_fixed
@@ -69,7 +69,7 @@ def run(
     noise, case = Noise(**settings["noise"]), settings["case"]
     truth = posed.logs(settings["parameters"])
     _, sensitivity = posed.of(time_s, rotation).residuals(truth)
-    spread = np.diag(covariance(sensitivity, noise_deviation(rotation, noise)))
+    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, noise)))
     told = np.flatnonzero(np.isfinite(spread))
     names = posed.searched.names
     given = {name: settings["parameters"][name] for i, name in enumerate(names) if i not in told}

@@ -10,6 +10,7 @@ MODULES = (
     *("overview", "torque", "linkage", "comb"),
     *("convergence", "fit", "evolution", "linearisation"),
     *("waterfall", "scatter", "profiles", "valley"),
+    "robustness",
 )
 """Each module draws the figure of its name in its function ``draw``."""
 

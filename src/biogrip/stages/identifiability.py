@@ -11,7 +11,7 @@ from biogrip.identifiability.valley import valley_data
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import identifier
 from biogrip.identify.multi_start import fitted_from
-from biogrip.measurement import Noise, noise_deviation, rms
+from biogrip.measurement import Noise, rms, standard_deviation
 from biogrip.random_streams import stream
 from biogrip.study.case_problem import case_problem
 from biogrip.traces import read_measurements, read_target
@@ -77,7 +77,7 @@ def expected(
     """
     posed = case_problem(settings, calibrated)
     time_s, _, rotation = read_target(target)
-    noise_rad = rms(noise_deviation(rotation, Noise(**settings["noise"])))
+    noise_rad = rms(standard_deviation(rotation, Noise(**settings["noise"])))
     problem = posed.of(time_s, rotation, noise_rad=noise_rad)
     found = fitted_from(problem, posed.logs(settings["parameters"]))
     confidence = settings["confidence"]

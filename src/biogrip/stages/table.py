@@ -22,6 +22,8 @@ MODULES = {
     "verdicts": "verdicts",
     "coverage": "coverage",
     "models": "models",
+    "sampling_evidence": "sampling_evidence",
+    "robustness": "robustness",
 }
 """The module that makes each table, in a function of the table's name."""
 

@@ -11,12 +11,13 @@ from biogrip.errors import BiogripError
 from biogrip.sample import SampleModel
 from biogrip.study import build
 from biogrip.study.source import read_places
+from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
 STAGE_FOLDERS = (
     *("targets", "measurements", "calibrations", "identifications", "histories", "timings"),
     *("identifiability", "coverage", "selection", "summaries", "traces"),
-    *("tables", "figures", "logs"),
+    *("robustness", "tables", "figures", "logs"),
 )
 
 
@@ -74,10 +75,16 @@ class Study:
         The whole config, for tables that show it.
     cases
         By name.
+    sweeps
+        By name.
+    points
+        The cases that the points of the sweeps are, by name.
     """
 
     config: dict[str, Any]
     cases: dict[str, Case]
+    sweeps: dict[str, Sweep]
+    points: dict[str, Case]
 
     @property
     def seeds(self) -> int:
@@ -120,7 +127,8 @@ def load_study(
     complete = _fill_in(with_numbers(config))
     check(complete, places)
     cases = {name: _case(name, block) for name, block in complete["cases"].items()}
-    return Study(complete, cases)
+    points = {name: _case(name, block) for name, block in point_blocks(complete).items()}
+    return Study(complete, cases, sweeps_of(complete), points)
 
 
 def _fill_in(config: dict[str, Any]) -> dict[str, Any]:

@@ -75,13 +75,11 @@ class Plan:
     def target(self, case: str) -> str:
         """Settings of the target stage."""
         c = self._case(case)
-        measurement = c.blocks["measurement"]
-        key = "times_s" if "times_s" in measurement else "rate_Hz"
         return _json(
             **self._simulation(c),
             gripper=self._gripper(c),
             nonlinear=c.blocks["models"]["target"] == "nonlinear",
-            sampling={key: measurement[key]},
+            sampling=self._sampling(c),
             parameters=c.parameters,
             stroke_rad=self._stroke_rad(c),
         )
@@ -311,12 +309,84 @@ class Plan:
             **{key: self.study.config[key] for key in ("gripper", "actuator", "search_range")},
         )
 
+    def sampling_evidence(self) -> str:
+        """Settings of the table of what sampling the paper's errors speak for."""
+        cases = {
+            name: {**self._truth(case), **self._met(case)}
+            for name, case in self.study.cases.items()
+            if case.published
+        }
+        return _json(cases=cases)
+
+    def points(self, sweep: str, case: str) -> list[str]:
+        """Names of the cases that are the points of a sweep over a case."""
+        return [point.name for point in self.study.sweeps[sweep].points(case)]
+
+    def sweep_files(self, pattern: str, sweep: str) -> list[str]:
+        """Fill ``{sweep}`` and ``{case}`` of a path for every case that a sweep is laid over."""
+        return [pattern.format(sweep=sweep, case=case) for case in self.study.sweeps[sweep].cases]
+
+    def robustness(self, sweep: str, case: str) -> str:
+        """Settings of the robustness stage; what all points share is said once."""
+        points = {
+            point.name: {
+                "row": point.row.text,
+                "column": point.column.text,
+                "sampling": self._sampling(self._case(point.name)),
+                "search_range": self._case(point.name).blocks["search_range"],
+                **self._met(self._case(point.name)),
+            }
+            for point in self.study.sweeps[sweep].points(case)
+        }
+        first, *others = points.values()
+        shared = {k: v for k, v in first.items() if all(other[k] == v for other in others)}
+        return json.dumps(
+            {
+                "methods": self.study.methods,
+                "noise_floor_tolerance": self._tolerance,
+                "parameters": self._case(case).parameters,
+                **shared,
+                "points": {
+                    name: {key: value for key, value in point.items() if key not in shared}
+                    for name, point in points.items()
+                },
+            }
+        )
+
+    def heat_maps(self, sweep: str) -> str:
+        """Settings of a sweep's heat maps and of its table."""
+        chosen = self.study.sweeps[sweep]
+        axes = {"rows": chosen.rows, "columns": chosen.columns}
+        return json.dumps(
+            {
+                "title": chosen.title,
+                "cases": {name: self._case(name).title for name in chosen.cases},
+                "methods": self.study.methods,
+                **{
+                    name: {
+                        "label": axis.label,
+                        "values": {value.text: value.shown for value in axis.values},
+                        "reconstructed": any(
+                            self._is_reconstructed(key)
+                            for value in axis.values
+                            for key in value.overrides
+                        ),
+                    }
+                    for name, axis in axes.items()
+                },
+            }
+        )
+
+    def _is_reconstructed(self, key: str) -> bool:
+        marked = self.study.config["reconstructed"]
+        return any(key == name or key.startswith(f"{name}.") for name in marked)
+
     @property
     def _tolerance(self) -> float:
         return float(self.study.config["evaluation"]["noise_floor_tolerance"])
 
     def _case(self, name: str) -> Case:
-        return self.study.cases[name]
+        return self.study.points[name] if name in self.study.points else self.study.cases[name]
 
     @staticmethod
     def _truth(case: Case) -> dict[str, Any]:
@@ -339,6 +409,10 @@ class Plan:
             "case": case.name,
             **{block: case.blocks[block] for block in METHODS[method].blocks},
         }
+
+    def _met(self, case: Case) -> dict[str, Any]:
+        """What the identification of a case assumes, and the noise that it meets."""
+        return {**self._posed(case), "noise": case.blocks["measurement"]["noise"]}
 
     def _judged(self, case: Case) -> dict[str, Any]:
         confidence = case.blocks["identifiability"]["confidence"]
@@ -363,6 +437,12 @@ class Plan:
         c = self._case(name)
         torque = build.torque(self._driving(c.blocks["protocol"]))
         return len(build.sampling(c.blocks["measurement"], torque.end_s))
+
+    @staticmethod
+    def _sampling(case: Case) -> dict[str, Any]:
+        measurement = case.blocks["measurement"]
+        key = "times_s" if "times_s" in measurement else "rate_Hz"
+        return {key: measurement[key]}
 
     def _simulation(self, case: Case) -> dict[str, Any]:
         """What every simulation of a case needs, but for the gripper."""

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from biogrip.study.validation import schema
+from biogrip.study.validation import OVERRIDABLE, schema
 
 _BOUNDS = {
     "exclusiveMinimum": "> {}",
@@ -33,15 +33,16 @@ def reference(config: Path) -> str:
     sections: list[str] = []
     for name, leaf in whole["properties"].items():
         block = _resolved(leaf)
-        if name == "cases":
+        if "additionalProperties" in block and "properties" not in block:
+            named = _resolved(block["additionalProperties"])
             keys = [
                 row
-                for key, part in _resolved(block["additionalProperties"])["properties"].items()
-                if key not in whole["properties"]
-                for row in _rows(f"cases.NAME.{key}", _resolved(part), None)
+                for key, part in named["properties"].items()
+                if key not in OVERRIDABLE
+                for row in _rows(f"{name}.NAME.{key}", _resolved(part), None)
             ]
-            text = _resolved(block["additionalProperties"])["description"]
-            sections.append(_section("cases", f"{block['description']} {text}", keys))
+            text = f"{block['description']} {named['description']}"
+            sections.append(_section(name, text, keys))
         elif "properties" in block:
             rows = list(_rows(name, block, defaults.get(name)))
             sections.append(_section(name, block["description"], rows))
@@ -64,7 +65,8 @@ def _rows(path: str, block: Mapping[str, Any], default: Any) -> Iterator[tuple[s
             inner = default.get(key) if isinstance(default, Mapping) else None
             yield from _rows(f"{path}.{key}", part, inner)
     elif "properties" in items:
-        yield _row(path, block, "see Figure 3 in `config.yaml`")
+        shown = _NO_DEFAULT if default is None else "see Figure 3 in `config.yaml`"
+        yield _row(path, block, shown)
         for key, part in items["properties"].items():
             yield from _rows(f"{path}[].{key}", part, None)
     else:
@@ -81,14 +83,19 @@ def _allowed(leaf: Mapping[str, Any]) -> str:
     bounds = ", ".join(text.format(leaf[key]) for key, text in _BOUNDS.items() if key in leaf)
     if leaf["type"] == "array":
         low, high = leaf.get("minItems"), leaf.get("maxItems")
-        count = "" if low is None else f"{low} " if low == high else f"{low} to {high} "
+        most = " or more" if high is None else "" if low == high else f" to {high}"
+        count = "" if low is None else f"{low}{most} "
         inner = _resolved(leaf["items"])
         if "enum" in inner:
             return f"list of {', '.join(f'`{value}`' for value in inner['enum'])}"
-        return f"list of {count}{inner.get('type', 'values')} {_allowed_bounds(inner)}".strip()
-    words = {"string": "text", "object": "block"}
-    kinds = leaf["type"] if isinstance(leaf["type"], list) else [leaf["type"]]
-    return f"{' or '.join(words.get(str(kind), str(kind)) for kind in kinds)} {bounds}".strip()
+        return f"list of {count}{_kinds(inner['type'])} {_allowed_bounds(inner)}".strip()
+    return f"{_kinds(leaf['type'])} {bounds}".strip()
+
+
+def _kinds(type_: str | list[str]) -> str:
+    words = {"string": "text", "object": "block", "array": "list"}
+    kinds = type_ if isinstance(type_, list) else [type_]
+    return " or ".join(words.get(kind, kind) for kind in kinds)
 
 
 def _allowed_bounds(leaf: Mapping[str, Any]) -> str:

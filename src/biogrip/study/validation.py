@@ -18,6 +18,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.sample import MODELS, MOST_BRANCHES
 from biogrip.study.meaning import Problem, meaning_problems
 from biogrip.study.source import ConfigFiles, KeyPath
+from biogrip.study.sweeps import placed, point_blocks, sweep_problems
 
 OVERRIDABLE = (
     *("gripper", "protocol", "measurement", "search_range"),
@@ -28,7 +29,7 @@ OVERRIDABLE = (
 
 # YAML 1.1 reads 1e-3 as text, for want of a dot; people mean a number.
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+")
-_PROSE = {"title", "error_percent"}
+_PROSE = {"title", "error_percent", "label", "unit"}
 _SHOWN = 6
 
 _Validator = extend(
@@ -79,6 +80,8 @@ def check(config: Mapping[str, Any], files: ConfigFiles) -> None:
         list(_odd_keys((), config))
         or list(_schema_problems(config))
         or list(meaning_problems(config))
+        or list(sweep_problems(config))
+        or list(_point_problems(config))
     )
     seen: dict[str, str] = {}
     for path, text in problems:
@@ -126,6 +129,15 @@ def _schema_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     yield from _not_finite((), config)
 
 
+def _point_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
+    """Check every point of every sweep like a case that the user wrote."""
+    points = point_blocks(config)
+    if points:
+        whole = {**config, "cases": points}
+        found = list(_schema_problems(whole)) or list(meaning_problems(whole))
+        yield from (placed(config, problem) for problem in found)
+
+
 def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
     found = error.instance
     limit = error.validator_value
@@ -143,12 +155,16 @@ def _explain(path: KeyPath, error: ValidationError) -> Iterator[Problem]:
             missing = next(key for key in limit if f"'{key}'" in error.message)
             yield (*path, missing), "is missing and has no default."
         case "propertyNames" | "pattern":
-            if path[-1:] == ("title",):
+            if path[-1:] and path[-1] in _PROSE:
                 text = "allowed are 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _."
                 yield path, f"found {_shown(found)}, {text}"
             else:
-                text = "a letter, then up to 63 letters, digits, '_' or '-' (it names files)."
-                yield (*path, found), f"not a usable case name: {text}"
+                kind, rest = {
+                    "cases": ("case", "63 letters, digits, '_' or '-'"),
+                    "sweeps": ("sweep", "31 letters, digits or '_'"),
+                }[str(path[0])]
+                text = f"a letter, then up to {rest} (it names files)."
+                yield (*path, found), f"not a usable {kind} name: {text}"
         case "type":
             words = {
                 "object": "a block of keys",

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import parameters_and_sum
-from biogrip.measurement import Noise, noise_deviation
+from biogrip.measurement import Noise, standard_deviation
 from biogrip.study.case_problem import case_problem
 from biogrip.tables.layout import Cell, Column, Table
 from biogrip.traces import read_target
@@ -50,7 +50,7 @@ def coverage(settings: dict[str, Any], inputs: list[Path]) -> Table:
         target = next(path for path in inputs if path.stem == name)
         time_s, _, rotation = read_target(target)
         _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
-        noise_rad = noise_deviation(rotation, Noise(**case["noise"]))
+        noise_rad = standard_deviation(rotation, Noise(**case["noise"]))
         for quantity in parameters_and_sum(posed.searched):
             mine = found[found["quantity"] == quantity.label]
             if mine.empty:

@@ -1,0 +1,58 @@
+"""How precisely a simulated case can be identified at all: bounds at its true parameters."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.fisher import bound
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.measurement import Noise, standard_deviation
+from biogrip.response.sensitivity import rotation_and_sensitivity
+from biogrip.sample import with_fixed
+from biogrip.study import build
+
+
+def bounds_percent(
+    settings: Mapping[str, Any], parameters: Mapping[str, float], time_s: Array
+) -> list[tuple[Quantity, float]]:
+    """Bound of everything that is identified of a case, with the noise that it has.
+
+    Parameters
+    ----------
+    settings
+        ``gripper``, ``protocol`` (and ``actuator``, if that is in volts), ``model``,
+        ``branches``, ``fixed``, ``nonlinear``, ``noise``.
+    parameters
+        Where the bounds are taken, SI units. What is zero there comes out as
+        undetermined, for the trace does not know its logarithm.
+    time_s : (n_samples,)
+        Sampling times.
+
+    Returns
+    -------
+    list of (Quantity, float)
+        Every parameter, and the sum of the exchangeable ones, each with 100
+        times the standard deviation of its logarithm; see
+        `biogrip.identifiability.fisher`. Without noise there are none: NaN.
+    """
+    model = with_fixed(build.sample_model(settings), settings["fixed"])
+    quantities = parameters_and_sum(model)
+    noise = Noise(**settings["noise"])
+    if noise.level == 0:
+        return [(q, math.nan) for q in quantities]
+    values = np.array([parameters[name] for name in model.names])
+    rotation, sensitivity = rotation_and_sensitivity(
+        build.gripper(settings["gripper"]),
+        model,
+        build.torque(settings),
+        time_s,
+        values,
+        nonlinear=settings["nonlinear"],
+    )
+    sigma = standard_deviation(rotation, noise)
+    with np.errstate(divide="ignore"):
+        logarithms = np.log(values)
+    return [(q, 100 * bound(sensitivity, sigma, logarithms, q)) for q in quantities]

@@ -1,0 +1,183 @@
+import copy
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from biogrip.errors import BiogripError
+from biogrip.study.config import Study, load_study
+from biogrip.study.plan import Plan
+
+ROOT = Path(__file__).parents[2]
+DEFAULT = ROOT / "config" / "config.yaml"
+ARMS = ("gripper.left.stiffness_Nm_per_rad", "gripper.right.stiffness_Nm_per_rad")
+SWEEP = """\
+sweeps:
+  noise:
+    cases: [liquid_drop_2, endothelial_cell]
+    rows: {label: level, key: measurement.noise.level, values: [0.1, 2e-2]}
+    columns:
+      label: kind
+      key: measurement.noise
+      values:
+        - {label: a, kind: uniform, reference: peak}
+        - {label: b, reference: signal, kind: gaussian}
+"""
+
+
+def load(tmp_path: Path, text: str) -> Study:
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    return load_study({**yaml.safe_load(DEFAULT.read_text()), **yaml.safe_load(text)}, [file])
+
+
+def settings(study: Study) -> dict[str, str]:
+    """Everything that decides a point's results, by its name."""
+    plan = Plan(study, Path("nowhere"))
+    methods = study.methods
+    return {
+        name: plan.target(name)
+        + plan.measurement(name)
+        + "".join(plan.identification(name, method) for method in methods)
+        for name in study.points
+    }
+
+
+def test_points_are_the_base_case_with_two_values_changed(tmp_path: Path) -> None:
+    study = load(tmp_path, SWEEP)
+    assert list(study.points) == [
+        f"{case}--noise--{level}--{kind}"
+        for case in ("liquid_drop_2", "endothelial_cell")
+        for level in ("0_1", "0_02")
+        for kind in ("uniform-peak", "gaussian-signal")
+    ]
+    base = study.cases["liquid_drop_2"]
+    point = study.points["liquid_drop_2--noise--0_02--uniform-peak"]
+    wanted = copy.deepcopy(base.blocks)
+    wanted["measurement"]["noise"] = {"kind": "uniform", "level": 0.02, "reference": "peak"}
+    assert point.blocks == wanted
+    assert (point.parameters, point.model) == (base.parameters, base.model)
+    assert base.blocks["measurement"]["noise"]["level"] == 0.1
+    assert not set(study.points) & set(study.cases)
+
+
+def test_a_list_of_keys_changes_all_of_them(tmp_path: Path) -> None:
+    text = SWEEP.replace("key: measurement.noise.level", f"key: [{', '.join(ARMS)}]")
+    study = load(tmp_path, text.replace("[0.1, 2e-2]", "[2.2e-7]"))
+    arms = study.points["endothelial_cell--noise--2_2e-07--uniform-peak"].blocks["gripper"]
+    assert [arms[arm]["stiffness_Nm_per_rad"] for arm in ("left", "right")] == [2.2e-7] * 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("[0.1, 2e-2]", "[0.4, 0.1, 0.3, 0.02]"),
+        ("        - {label: a,", "        - {label: c, kind: uniform, reference: signal}\n"
+         "        - {label: renamed,"),
+        ("cases: [liquid_drop_2,", "cases: [liquid_drop_1, liquid_drop_2,"),
+        ("    cases: [liquid", "    title: Another\n    cases: [liquid"),
+    ],
+)  # fmt: skip
+def test_whatever_is_added_changes_no_other_point(tmp_path: Path, old: str, new: str) -> None:
+    before = settings(load(tmp_path, SWEEP))
+    assert old in SWEEP
+    after = settings(load(tmp_path, SWEEP.replace(old, new)))
+    assert {name: after[name] for name in before} == before
+
+
+def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) -> None:
+    names = [
+        set(load(tmp_path, SWEEP.replace("[0.1, 2e-2]", f"[{one}]")).points)
+        for one in ("1", "1.0", "1e0", "10e-1")
+    ]
+    assert names[0] == names[1] == names[2] == names[3]
+
+
+def test_heat_maps_have_values_in_the_axis_unit(tmp_path: Path) -> None:
+    text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
+    shown = json.loads(Plan(load(tmp_path, text), Path("nowhere")).heat_maps("noise"))
+    assert shown["rows"] == {
+        "label": "level (%)",
+        "values": {"0.1": "10", "0.02": "2"},
+        "reconstructed": False,
+    }
+    assert shown["columns"]["values"] == {"a": "a", "b": "b"}
+    # Kind and reference are reconstructed by the default study.
+    assert shown["columns"]["reconstructed"]
+
+
+LEVEL = "key: measurement.noise.level"
+BAD = {
+    ("    rows:", "    rwos:"): r"my.yaml, line 4: sweeps.noise.rwos: unknown key. "
+    r"Did you mean 'rows'\?",
+    ("  noise:\n", "  no-ise:\n"): r"line 2: sweeps.no-ise: not a usable sweep name: a letter",
+    ("[liquid_drop_2,", "[liquid_drop_3,"): r"my.yaml, line 3: sweeps.noise.cases\[0\]: found "
+    r"'liquid_drop_3', allowed is a case of the study. Did you mean 'liquid_drop_",
+    (LEVEL, "key: measurement.noise.levle"): r"my.yaml, line 4: sweeps.noise.rows.key: found "
+    r"'measurement.noise.levle', .* single value .* Did you mean 'measurement.noise.level'",
+    (LEVEL, "key: sample.k"): r"found 'sample.k', allowed is the key of a single value",
+    (LEVEL, "key: measurement.noise"): r"found 'measurement.noise', allowed is .* single value",
+    ("key: measurement.noise\n", "key: measurement.rate_Hz\n"): r"columns.key: found "
+    r"'measurement.rate_Hz', allowed is the key of a block that a case may change.",
+    ("[0.1, 2e-2]", "[0.1, -2]"): r"my.yaml, line 4: sweeps.noise.rows.values\[1\]: gives "
+    r"measurement.noise.level: found -2, allowed is at least 0",
+    ("[0.1, 2e-2]", "[]"): r"rows.values: found a list of 0, allowed are at least 1 items",
+    ("[0.1, 2e-2]", "[0.1, 0.1]"): r"rows.values: holds something twice",
+    ("[0.1, 2e-2]", "[0.1, 0.1000000000000000001]"): r"rows.values: holds something twice",
+    ("[0.1, 2e-2]", "[0.1, true]"): r"rows.values\[1\]: found True, allowed is a number or text",
+    ("[0.1, 2e-2]", '[0.1, "0.1"]'): r"line 4: sweeps.noise.rows.values\[1\]: is called '0.1' like",
+    ("label: b, reference: signal, kind: gaussian", "label: b, reference: peak, kind: uniform"): r""
+    r"line 2: sweeps.noise: has the point liquid_drop_2--noise--0_1--uniform-peak twice; allowed",
+    ("label: b,", "label: a,"): r"line 10: sweeps.noise.columns.values\[1\]: is called 'a' like",
+    ("label: a, kind: uniform", "label: a, kind: unifrom"): r"my.yaml, line 9: "
+    r"sweeps.noise.columns.values\[0\]: gives .*kind: found 'unifrom'. Did you mean 'uniform'",
+    ("label: a, kind", "label: a, kidn"): r"gives measurement.noise.kidn: unknown key",
+    ("label: a, kind", "kind"): r"columns.values\[0\].label: is missing and has no default",
+    ("label: a, kind", "label: a, level: 1, kind"): r"columns.values\[0\]: sets "
+    r"measurement.noise.level, which the rows do too",
+    ("- {label: b, reference: signal, kind: gaussian}", "- 3"): r"columns.values: holds blocks and",
+    (LEVEL + ", values: [0.1, 2e-2]", "key: measurement.rate_Hz, values: [1e-3]"): r"my.yaml, "
+    r"line 4: sweeps.noise.rows.values\[0\]: gives measurement.rate_Hz: found 0.001, which gives",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("change", BAD, ids=lambda change: change[1].strip()[:40])
+def test_bad_sweeps_are_explained(tmp_path: Path, change: tuple[str, str]) -> None:
+    assert change[0] in SWEEP
+    with pytest.raises(BiogripError) as caught:
+        load(tmp_path, SWEEP.replace(*change, 1))
+    message = str(caught.value)
+    assert re.search(BAD[change], message), message
+    assert message.count("\n") < 10
+
+
+def test_a_problem_that_no_value_has_alone_is_placed_at_its_sweep(tmp_path: Path) -> None:
+    """Jaws that are 10 um apart cannot hold the sample of 60 um that the case has."""
+    config: dict[str, Any] = yaml.safe_load(DEFAULT.read_text())
+    config["cases"]["liquid_drop_2"]["sample"]["size_m"] = 60e-6
+    text = SWEEP.replace("measurement.noise.level", "gripper.jaw_gap_m").replace("0.1,", "1e-5,")
+    config |= yaml.safe_load(text)
+    file = tmp_path / "my.yaml"
+    file.write_text(text)
+    with pytest.raises(BiogripError, match=r"line 2: sweeps.noise: 1e-05 and a for liquid_drop_2"):
+        load_study(config, [file])
+
+
+def test_a_case_cannot_have_the_name_of_a_point(tmp_path: Path) -> None:
+    config = yaml.safe_load(DEFAULT.read_text()) | yaml.safe_load(SWEEP)
+    name = "endothelial_cell--noise--0_02--uniform-peak"
+    config["cases"][name] = config["cases"]["endothelial_cell"]
+    with pytest.raises(BiogripError, match=rf"cases.{name}: is the name of a point of the sweep"):
+        load_study(config, [])
+
+
+def test_the_shipped_sweeps_cover_what_they_say() -> None:
+    file = ROOT / "config" / "robustness.yaml"
+    sweeps = yaml.safe_load(file.read_text())["sweeps"]
+    study = load_study(yaml.safe_load(DEFAULT.read_text()) | {"sweeps": sweeps}, [DEFAULT, file])
+    count = {name: len(sweep.points("endothelial_cell")) for name, sweep in study.sweeps.items()}
+    assert count == {"noise": 28, "sampling": 15, "gripper": 25}
+    assert len(study.points) == 3 * sum(count.values())

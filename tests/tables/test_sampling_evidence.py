@@ -1,0 +1,62 @@
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.study.config import load_study
+from biogrip.study.plan import Plan
+from biogrip.tables.sampling_evidence import sampling_evidence
+
+CONFIG = Path(__file__).parents[2] / "config" / "config.yaml"
+
+
+@pytest.fixture
+def settings() -> dict[str, Any]:
+    study = load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG])
+    loaded: dict[str, Any] = json.loads(Plan(study, Path("nowhere")).sampling_evidence())
+    return loaded
+
+
+def test_rows_are_what_the_traces_determine(settings: dict[str, Any]) -> None:
+    rows = sampling_evidence(settings, []).rows
+    assert [row[:2] for row in rows] == [
+        ("endothelial_cell", "k"),
+        ("endothelial_cell", "k_p"),
+        ("endothelial_cell", "c"),
+        ("liquid_drop_1", "k"),
+        ("liquid_drop_1", "c + c_p"),
+        ("liquid_drop_2", "k"),
+        ("liquid_drop_2", "c + c_p"),
+        ("all", "error / bound"),
+    ]
+    # 100 (10.0001 - 9.93) / 10.0001
+    assert rows[4][2] == pytest.approx(0.700993, rel=1e-5)
+
+
+def test_the_last_row_is_the_root_mean_square_of_those_above(settings: dict[str, Any]) -> None:
+    rows = sampling_evidence(settings, []).rows
+    numbers = np.array([row[2:] for row in rows[:-1]], dtype=float)
+    wanted = [np.sqrt(np.mean((numbers[:, 0] / column) ** 2)) for column in numbers[:, 1:].T]
+    np.testing.assert_allclose(np.array(rows[-1][3:], dtype=float), wanted)
+
+
+def test_ten_times_the_samples_are_worth_about_the_root_of_ten(
+    settings: dict[str, Any],
+) -> None:
+    """From 1 to 10 Hz; elsewhere times are too coarse, or so fine that more is seen of k."""
+    for row in sampling_evidence(settings, []).rows[:-1]:
+        bounds = np.array(row[3:], dtype=float)
+        assert np.all(bounds[:-1] / bounds[1:] > 2)
+        assert bounds[1] / bounds[2] == pytest.approx(np.sqrt(10), rel=0.05)
+
+
+def test_what_the_paper_does_not_give_has_no_row(settings: dict[str, Any]) -> None:
+    published = settings["cases"]["liquid_drop_2"]["published"]
+    published["identified"] = {"k": 0.97, "c": 9.7}
+    rows = sampling_evidence(settings, []).rows
+    assert [row[1] for row in rows if row[0] == "liquid_drop_2"] == ["k", "c"]
+    settings["cases"] = {}
+    assert sampling_evidence(settings, []).rows == []

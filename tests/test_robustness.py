@@ -1,0 +1,218 @@
+"""The robustness stage, its table and its heat maps: numbers recomputed by hand."""
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+
+from biogrip.errors import BiogripError
+from biogrip.figures import robustness as figure
+from biogrip.figures.style import styled
+from biogrip.gripper import Arm, Gripper
+from biogrip.identify.records import columns
+from biogrip.protocol import held, torque_history
+from biogrip.response.linear import rotation, step_response
+from biogrip.sample import MODELS, generalized_maxwell
+from biogrip.stages import robustness as stage
+from biogrip.study.config import load_study
+from biogrip.study.plan import Plan
+from biogrip.tables.robustness import headlines, robustness
+
+CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
+CASE = "endothelial_cell"
+TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
+SWEEPS = """
+methods: [genetic, least_squares]
+sweeps:
+  both:
+    title: Level and kind
+    cases: [endothelial_cell]
+    rows:
+      {label: level, unit: "%", unit_in_si: 0.01, key: measurement.noise.level, values: [0, 0.2]}
+    columns:
+      label: kind
+      key: measurement.noise
+      values:
+        - {label: "additive, any", kind: gaussian, reference: peak}
+        - {label: proportional, kind: uniform, reference: signal}
+"""
+TIME_S = np.arange(4001) / 10.0
+
+
+@pytest.fixture
+def plan() -> Plan:
+    config = yaml.safe_load(CONFIG.read_text()) | yaml.safe_load(SWEEPS)
+    return Plan(load_study(config, [CONFIG]), Path("nowhere"))
+
+
+@pytest.fixture
+def identifications(plan: Plan, tmp_path: Path) -> list[Path]:
+    """Five seeds: k = 25, 30, ... 45 and c = 330, c_p = 1; misfits 1 to 1.04 times the noise."""
+    files = []
+    for name in plan.points("both", CASE):
+        files.append(tmp_path / f"{name}.csv")
+        noise = 0.0 if "--0--" in name else 1e-6
+        with files[-1].open("w", newline="") as stream:
+            writer = csv.writer(stream)
+            writer.writerow(columns(MODELS["generalized_maxwell"]))
+            for method in ("genetic", "least_squares"):
+                for seed in range(5):
+                    misfit = (noise or _resolution()) * (1 + 0.01 * seed)
+                    # Least squares is right, and without noise exactly.
+                    if method == "least_squares":
+                        misfit = noise
+                    row = [name, method, seed, 25 + 5 * seed, 12.3, 330, 1]
+                    writer.writerow([*row, misfit, noise, 60, 15500, "stalled"])
+    return files
+
+
+@pytest.fixture
+def judged(plan: Plan, identifications: list[Path], tmp_path: Path) -> Path:
+    output = tmp_path / "judged" / f"{CASE}.csv"
+    stage.run(json.loads(plan.robustness("both", CASE)), identifications, output)
+    return output
+
+
+def _response(parameters: np.ndarray) -> np.ndarray:
+    arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
+    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+    step = step_response(Gripper(1.5e-3, 75.0, arm, arm), generalized_maxwell(parameters))
+    return rotation(step, steps, TIME_S)[0]
+
+
+def _resolution() -> float:
+    """Misfit of the truth with two digits of 1 to 9: 35, 12, 290 (300 has none) and 0.99e-3."""
+    rounded = _response(np.array([35.0, 12.0, 290.0, 0.99e-3]))
+    return float(np.sqrt(np.mean((rounded - _response(TRUTH)) ** 2)))
+
+
+def _by_hand(relative_sigma: np.ndarray) -> np.ndarray:
+    """Sandwich covariance of log k, log k_p, log c from central differences."""
+    step = 1e-5
+    slopes = []
+    for index in range(3):
+        up, down = TRUTH.copy(), TRUTH.copy()
+        up[index] *= np.exp(step)
+        down[index] *= np.exp(-step)
+        slopes.append((_response(up) - _response(down)) / (2 * step))
+    jacobian = np.array(slopes)
+    inverse = np.linalg.inv(jacobian @ jacobian.T)
+    spread: np.ndarray = (jacobian * relative_sigma) @ (jacobian * relative_sigma).T
+    return inverse @ spread @ inverse
+
+
+def test_judged_points_are_the_arithmetic_they_say(judged: Path) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str, "column": str})
+    assert tuple(rows.columns) == stage.COLUMNS
+    assert len(rows) == 4 * 2 * 5
+    index = rows.set_index(["row", "column", "method", "quantity"]).sort_index()
+    noisy = index.loc[("0.2", "additive, any", "genetic")]
+    # |35 - k| / 35 over k = 25, 30 ... 45: 0, 1/7, 1/7, 2/7, 2/7.
+    assert noisy.loc["k", "median_absolute_error_percent"] == pytest.approx(100 / 7, rel=1e-5)
+    total = 100 * (331 - 299.901) / 299.901
+    assert noisy.loc["c + c_p", "median_absolute_error_percent"] == pytest.approx(total, rel=1e-5)
+    # 1, 1.01 and 1.02 times the noise are within 2 % of it.
+    assert noisy.loc["k", "success_share"] == 0.6
+    assert (noisy["seeds"] == 5).all()
+
+
+@pytest.mark.parametrize("method", ["genetic", "least_squares"])
+def test_without_noise_the_floor_is_what_two_digits_can_do(judged: Path, method: str) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str})
+    clean = rows[(rows["row"] == "0") & (rows["method"] == method)]
+    assert clean["bound_percent"].isna().all()
+    wanted = 0.6 if method == "genetic" else 1.0
+    assert clean["success_share"].tolist() == [wanted] * 10
+
+
+@pytest.mark.parametrize("column", ["additive, any", "proportional"])
+def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
+    rows = pd.read_csv(judged, dtype={"row": str})
+    chosen = rows[(rows["row"] == "0.2") & (rows["column"] == column)]
+    found = chosen[chosen["method"] == "genetic"].set_index("quantity")["bound_percent"]
+    phi = _response(TRUTH)
+    sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))
+    wanted = 100 * np.sqrt(np.diag(_by_hand(sigma)))
+    np.testing.assert_allclose(found[["k", "k_p", "c"]], wanted, rtol=1e-3)
+    # c_p of 1e-3 beside c of 299.9 is told by the prior alone, 100 e-folds wide.
+    assert found["c_p"] == pytest.approx(1e4, rel=1e-3)
+
+
+def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
+    text = SWEEPS.replace("values: [0, 0.2]", "values: [0.2]")
+    text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
+    config = yaml.safe_load(CONFIG.read_text()) | yaml.safe_load(text)
+    settings = Plan(load_study(config, [CONFIG]), Path("nowhere")).robustness("both", CASE)
+    stage.run(json.loads(settings), identifications, tmp_path / "x.csv")
+    assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
+
+
+def test_a_missing_point_is_named(plan: Plan, identifications: list[Path], tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match=r"cell--both--0--gaussian-peak: no file of identific"):
+        stage.run(
+            json.loads(plan.robustness("both", CASE)), identifications[1:], tmp_path / "x.csv"
+        )
+
+
+def test_the_table_has_the_best_and_the_worst_determined(plan: Plan, judged: Path) -> None:
+    table = robustness(json.loads(plan.heat_maps("both")), [judged])
+    names = [column.name for column in table.columns]
+    rows = [dict(zip(names, row, strict=True)) for row in table.rows]
+    assert [(row["quantity"], row["row"], row["column"]) for row in rows] == [
+        (quantity, level, kind)
+        for quantity in ("k_p", "k")
+        for level in ("0", "20")
+        for kind in ("additive, any", "proportional")
+    ]
+    assert rows[-1]["success_genetic"] == 0.6
+    assert rows[-1]["success_least_squares"] == 1.0
+    assert "reconstructed" in table.columns[2].heading
+    assert "reconstructed" not in table.columns[1].heading
+
+
+def _bounds(**percent: list[float]) -> pd.DataFrame:
+    rows = [(q.replace("_and_", " + "), p) for q, values in percent.items() for p in values]
+    return pd.DataFrame(rows, columns=["quantity", "bound_percent"])
+
+
+def test_headlines_follow_from_the_bounds() -> None:
+    assert headlines(_bounds(k=[50, 60], k_p=[5, 6], c=[1, 2])) == ["c", "k"]
+    # A sum stands for its parts, whatever their bounds.
+    assert headlines(_bounds(c=[1, 1], c_p=[2, 2], c_and_c_p=[3, 3], k=[99, 98])) == [
+        "c + c_p",
+        "k",
+    ]
+    assert headlines(_bounds(k=[99, 400, 400], c=[1, 1, np.nan])) == ["c"]
+    assert headlines(_bounds(k=[400.0])) == []
+
+
+def test_heat_maps_show_the_numbers_they_are_given(plan: Plan, judged: Path) -> None:
+    settings: dict[str, Any] = json.loads(plan.heat_maps("both"))
+    with styled():
+        drawn = figure.draw(settings, [judged])
+    shares, best, worst = drawn.axes[:3]
+    texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
+    assert texts[0] == ["60\n(100)"] * 4
+    rows = pd.read_csv(judged, dtype={"row": str})
+    bound = rows[(rows["row"] == "0.2") & (rows["quantity"] == "k")]["bound_percent"].unique()
+    assert texts[2] == ["14", "14", *(f"14\n({value:.2g})" for value in bound)]
+    assert [label.get_text() for label in worst.get_yticklabels()] == ["0", "20"]
+    assert [label.get_text() for label in worst.get_xticklabels()] == [
+        "additive,\nany",
+        "proportional",
+    ]
+    assert best.get_title(loc="left").startswith("$k_{p}$: error")
+
+
+def test_a_damaged_sweep_is_named(plan: Plan, tmp_path: Path) -> None:
+    settings = json.loads(plan.heat_maps("both"))
+    (tmp_path / f"{CASE}.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(BiogripError, match=r"endothelial_cell.csv, line 1: wanted the columns"):
+        robustness(settings, [tmp_path / f"{CASE}.csv"])
+    with pytest.raises(BiogripError, match="endothelial_cell: no file of its points is given"):
+        robustness(settings, [])
