@@ -24,7 +24,7 @@ rule all:
         targets=collect("results/targets/{case}.csv", case=PLAN.simulated),
         identifications=collect("results/identifications/{case}.csv", case=CASES),
         tables=collect("results/tables/{table}.csv", table=TABLES),
-        timings="results/timings/methods.csv",
+        timings="results/timings.csv",
         summaries=collect("results/summaries/{case}.html", case=CASES),
         figures=collect("results/figures/{figure}.png", figure=FIGURES),
 

@@ -11,7 +11,7 @@ from biogrip.errors import BiogripError
 from biogrip.identify.methods import METHODS
 from biogrip.study.config import check_results_folder, load_study
 from biogrip.study.locks import release_dead_locks, sign_locks
-from biogrip.study.modules import source_files
+from biogrip.study.modules import fingerprint, source_files
 from biogrip.study.plan import Plan
 from biogrip.study.source import read_places
 
@@ -53,6 +53,7 @@ onstart:
 NONE = "(?!)"
 PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
+COMPARES_MODELS = bool(STUDY.config["model_selection"]["models"])
 PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
 
 

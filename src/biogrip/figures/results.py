@@ -17,6 +17,9 @@ from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.traces import read_measurements
 
+SHOWN_SEEDS = 100
+"""Figures that draw something for each seed draw no more than so many: the first."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -80,8 +83,18 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     )
 
 
-def read_history(path: Path, method: str) -> pd.DataFrame:
-    """Read the histories of a case by one method.
+def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the identifications of the seeds that are drawn one by one."""
+    return found[found["seed"] < SHOWN_SEEDS]
+
+
+def seeds_in_words(count: int) -> str:
+    """Say how many of a number of seeds are drawn one by one."""
+    return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
+def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
+    """Read the histories, by one method, of the seeds that are drawn and of the best.
 
     Raises
     ------
@@ -89,7 +102,14 @@ def read_history(path: Path, method: str) -> pd.DataFrame:
         If the file cannot be read.
     """
     try:
-        return pd.read_parquet(path, filters=[("method", "==", method)])
+        by_method = ("method", "==", method)
+        return pd.read_parquet(
+            path,
+            filters=[
+                [by_method, ("seed", "<", SHOWN_SEEDS)],
+                [by_method, ("seed", "==", best)],
+            ],
+        )
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
 

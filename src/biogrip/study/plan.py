@@ -2,13 +2,13 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from biogrip.identify.methods import METHODS
 from biogrip.study import build
-from biogrip.study.batches import Batch, existing_batches, plan_batches
+from biogrip.study.batches import Batch, existing_batches, plan_batches, seeds_a_batch
 from biogrip.study.config import Case, Study, overlaid
 
 
@@ -26,6 +26,7 @@ class Plan:
 
     study: Study
     results: Path
+    _planned: dict[tuple[str, ...], list[Batch]] = field(default_factory=dict, init=False)
 
     def batches(self, case: str, method: str) -> list[Batch]:
         """Batches of seeds of a case and method, those with results kept."""
@@ -45,8 +46,12 @@ class Plan:
         return 1 if self._case(case).recorded else self.study.seeds
 
     def _batches(self, seeds: int, *folder: str) -> list[Batch]:
-        existing = existing_batches(self.results.joinpath(*folder))
-        return plan_batches(seeds, self.study.batch_size, existing)
+        # Listed once: a plan does not change while it is carried out.
+        if folder not in self._planned:
+            existing = existing_batches(self.results.joinpath(*folder))
+            size = seeds_a_batch(seeds, self.study.batch_size)
+            self._planned[folder] = plan_batches(seeds, size, existing)
+        return self._planned[folder]
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
         """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case.
@@ -59,6 +64,13 @@ class Plan:
             for method in methods
             for batch in self.batches(case, method)
         ]
+
+    def joined_files(self, stage: str, case: str) -> list[str]:
+        """Files of a stage that are joined to one for a case."""
+        if stage == "timings":
+            return self.batch_files("results/timings/{case}/{method}/{batch}.csv", case)
+        batches = self.coverage_batches if stage == "coverage" else self.selection_batches
+        return [f"results/{stage}/{case}/{batch.name}.csv" for batch in batches(case)]
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
