@@ -14,6 +14,11 @@ SMALL = """
 seeds: 4
 batch_size: 2
 measurement: {rate_Hz: 1.0}
+methods: [genetic, least_squares, differential_evolution]
+least_squares: {candidates: 100, starts: 4}
+differential_evolution: {popsize: 5, maxiter: 20}
+identifiability: {coverage_seeds: 4}
+model_selection: {models: [maxwell, generalized_maxwell]}
 genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
 cases:
   liquid_drop_1: null

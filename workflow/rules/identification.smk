@@ -29,7 +29,7 @@ rule identification:
 # What every seed adds a row to, so that no table has thousands of inputs.
 rule joined:
     input:
-        batches=lambda wildcards: PLAN.joined_files(wildcards.stage, wildcards.case),
+        batches=lambda wildcards: PLAN.stage_files(wildcards.stage, wildcards.case),
         code=source_files("biogrip.stages.joined"),
     output:
         "results/{stage}/{case}.csv",

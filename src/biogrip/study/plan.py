@@ -34,7 +34,11 @@ class Plan:
 
     def coverage_batches(self, case: str) -> list[Batch]:
         """Batches of the seeds that intervals are tested with."""
-        seeds = self._case(case).blocks["identifiability"]["coverage_seeds"]
+        seeds = (
+            self._case(case).blocks["identifiability"]["coverage_seeds"]
+            if case in self.covered
+            else 0
+        )
         return self._batches(seeds, "coverage", case)
 
     def selection_batches(self, case: str) -> list[Batch]:
@@ -65,12 +69,14 @@ class Plan:
             for batch in self.batches(case, method)
         ]
 
-    def joined_files(self, stage: str, case: str) -> list[str]:
-        """Files of a stage that are joined to one for a case."""
-        if stage == "timings":
-            return self.batch_files("results/timings/{case}/{method}/{batch}.csv", case)
-        batches = self.coverage_batches if stage == "coverage" else self.selection_batches
-        return [f"results/{stage}/{case}/{batch.name}.csv" for batch in batches(case)]
+    def stage_files(self, stage: str, case: str) -> list[str]:
+        """Files of a stage that works in batches, of a case."""
+        suffix = ".parquet" if stage in ("measurements", "histories") else ".csv"
+        if stage in ("selection", "coverage"):
+            planned = self.selection_batches if stage == "selection" else self.coverage_batches
+            return [f"results/{stage}/{case}/{batch.name}{suffix}" for batch in planned(case)]
+        method = "" if stage == "measurements" else "{method}/"
+        return self.batch_files(f"results/{stage}/{{case}}/{method}{{batch}}{suffix}", case)
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
