@@ -108,7 +108,8 @@ def test_a_killed_run_continues_with_the_same_command(finished: Path, tmp_path: 
     assert list((tmp_path / ".snakemake" / "locks").iterdir())
     run = snakemake(tmp_path)
     assert run.status == 0, run.output
-    assert 0 < run.jobs("identification") < 4
+    # Of 12, three were there; of these, one may not have been written down.
+    assert 0 < run.jobs("identification") < 12
     assert tables(tmp_path) == tables(finished)
 
 
