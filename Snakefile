@@ -41,9 +41,15 @@ rule all:
     default_target: True
     input:
         targets=collect("results/targets/{case}.csv", case=PLAN.simulated),
+        batches=[
+            file
+            for case in CASES
+            for stage in STAGES_IN_BATCHES
+            for file in PLAN.stage_files(stage, case)
+        ],
         identifications=collect("results/identifications/{case}.csv", case=CASES),
         tables=collect("results/tables/{table}.csv", table=TABLES),
-        timings="results/timings/methods.csv",
+        timings="results/timings.csv",
         summaries=collect("results/summaries/{case}.html", case=CASES),
         figures=collect("results/figures/{figure}.png", figure=FIGURES),
 

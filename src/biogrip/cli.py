@@ -103,6 +103,12 @@ def _parser() -> argparse.ArgumentParser:
     _inputs(robustness, "identifications", many=True)
     _outputs(robustness, "output")
 
+    text = "join the batches of a case in a stage whose files are tables"
+    joined = stages.add_parser("joined", help=text, description=text)
+    joined.set_defaults(command=_joined)
+    _inputs(joined, "batches", many=True)
+    _outputs(joined, "output")
+
     table = _stage(stages, "table", _table, "write a table as CSV, Markdown, LaTeX and HTML")
     table.add_argument("name", help="which table")
     _inputs(table, "inputs", many=True)
@@ -302,6 +308,12 @@ def _robustness(options: argparse.Namespace) -> None:
     from biogrip.stages import robustness
 
     robustness.run(options.settings, options.identifications, options.output)
+
+
+def _joined(options: argparse.Namespace) -> None:
+    from biogrip.stages import joined
+
+    joined.run(options.batches, options.output)
 
 
 def _table(options: argparse.Namespace) -> None:

@@ -2,7 +2,7 @@ import itertools
 
 import pytest
 
-from biogrip.study.batches import Batch, parse_batch, plan_batches
+from biogrip.study.batches import MOST_BATCHES, Batch, parse_batch, plan_batches, seeds_a_batch
 
 
 def names(*arguments: object) -> list[str]:
@@ -44,6 +44,14 @@ def test_every_seed_is_covered_once_whatever_exists(seeds: int, size: int) -> No
             assert len(covered) >= seeds
             # Half-way through, the plan does not change: a restarted run continues.
             assert plan_batches(seeds, size, plan[::2]) == plan or existing
+
+
+def test_very_many_seeds_make_larger_batches_not_more() -> None:
+    assert seeds_a_batch(50, 25) == seeds_a_batch(1000, 25) == 25
+    assert seeds_a_batch(10_000, 25) == 250
+    assert seeds_a_batch(10_000, 500) == 500
+    for seeds in (1001, 9_999, 123_456):
+        assert len(plan_batches(seeds, seeds_a_batch(seeds, 25))) <= MOST_BATCHES
 
 
 def test_names_are_read_back() -> None:

@@ -14,6 +14,11 @@ SMALL = """
 seeds: 4
 batch_size: 2
 measurement: {rate_Hz: 1.0}
+methods: [genetic, least_squares, differential_evolution]
+least_squares: {candidates: 100, starts: 4}
+differential_evolution: {popsize: 5, maxiter: 20}
+identifiability: {coverage_seeds: 4}
+model_selection: {models: [maxwell, generalized_maxwell]}
 genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
 genetic_refined: {first: 2, last: 1}
 least_squares: {candidates: 200, starts: 3}
@@ -33,30 +38,36 @@ class Run:
     output: str
 
     def jobs(self, rule: str) -> int:
-        """How many jobs of a rule were run or would be (from the job table)."""
-        for line in self.output.splitlines():
-            words = line.split()
-            if len(words) == 2 and words[0] == rule and words[1].isdigit():
-                return int(words[1])
-        return 0
+        """How many jobs of a rule were run or would be."""
+        return self.all_jobs().get(rule, 0)
+
+    def all_jobs(self) -> dict[str, int]:
+        """How many jobs of each rule were run or would be (from the job table)."""
+        rows = [line.split() for line in self.output.splitlines()]
+        table = {row[0]: int(row[1]) for row in rows if len(row) == 2 and row[1].isdigit()}
+        return {rule: jobs for rule, jobs in table.items() if rule not in ("all", "total")}
 
 
 Snakemake = Callable[..., Run]
 
 
 def snakemake(
-    folder: Path, *arguments: str, config: str = SMALL, environment: dict[str, str] | None = None
+    folder: Path,
+    *arguments: str,
+    config: str = SMALL,
+    environment: dict[str, str] | None = None,
+    root: Path = ROOT,
 ) -> Run:
     """Run the repository's workflow in a folder of its own, over a config laid on the default."""
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
     jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
     command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
-    command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
+    command += ["--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
     command += ["--configfile", str(overlay)]
     done = subprocess.run(
         command,
-        cwd=ROOT,
+        cwd=root,
         env={**os.environ, **(environment or {})},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

@@ -10,8 +10,9 @@ from snakemake.settings.types import ExecMode
 from biogrip.errors import BiogripError
 from biogrip.identify.methods import METHODS
 from biogrip.study.config import check_results_folder, load_study
+from biogrip.study.damage import remove_damaged
 from biogrip.study.locks import release_dead_locks, sign_locks
-from biogrip.study.modules import source_files
+from biogrip.study.modules import fingerprint, source_files
 from biogrip.study.plan import Plan
 from biogrip.study.source import read_places
 
@@ -43,6 +44,8 @@ except BiogripError as error:
 
 if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
     release_dead_locks(Path(".snakemake"))
+    for damaged in remove_damaged(Path("results")):
+        print(f"biogrip: {damaged}: was cut short; making it again.", file=sys.stderr)
 
 
 onstart:
@@ -53,6 +56,13 @@ onstart:
 NONE = "(?!)"
 PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
+COMPARES_MODELS = bool(STUDY.config["model_selection"]["models"])
+# Asked for by themselves, or one that is lost would be missed only when it is needed.
+STAGES_IN_BATCHES = [
+    *("measurements", "identifications", "histories", "timings"),
+    *(["selection"] if COMPARES_MODELS else []),
+    *(["coverage"] if PLAN.covered else []),
+]
 PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
 
 

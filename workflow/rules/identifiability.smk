@@ -52,7 +52,6 @@ rule coverage:
         target="results/targets/{case}.csv",
         expected="results/identifiability/expected/{case}.json",
         calibrated=lambda wildcards: calibrations_of(wildcards.case),
-        code=source_files("biogrip.stages.coverage", METHODS["least_squares"].module),
     output:
         "results/coverage/{case}/{batch}.csv",
     log:
@@ -61,6 +60,7 @@ rule coverage:
         "../envs/biogrip.yaml"
     params:
         settings=lambda wildcards: PLAN.coverage(wildcards.case),
+        code=fingerprint("biogrip.stages.coverage", METHODS["least_squares"].module),
     message:
         "Estimates and intervals of {wildcards.case}, {wildcards.batch}"
     shell:
@@ -73,7 +73,6 @@ rule selection:
     input:
         measurements="results/measurements/{case}/{batch}.parquet",
         calibrated=lambda wildcards: calibrations_of(wildcards.case),
-        code=source_files("biogrip.stages.selection", METHODS["least_squares"].module),
     output:
         "results/selection/{case}/{batch}.csv",
     log:
@@ -82,6 +81,7 @@ rule selection:
         "../envs/biogrip.yaml"
     params:
         settings=lambda wildcards: PLAN.selection(wildcards.case),
+        code=fingerprint("biogrip.stages.selection", METHODS["least_squares"].module),
     message:
         "Fitting every sample model to {wildcards.case}, {wildcards.batch}"
     shell:

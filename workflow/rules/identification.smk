@@ -5,9 +5,6 @@ rule identification:
     input:
         measurements="results/measurements/{case}/{batch}.parquet",
         calibrated=lambda wildcards: calibrations_of(wildcards.case),
-        code=lambda wildcards: source_files(
-            "biogrip.stages.identification", METHODS[wildcards.method].module
-        ),
     output:
         parameters="results/identifications/{case}/{method}/{batch}.csv",
         history="results/histories/{case}/{method}/{batch}.parquet",
@@ -18,12 +15,35 @@ rule identification:
         "../envs/biogrip.yaml"
     params:
         settings=lambda wildcards: PLAN.identification(wildcards.case, wildcards.method),
+        code=lambda wildcards: fingerprint(
+            "biogrip.stages.identification", METHODS[wildcards.method].module
+        ),
     message:
         "Identifying {wildcards.case} by {wildcards.method}, {wildcards.batch}"
     shell:
         "biogrip identification --settings {params.settings:q} --seeds {wildcards.batch} "
         "--measurements {input.measurements:q} --calibrated {input.calibrated:q} "
         "--output {output.parameters:q} --history {output.history:q} --timing {output.timing:q} 2> {log:q}"
+
+
+# What every seed adds a row to, so that no table has thousands of inputs.
+rule joined:
+    input:
+        batches=lambda wildcards: PLAN.stage_files(wildcards.stage, wildcards.case),
+        code=source_files("biogrip.stages.joined"),
+    output:
+        "results/{stage}/{case}.csv",
+    log:
+        "results/logs/joined/{stage}_{case}.log",
+    wildcard_constraints:
+        stage="timings|coverage|selection",
+        case="|".join(map(re.escape, CASES)),
+    conda:
+        "../envs/biogrip.yaml"
+    message:
+        "Putting together the {wildcards.stage} of {wildcards.case}"
+    shell:
+        "biogrip joined --batches {input.batches:q} --output {output:q} 2> {log:q}"
 
 
 rule collection:

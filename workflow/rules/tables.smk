@@ -12,7 +12,7 @@ TABLES = [
     *(f"errors_{case}" for case in CASES),
     "errors",
     *(f"verdicts_{case}" for case in CASES),
-    "models",
+    *(["models"] if COMPARES_MODELS else []),
     *(["methods", "linearisation"] if PLAN.simulated else []),
     *(["coverage"] if PLAN.covered else []),
     *(["evidence", "printed_values"] if PUBLISHED_CASES else []),
@@ -129,11 +129,7 @@ rule verdicts_table:
 
 rule models_table:
     input:
-        fits=[
-            f"results/selection/{case}/{batch.name}.csv"
-            for case in CASES
-            for batch in PLAN.selection_batches(case)
-        ],
+        fits=collect("results/selection/{case}.csv", case=CASES),
         code=source_files("biogrip.tables.models"),
     output:
         csv="results/tables/models.csv",
@@ -188,11 +184,7 @@ rule methods_table:
 rule coverage_table:
     input:
         targets=collect("results/targets/{case}.csv", case=PLAN.covered),
-        intervals=[
-            f"results/coverage/{case}/{batch.name}.csv"
-            for case in PLAN.covered
-            for batch in PLAN.coverage_batches(case)
-        ],
+        intervals=collect("results/coverage/{case}.csv", case=PLAN.covered),
         code=source_files("biogrip.tables.coverage"),
     output:
         csv="results/tables/coverage.csv",
@@ -219,19 +211,13 @@ rule coverage_table:
 # Outside tables/, for times are not the same on every machine.
 rule timings_table:
     input:
-        timings=[
-            file
-            for case in CASES
-            for file in PLAN.batch_files(
-                "results/timings/{case}/{method}/{batch}.csv", case
-            )
-        ],
+        timings=collect("results/timings/{case}.csv", case=CASES),
         code=source_files("biogrip.tables.timings"),
     output:
-        csv="results/timings/methods.csv",
-        text=multiext("results/timings/methods", ".md", ".tex"),
+        csv="results/timings.csv",
+        text=multiext("results/timings", ".md", ".tex"),
         html=report(
-            "results/timings/methods.html",
+            "results/timings.html",
             caption="../report/timings.rst",
             category="Tables",
             labels={"case": "all", "item": "processor times", "format": "table"},

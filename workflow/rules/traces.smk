@@ -21,7 +21,6 @@ rule target:
 rule measurement:
     input:
         target="results/targets/{case}.csv",
-        code=source_files("biogrip.stages.measurement"),
     output:
         "results/measurements/{case}/{batch}.parquet",
     log:
@@ -32,6 +31,7 @@ rule measurement:
         "../envs/biogrip.yaml"
     params:
         settings=lambda wildcards: PLAN.measurement(wildcards.case),
+        code=fingerprint("biogrip.stages.measurement"),
     message:
         "Adding noise to {wildcards.case}, {wildcards.batch}"
     shell:

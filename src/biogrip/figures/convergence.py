@@ -6,7 +6,7 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from biogrip.figures.results import read_history, seeds_drawn
+from biogrip.figures.results import read_history, seeds_in_words
 from biogrip.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
 from biogrip.identify.identifications import at_noise_floor, lowest_misfit, read_identifications
 
@@ -14,7 +14,7 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
-    """Draw by how much every seed's misfit exceeds its noise, and of the best.
+    """Draw by how much the seeds' misfits exceed their noise, and that of the best.
 
     Parameters
     ----------
@@ -25,11 +25,11 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         Identifications (CSV) and histories (Parquet) of the case.
     """
     found = read_identifications(inputs[0], settings["method"])
-    best = int(lowest_misfit(found)["seed"])
-    history = read_history(inputs[1], settings["method"], best)
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
+    best = int(lowest_misfit(found)["seed"])
+    history = read_history(inputs[1], settings["method"], best)
     reached = at_noise_floor(found, settings["noise_floor_tolerance"])
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
@@ -39,7 +39,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         if seed == best:
             style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
         axes.plot(rows["generation"], excess, **style)
-    axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_drawn(found))
+    axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
     axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)

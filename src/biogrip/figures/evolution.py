@@ -5,14 +5,14 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from biogrip.figures.results import read_history, seeds_drawn
+from biogrip.figures.results import read_history, seeds_in_words
 from biogrip.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
 from biogrip.identify.identifications import lowest_misfit, read_identifications
 from biogrip.study import build
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
-    """Draw every parameter's evolution for all seeds and for the best.
+    """Draw every parameter's evolution for the seeds and for the best.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
         grid[0].plot([], [], color=FITTED)[0],
     ]
-    labels = [seeds_drawn(found), f"seed {best}, lowest misfit"]
+    labels = [seeds_in_words(len(found)), f"seed {best}, lowest misfit"]
     if settings["parameters"]:
         lines.append(grid[0].plot([], [], color=TARGET, linestyle="--")[0])
         labels.append("target")

@@ -4,11 +4,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.figures.results import best_fit, scale_of
+from biogrip.figures.results import SHOWN_SEEDS, best_fit, first_seeds, scale_of, seeds_in_words
 from biogrip.figures.style import (
     ALL_SEEDS,
     FITTED,
@@ -45,8 +46,12 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     _fit(axes[0], cases[0], identifications[0], others)
+    seeds = 0
     for index, (case, path) in enumerate(zip(cases, identifications, strict=False)):
-        _scatter(axes[index + 1], case, path, settings["noise_floor_tolerance"], index)
+        found = read_identifications(path, case["method"])
+        seeds = len(found)
+        tolerance = settings["noise_floor_tolerance"]
+        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index)
     legend: dict[str, Any] = {}
     for panel_axes in axes[1:]:
         legend |= {
@@ -59,6 +64,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         loc="outside lower right",
         ncols=4,
         markerscale=2.5,
+        title=seeds_in_words(seeds) if seeds > SHOWN_SEEDS else None,
     )
     return drawn
 
@@ -89,11 +95,10 @@ def _fit(axes: Axes, case: dict[str, Any], identifications: Path, others: list[P
 def _scatter(
     axes: Axes,
     case: dict[str, Any],
-    identifications: Path,
+    found: pd.DataFrame,
     tolerance: float,
     index: int,
 ) -> None:
-    found = read_identifications(identifications, case["method"])
     reached = at_noise_floor(found, tolerance)
     ticks = []
     for x, (label, columns, target, paper) in enumerate(_quantities(case)):

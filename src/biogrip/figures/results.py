@@ -17,8 +17,8 @@ from biogrip.study import build
 from biogrip.study.batches import parse_batch
 from biogrip.traces import read_measurements
 
-# A line a seed: more than these cannot be told apart, and make a figure too large to open.
-MOST_SEEDS_DRAWN = 1000
+SHOWN_SEEDS = 100
+"""Figures that draw something for each seed draw no more than so many: the first."""
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,18 @@ def best_fit(settings: dict[str, Any], identifications: Path, others: list[Path]
     )
 
 
+def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the identifications of the seeds that are drawn one by one."""
+    return found[found["seed"] < SHOWN_SEEDS]
+
+
+def seeds_in_words(count: int) -> str:
+    """Say how many of a number of seeds are drawn one by one."""
+    return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
 def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
-    """Read a method's histories: of the first `MOST_SEEDS_DRAWN` seeds and of the best.
+    """Read the histories, by one method, of the seeds that are drawn and of the best.
 
     Raises
     ------
@@ -92,18 +102,16 @@ def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
         If the file cannot be read.
     """
     try:
-        mine = ("method", "==", method)
-        drawn = [mine, ("seed", "<", MOST_SEEDS_DRAWN)]
-        return pd.read_parquet(path, filters=[drawn, [mine, ("seed", "==", best)]])
+        by_method = ("method", "==", method)
+        return pd.read_parquet(
+            path,
+            filters=[
+                [by_method, ("seed", "<", SHOWN_SEEDS)],
+                [by_method, ("seed", "==", best)],
+            ],
+        )
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
-
-
-def seeds_drawn(found: pd.DataFrame) -> str:
-    """Return what a legend says of the lines from `read_history`."""
-    if len(found) <= MOST_SEEDS_DRAWN:
-        return f"all {len(found)} seeds"
-    return f"{MOST_SEEDS_DRAWN} of {len(found)} seeds"
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

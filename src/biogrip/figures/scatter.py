@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
+from biogrip.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.figures.style import (
     METHOD_STYLES,
     PAGE_IN,
@@ -65,7 +66,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, limit), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
-    _legend(drawn, settings, list(found["method"].unique()))
+    _legend(drawn, settings, list(found["method"].unique()), found["seed"].nunique())
     return drawn
 
 
@@ -77,18 +78,19 @@ def _quantity(axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float
     names = list(methods.unique())
     for place, name in enumerate(names):
         mine = ratios[(methods == name).to_numpy()]
+        shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
-        x = place + 0.6 * ((np.arange(len(mine)) * 0.618034) % 1 - 0.5)
+        x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
         style = METHOD_STYLES[name]
-        inside = (mine > bottom) & (mine < top)
+        inside = (shown > bottom) & (shown < top)
         dots: dict[str, Any] = {
             "color": style["color"],
             "linestyle": "",
             "markeredgewidth": 0,
             "alpha": 0.55,
         }
-        axes.plot(x[inside], mine[inside], marker="o", markersize=2, **dots)
-        for outside, marker, edge in ((mine >= top, "^", top), (mine <= bottom, "v", bottom)):
+        axes.plot(x[inside], shown[inside], marker="o", markersize=2, **dots)
+        for outside, marker, edge in ((shown >= top, "^", top), (shown <= bottom, "v", bottom)):
             height = np.full(int(outside.sum()), edge)
             (line,) = axes.plot(
                 x[outside], height, marker=marker, markersize=3, clip_on=False, **dots
@@ -124,7 +126,7 @@ def _title(quantity: Quantity, limit: float) -> str:
     return f"{quantity.symbol}: {known}"
 
 
-def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str]) -> None:
+def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str], seeds: int) -> None:
     handles: list[Any] = []
     axes = drawn.axes[0]
     for name in methods:
@@ -138,4 +140,5 @@ def _legend(drawn: Figure, settings: dict[str, Any], methods: list[str]) -> None
     if settings["published"]:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
-    drawn.suptitle(settings["title"], x=0.01, ha="left", fontsize=8)
+    few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
+    drawn.suptitle(settings["title"] + few, x=0.01, ha="left", fontsize=8)

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
+from biogrip.figures.results import first_seeds, seeds_in_words
 from biogrip.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
 from biogrip.identifiability.document import read_verdicts
 from biogrip.identify.identifications import read_identifications
@@ -41,16 +42,17 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     total = sum(valley["best"])
     label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
     axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
+    drawn_seeds = seeds_in_words(len(identified))
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
     axes.plot(
-        *np.clip(identified[columns].to_numpy(float), 0, _SHOWN * total).T,
+        *np.clip(first_seeds(identified)[columns].to_numpy(float), 0, _SHOWN * total).T,
         "o",
         color=FITTED,
         markersize=2.5,
         markeredgewidth=0,
         alpha=0.8,
         clip_on=False,
-        label=f"{METHODS[settings['method']].title}, all seeds",
+        label=f"{METHODS[settings['method']].title}, {drawn_seeds}",
     )
     for place, color, marker, name in (
         (settings["parameters"], TARGET, "*", "truth"),

@@ -6,6 +6,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+MOST_BATCHES = 40
+"""Batches that a fresh case is cut into at most."""
+
 
 class Batch(NamedTuple):
     """Seeds from first to last, both included."""
@@ -54,6 +57,14 @@ def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) ->
             plan.append(batch)
             covered = batch.last + 1
     return plan + _cut(covered, seeds, batch_size)
+
+
+def seeds_a_batch(seeds: int, batch_size: int) -> int:
+    """Size of the batches of a case: the one asked for, or more where there are very many seeds.
+
+    Snakemake thinks about each job for a millisecond, before every run.
+    """
+    return max(batch_size, -(-seeds // MOST_BATCHES))
 
 
 def existing_batches(folder: Path) -> list[Batch]:

@@ -5,12 +5,28 @@ package is followed, without running anything.
 """
 
 import ast
+import hashlib
 from functools import cache
 from pathlib import Path
 
 import biogrip
 
 _PACKAGE = Path(biogrip.__file__).parent
+
+
+@cache
+def fingerprint(*modules: str) -> str:
+    """Hash of what `source_files` names: one value where a list of files would be long.
+
+    Parameters
+    ----------
+    modules
+        For example ``"biogrip.stages.target"``.
+    """
+    digest = hashlib.sha256()
+    for file in source_files(*modules):
+        digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+    return digest.hexdigest()[:16]
 
 
 def source_files(*modules: str) -> list[str]:

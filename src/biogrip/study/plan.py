@@ -2,13 +2,13 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from biogrip.identify.methods import METHODS
 from biogrip.study import build
-from biogrip.study.batches import Batch, existing_batches, plan_batches
+from biogrip.study.batches import Batch, existing_batches, plan_batches, seeds_a_batch
 from biogrip.study.config import Case, Study, overlaid
 
 
@@ -26,6 +26,7 @@ class Plan:
 
     study: Study
     results: Path
+    _planned: dict[tuple[str, ...], list[Batch]] = field(default_factory=dict, init=False)
 
     def batches(self, case: str, method: str) -> list[Batch]:
         """Batches of seeds of a case and method, those with results kept."""
@@ -33,7 +34,11 @@ class Plan:
 
     def coverage_batches(self, case: str) -> list[Batch]:
         """Batches of the seeds that intervals are tested with."""
-        seeds = self._case(case).blocks["identifiability"]["coverage_seeds"]
+        seeds = (
+            self._case(case).blocks["identifiability"]["coverage_seeds"]
+            if case in self.covered
+            else 0
+        )
         return self._batches(seeds, "coverage", case)
 
     def selection_batches(self, case: str) -> list[Batch]:
@@ -45,8 +50,12 @@ class Plan:
         return 1 if self._case(case).recorded else self.study.seeds
 
     def _batches(self, seeds: int, *folder: str) -> list[Batch]:
-        existing = existing_batches(self.results.joinpath(*folder))
-        return plan_batches(seeds, self.study.batch_size, existing)
+        # Listed once: a plan does not change while it is carried out.
+        if folder not in self._planned:
+            existing = existing_batches(self.results.joinpath(*folder))
+            size = seeds_a_batch(seeds, self.study.batch_size)
+            self._planned[folder] = plan_batches(seeds, size, existing)
+        return self._planned[folder]
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
         """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case.
@@ -59,6 +68,15 @@ class Plan:
             for method in methods
             for batch in self.batches(case, method)
         ]
+
+    def stage_files(self, stage: str, case: str) -> list[str]:
+        """Files of a stage that works in batches, of a case."""
+        suffix = ".parquet" if stage in ("measurements", "histories") else ".csv"
+        if stage in ("selection", "coverage"):
+            planned = self.selection_batches if stage == "selection" else self.coverage_batches
+            return [f"results/{stage}/{case}/{batch.name}{suffix}" for batch in planned(case)]
+        method = "" if stage == "measurements" else "{method}/"
+        return self.batch_files(f"results/{stage}/{{case}}/{method}{{batch}}{suffix}", case)
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""

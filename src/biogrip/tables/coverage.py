@@ -39,15 +39,15 @@ def coverage(settings: dict[str, Any], inputs: list[Path]) -> Table:
         ``cases``: what `case_problem` needs, ``parameters``, ``noise`` and
         ``seeds``, how many of them count, by case.
     inputs
-        For each case its target, and batches of intervals, CSV.
+        For each case its target and its intervals, CSV, named after it.
     """
     rows: list[tuple[Cell, ...]] = []
     for name, case in settings["cases"].items():
         posed = case_problem(case)
         log_truth = posed.logs(case["parameters"])
-        found = pd.concat([_read(path) for path in inputs if path.parent.name == name])
+        target, intervals = (path for path in inputs if path.stem == name)
+        found = _read(intervals)
         found = found[found["seed"] < case["seeds"]]
-        target = next(path for path in inputs if path.stem == name)
         time_s, _, rotation = read_target(target)
         _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
         noise_rad = standard_deviation(rotation, Noise(**case["noise"]))

@@ -26,7 +26,7 @@ def timings(settings: dict[str, Any], inputs: list[Path]) -> Table:
     settings
         Nothing is needed.
     inputs
-        Processor times of batches, CSV.
+        Processor times of the cases, CSV.
     """
     try:
         spent = pd.concat([pd.read_csv(path) for path in inputs])

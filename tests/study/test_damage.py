@@ -1,0 +1,62 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.study.damage import remove_damaged
+from biogrip.traces import Measurements, write_measurements
+
+ROWS = "case,method,seed\nx,genetic,0\nx,genetic,1\n"
+
+
+def written(results: Path, name: str, content: bytes) -> Path:
+    path = results / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("identifications/x/genetic/seeds_0-1.csv", ROWS.encode()),
+        ("selection/x/seeds_0-1.csv", ROWS.encode()),
+        ("coverage/x/seeds_0-1.csv", b"case,quantity\n"),
+        ("identifications/x.csv", ROWS.encode()),
+        ("identifiability/x.json", b'{"a": 1}\n'),
+        ("logs/x.log", b"no line end"),
+        ("tables/x.html", b"<html></html>\n"),
+    ],
+)
+def test_what_is_whole_stays(tmp_path: Path, name: str, content: bytes) -> None:
+    path = written(tmp_path, name, content)
+    assert remove_damaged(tmp_path) == []
+    assert path.read_bytes() == content
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("identifications/x/genetic/seeds_0-1.csv", ROWS[:-3].encode()),
+        ("identifications/x/genetic/seeds_0-1.csv", ROWS[: ROWS.rindex("x")].encode()),
+        ("identifications/x/genetic/seeds_0-1.csv", ROWS[: ROWS.index("x")].encode()),
+        ("identifications/x.csv", b""),
+        ("identifiability/x.json", b'{"a": '),
+        ("figures/x.png", b"\x89PNG"),
+        ("figures/x.pdf", b"%PDF-1.4\n"),
+        ("tables/x.html", b"<html></h"),
+    ],
+)
+def test_what_was_cut_short_is_removed(tmp_path: Path, name: str, content: bytes) -> None:
+    path = written(tmp_path, name, content)
+    assert remove_damaged(tmp_path) == [path]
+    assert not path.exists()
+
+
+def test_a_parquet_file_is_whole_or_not(tmp_path: Path) -> None:
+    path = tmp_path / "measurements" / "x" / "seeds_0-0.parquet"
+    ramp = np.linspace(0, 1, 1000)
+    write_measurements(path, Measurements(ramp, ramp, {0: ramp}))
+    assert remove_damaged(tmp_path) == []
+    path.write_bytes(path.read_bytes()[:-20])
+    assert remove_damaged(tmp_path) == [path]
