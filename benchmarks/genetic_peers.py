@@ -3,6 +3,7 @@
 Each runs the operators of `biogrip.identify.genetic` as nearly as its interface
 allows, and as fast: truncation selection, random disjoint pairs, single-point
 crossover, and from `mutation_start` on one gene redrawn in half of the children.
+With ``plain`` it does what it does unless told otherwise.
 """
 
 import random
@@ -51,10 +52,15 @@ class Task:
         return self.misfit(self.genome.decode(chromosomes))
 
 
-def by_deap(task: Task, seed: int) -> tuple[IntArray, float]:
+def by_deap(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
     """Run a loop of DEAP's tools, whose ``map`` evaluates a whole batch.
 
-    Chromosomes are copied as lists; DEAP's default, a deep copy, takes longer.
+    Parameters
+    ----------
+    task, seed
+        What to do.
+    plain
+        Whether children start as deep copies, DEAP's default, or as new lists.
     """
     settings, genome = task.settings, task.genome
     low, high = genome.low.tolist(), genome.high.tolist()
@@ -70,7 +76,8 @@ def by_deap(task: Task, seed: int) -> tuple[IntArray, float]:
     toolbox.register("evaluate", lambda batch: [(m,) for m in task.of(np.array(batch)).tolist()])
     toolbox.register("map", lambda evaluate, batch: evaluate(batch))
     toolbox.register("select", tools.selBest, k=settings.survivors)
-    toolbox.register("clone", creator.Chromosome)
+    if not plain:
+        toolbox.register("clone", creator.Chromosome)
     toolbox.register("mate", tools.cxOnePoint)
     toolbox.register("mutate", mutate)
 
@@ -95,11 +102,19 @@ def by_deap(task: Task, seed: int) -> tuple[IntArray, float]:
     return np.array(best), best.fitness.values[0]
 
 
-def by_pygad(task: Task, seed: int) -> tuple[IntArray, float]:
-    """Run PyGAD on batches; selection and mutation are callables on arrays.
+def by_pygad(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
+    """Run PyGAD on batches.
 
     Its crossover makes one child of each two parents that follow one another.
     It does not evaluate a child that equals a parent.
+
+    Parameters
+    ----------
+    task, seed
+        What to do.
+    plain
+        Whether selection and mutation are PyGAD's own, which mates neighbours
+        in rank and mutates every child from the start, or callables on arrays.
     """
     settings, genome = task.settings, task.genome
     rng = np.random.default_rng(seed)
@@ -113,6 +128,10 @@ def by_pygad(task: Task, seed: int) -> tuple[IntArray, float]:
             _mutate(children, genome, rng, settings.mutation_probability)
         return children
 
+    operators: dict[str, Any] = {"parent_selection_type": parents, "mutation_type": mutated}
+    if plain:
+        values = [range(a, b + 1) for a, b in zip(genome.low, genome.high, strict=True)]
+        operators = {"mutation_num_genes": settings.mutated_genes, "gene_space": values}
     run = pygad.GA(
         num_generations=settings.max_generations,
         num_parents_mating=settings.survivors,
@@ -121,9 +140,8 @@ def by_pygad(task: Task, seed: int) -> tuple[IntArray, float]:
         gene_type=int,
         fitness_func=lambda run, chromosomes, indices: -task.of(chromosomes),
         fitness_batch_size=settings.population,
-        parent_selection_type=parents,
         crossover_type="single_point",
-        mutation_type=mutated,
+        **operators,
         random_seed=seed,
         suppress_warnings=True,
     )
@@ -132,16 +150,16 @@ def by_pygad(task: Task, seed: int) -> tuple[IntArray, float]:
     return best, -fitness
 
 
-def by_pymoo(task: Task, seed: int, *, unique: bool = False) -> tuple[IntArray, float]:
+def by_pymoo(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
     """Run pymoo's vectorised genetic algorithm.
 
     Parameters
     ----------
     task, seed
         What to do.
-    unique
-        Whether children that are there already are replaced, which is pymoo's
-        default; the paper's algorithm keeps them.
+    plain
+        Whether children that are there already are replaced, pymoo's default,
+        or kept, as the paper does.
     """
     settings, genome = task.settings, task.genome
     algorithm = GA(
@@ -151,7 +169,7 @@ def by_pymoo(task: Task, seed: int, *, unique: bool = False) -> tuple[IntArray, 
         selection=_AmongSurvivors(settings.survivors),
         crossover=SinglePointCrossover(prob=1.0),
         mutation=_OneGene(genome, settings),
-        eliminate_duplicates=unique,
+        eliminate_duplicates=plain,
         advance_after_initial_infill=True,
     )
     # pymoo counts the initial population as the first generation.

@@ -113,11 +113,14 @@ class TestPeers:
         )
         return Task(noisy.misfit(), noisy.genome, settings)
 
+    @pytest.mark.parametrize("plain", [False, True])
     @pytest.mark.parametrize("name", PEERS)
-    def test_reported_misfit_is_that_of_the_chromosome(self, task: "Task", name: str) -> None:
+    def test_reported_misfit_is_that_of_the_chromosome(
+        self, task: "Task", name: str, plain: bool
+    ) -> None:
         from benchmarks import genetic_peers
 
-        best, misfit = getattr(genetic_peers, name)(task, 1)
+        best, misfit = getattr(genetic_peers, name)(task, 1, plain=plain)
         assert misfit == pytest.approx(task.of(best[None])[0], rel=1e-9)
         assert np.all((task.genome.low <= best) & (best <= task.genome.high))
 
