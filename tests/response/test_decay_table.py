@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.response.decay_table import _DEGREE, _WIDTH, DecayTable
+from biogrip.response.decay_table import DEGREE, SHORT_DEGREE, SHORTER, WIDTH, DecayTable
 from biogrip.response.misfit_series import _power_sums
 
 RNG = np.random.default_rng(0)
@@ -60,7 +60,11 @@ def test_several_sums_and_any_shape() -> None:
     np.testing.assert_allclose(found, sums(rates), atol=1e-14)
 
 
-def test_the_bound_is_what_is_said() -> None:
-    rho = math.pi / _WIDTH + math.hypot(math.pi / _WIDTH, 1)
-    assert rho - 1 / rho == pytest.approx(2 * math.pi / _WIDTH)
-    assert 4 * math.e * rho**-_DEGREE / (rho - 1) == pytest.approx(1.7e-16, rel=0.05)
+@pytest.mark.parametrize(
+    ("width", "degree", "bound"),
+    [(WIDTH, DEGREE, 1.7e-16), (WIDTH / SHORTER, SHORT_DEGREE, 4e-17)],
+)
+def test_the_bounds_are_what_is_said(width: float, degree: int, bound: float) -> None:
+    rho = math.pi / width + math.hypot(math.pi / width, 1)
+    assert rho - 1 / rho == pytest.approx(2 * math.pi / width)
+    assert 4 * math.e * rho**-degree / (rho - 1) == pytest.approx(bound, rel=0.05)
