@@ -4,6 +4,9 @@ PYTHON ?= python3
 JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.installed
+# The libraries that benchmarks compare with stay out of the study's environment.
+BENCH_BIN := .venv-bench/bin
+BENCH_READY := .venv-bench/.installed
 
 LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --python-version 3.11 \
   --generate-hashes --no-header --no-annotate --quiet
@@ -34,8 +37,9 @@ format: $(READY)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-bench: $(READY)
-	$(BIN)/python -m benchmarks
+bench: $(BENCH_READY)
+	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
+	$(BENCH_BIN)/python -m benchmarks
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html
@@ -51,8 +55,10 @@ lock:
 	  $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock)
 
 clean:
-	rm -rf .venv .snakemake results/targets results/measurements results/identifications \
-	  results/histories results/calibrations results/linearisation.csv results/robustness results/tables \
+	rm -rf .venv .venv-bench .snakemake results/targets results/measurements results/traces \
+	  results/identifications results/histories results/timings results/calibrations \
+	  results/identifiability results/coverage results/selection results/summaries \
+	  results/robustness results/linearisation.csv results/tables \
 	  results/figures results/logs report.html
 
 $(READY): requirements.lock pyproject.toml
@@ -60,3 +66,9 @@ $(READY): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(READY)
+
+$(BENCH_READY): requirements.lock benchmarks/requirements.lock pyproject.toml
+	test -x $(BENCH_BIN)/python || $(PYTHON) -m venv .venv-bench
+	$(BENCH_BIN)/python -m pip install --quiet --require-hashes -r requirements.lock -r benchmarks/requirements.lock
+	$(BENCH_BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	touch $(BENCH_READY)

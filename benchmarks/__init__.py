@@ -1,1 +1,1 @@
-"""How fast the hot path is, against peers in the same run."""
+"""How fast and how good the study's methods are, against peers in the same run."""

@@ -1,15 +1,18 @@
-"""Times the misfit of a population, and an identification, against peers; prints Markdown.
+"""Runs every benchmark and writes `benchmarks/results`."""
 
-Every row is measured in this one run, so the ratios hold wherever it runs; the
-seconds do not.
-"""
+import os
 
-from benchmarks.identification import identification_rows
-from benchmarks.misfit import misfit_rows
-from benchmarks.setup import markdown
+# One thread for every competitor. BLAS libraries read this once, while numpy is imported.
+for variable in (
+    "BLIS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+):
+    os.environ[variable] = "1"
 
 if __name__ == "__main__":
-    print("### Misfit of 500 individuals against 4001 samples\n")
-    print(markdown(misfit_rows()))
-    print("\n### One identification at the paper's budget\n")
-    print(markdown(identification_rows()))
+    from benchmarks.report import run
+
+    run()

@@ -1,68 +1,114 @@
-"""The problem that all benchmarks share, and how they are timed."""
+"""The problem that all benchmarks share: one noisy trace of the default study."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import pandas as pd
 import yaml
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
-from biogrip.identify.genome import Genome, genome_of
-from biogrip.measurement import Noise, add_noise
+from biogrip.identify.genetic import GeneticSettings
+from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.measurement import Noise, add_noise, rms
 from biogrip.protocol import TorqueHistory, sample_times
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS, SampleModel
+from biogrip.response.misfit import misfit_of
+from biogrip.sample import SampleModel, model_named
 from biogrip.study import build
 from biogrip.study.config import load_study
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
+CASE = "endothelial_cell"
+POPULATION = 500
+NOISE_FLOOR = 0.02
+"""Misfits up to this share above the noise count as at its floor, as in the study."""
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One noisy trace of Table 5, and what it takes to identify it."""
+    """One noisy trace, and what it takes to identify its sample.
+
+    Parameters
+    ----------
+    gripper, model, steps
+        What is simulated.
+    truth : (n_parameters,)
+        The sample that made the trace.
+    time_s, trace_rad : (n_samples,)
+        The trace.
+    noise_rms_rad
+        RMS of the noise in it.
+    ranges, genome, genetic
+        Where and how the study searches.
+    """
 
     gripper: Gripper
     model: SampleModel
     steps: TorqueHistory
+    truth: Array
     time_s: Array
     trace_rad: Array
+    noise_rms_rad: float
+    ranges: dict[str, GeneRange]
     genome: Genome
-    genetic: dict[str, Any]
+    genetic: GeneticSettings
+
+    @property
+    def interval_s(self) -> float:
+        """Sampling interval."""
+        return float(self.time_s[1])
+
+    def misfit(self, *, nonlinear: bool = False) -> Callable[[Array], Array]:
+        """Return the study's misfit of a population against the trace."""
+        return misfit_of(
+            self.gripper, self.model, self.steps, self.time_s, self.trace_rad, nonlinear=nonlinear
+        )
+
+    def population(self, count: int = POPULATION) -> Array:
+        """Samples drawn uniformly from the search range, shape (count, n_parameters)."""
+        return self.genome.decode(self.genome.draw(count, np.random.default_rng(1)))
 
 
-def problem() -> Problem:
-    """Return the default study's first case with the noise of a fixed seed."""
+def problem(
+    seed: int = 0, *, case: str = CASE, rate_Hz: float | None = None, branches: int = 1
+) -> Problem:
+    """Return a case of the default study with the noise of a seed.
+
+    Parameters
+    ----------
+    seed
+        Of the noise.
+    case
+        Which case.
+    rate_Hz
+        Sampling rate, if not the study's.
+    branches
+        Maxwell branches of the sample model that is identified; the sample
+        itself keeps its own.
+    """
     study = load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG])
-    case = study.cases["endothelial_cell"]
-    model = MODELS[case.model.name]
-    gripper = build.gripper(case.blocks["gripper"])
-    steps = build.torque({"protocol": case.blocks["protocol"]})
-    time_s = sample_times(steps.end_s, case.blocks["measurement"]["rate_Hz"])
-    truth = np.array([[case.parameters[name] for name in model.names]])
-    clean = rotation(step_response(gripper, model.network(truth)), steps, time_s)[0]
-    noise = Noise(**case.blocks["measurement"]["noise"])
-    trace = add_noise(clean, noise, np.random.default_rng(0))
-    genome = genome_of(model, build.gene_ranges(case.blocks["search_range"]))
-    return Problem(gripper, model, steps, time_s, trace, genome, case.blocks["genetic_algorithm"])
-
-
-def seconds(call: Callable[[], object], at_least_s: float = 0.5) -> float:
-    """Return the median time of a call, repeated for a while after one warm-up."""
-    call()
-    times: list[float] = []
-    while sum(times) < at_least_s or len(times) < 3:
-        start = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - start)
-    return float(np.median(times))
-
-
-def markdown(rows: list[dict[str, str]]) -> str:
-    """Return rows as a Markdown table."""
-    return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
+    chosen = study.cases[case]
+    measurement = chosen.blocks["measurement"]
+    gripper = build.gripper(chosen.blocks["gripper"])
+    steps = build.torque({"protocol": chosen.blocks["protocol"]})
+    time_s = sample_times(steps.end_s, rate_Hz or measurement["rate_Hz"])
+    own = model_named(chosen.model.name)
+    truth = np.array([chosen.parameters[name] for name in own.names])
+    clean = rotation(step_response(gripper, own.network(truth)), steps, time_s)[0]
+    trace = add_noise(clean, Noise(**measurement["noise"]), np.random.default_rng(seed))
+    model = model_named(chosen.model.name, branches)
+    ranges = build.gene_ranges(chosen.blocks["search_range"])
+    return Problem(
+        gripper,
+        model,
+        steps,
+        truth,
+        time_s,
+        trace,
+        rms(trace - clean),
+        ranges,
+        genome_of(model, ranges),
+        build.genetic_settings(chosen.blocks["genetic_algorithm"]),
+    )

@@ -1,9 +1,11 @@
+import math
+
 import numpy as np
 import pytest
 
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory, held, sample_times, torque_history
-from biogrip.response.linear import rotation, step_response
+from biogrip.response.linear import drives, rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.sample import MODELS
 from tests.response.reference import random_samples
@@ -58,6 +60,74 @@ def test_agrees_with_forming_the_responses(
     np.testing.assert_allclose(misfit(samples), expected, rtol=1e-9)
 
 
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_projections_agree_with_direct_sums(name: str, gripper: Gripper) -> None:
+    """From modes that stand still to those that are over at once, each drive by itself."""
+    phases, rate_Hz = PROTOCOLS[name]
+    steps = torque_history(phases)
+    count = len(sample_times(steps.end_s, rate_Hz))
+    trace = np.random.default_rng(5).standard_normal(count)
+    misfit = SeriesMisfit(gripper, MODEL, steps, 1 / rate_Hz, trace)
+    rates = -np.concatenate(([1e-300], np.geomspace(1e-9, 1e9, 500)))
+    found = misfit.projections(rates)
+    heights = drives(steps.left[:, 0], steps.right[:, 0], steps.symmetric)
+    expected, scale = np.zeros((2, len(heights), len(rates)))
+    for start, height in zip(steps.time_s * rate_Hz, heights.T, strict=True):
+        first = math.ceil(start - 1e-9)
+        terms = np.exp(np.outer(rates, np.arange(first, count) - start)) * trace[first:]
+        expected += height[:, None] * terms.sum(axis=1)
+        scale += np.abs(height[:, None]) * np.abs(terms).sum(axis=1)
+    assert np.all(np.abs(found - expected) <= 1e-14 * scale)
+    np.testing.assert_allclose(misfit.exact_projections(rates), expected, atol=1e-14 * scale.max())
+
+
+def test_times_of_steps_are_rounded_to_samples(gripper: Gripper) -> None:
+    """0.3 s is 2.9999999999999996 intervals of 0.1 s or 3; the mode must not notice."""
+    trace = np.random.default_rng(9).standard_normal(9)
+    samples = random_samples(200, 10)
+    held_s = [0.1 + 0.2, 0.3, 0.29999999999999993]
+    misfits = [
+        SeriesMisfit(
+            gripper, MODEL, torque_history((held(t, 1e-9), held(0.5, 2e-9))), 0.1, 1e-6 * trace
+        )(samples)
+        for t in held_s
+    ]
+    np.testing.assert_allclose(misfits[1:], misfits[:1] * 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize("count", [2, 3, 5, 1_000_001])
+def test_few_and_many_samples(count: int, gripper: Gripper) -> None:
+    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+    time_s = np.linspace(0, 400.0, count)
+    trace = 1e-5 * np.random.default_rng(11).standard_normal(count)
+    samples = np.vstack((TRUTH, random_samples(7, 12)))
+    misfit = SeriesMisfit(gripper, MODEL, steps, 400.0 / (count - 1), trace)
+    expected = direct(gripper, steps, time_s, trace, samples)
+    np.testing.assert_allclose(misfit(samples), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize(("level", "rtol"), [(1e-4, 1e-9), (0.0, 1e-8)])
+def test_a_constant_trace(
+    level: float, rtol: float, gripper: Gripper, steps: TorqueHistory
+) -> None:
+    """Against zero the misfit is the response itself, in the slowest samples what is left of it.
+
+    Of their way to rest, 1e6 s, they go a fraction 4e-4; constant and mode cancel to its square.
+    """
+    trace = np.full(4001, level)
+    samples = np.vstack((TRUTH, random_samples(500, 13)))
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
+    expected = direct(gripper, steps, np.arange(4001) / 10, trace, samples)
+    np.testing.assert_allclose(misfit(samples), expected, rtol=rtol)
+
+
+def test_parameters_that_are_not_numbers_have_no_misfit(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, np.ones(4001))
+    assert np.isnan(misfit(np.vstack((TRUTH, np.full(4, np.nan))))).tolist() == [False, True]
+
+
 def test_a_perfect_fit_is_zero_up_to_cancellation(gripper: Gripper, steps: TorqueHistory) -> None:
     """Without noise the sums cancel to sqrt(eps) of the signal."""
     time_s = np.arange(4001) / 10
@@ -75,4 +145,4 @@ def test_an_individual_does_not_depend_on_its_company(
     samples = random_samples(300, 4)
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
     alone = np.concatenate([misfit(sample[None, :]) for sample in samples])
-    np.testing.assert_allclose(misfit(samples), alone, rtol=1e-10)
+    np.testing.assert_allclose(misfit(samples), alone, rtol=1e-11)

@@ -111,10 +111,10 @@ def evolve(
     progress: Progress = silent,
 ) -> Evolution:
     """Run the algorithm on any misfit of parameters of shape (n, n_parameters)."""
-    population = _evaluated(genome.draw(settings.population, rng), misfit, genome).ranked()
-    first = population.first(settings.survivors)
+    drawn = _evaluated(genome.draw(settings.population, rng), misfit, genome)
+    first = survivors = drawn.best(settings.survivors)
     evaluations = settings.population
-    rows = [_record(population, settings, evaluations)]
+    rows = [_record(survivors, evaluations)]
     generation = improved = 0
     while True:
         if generation >= settings.max_generations:
@@ -124,17 +124,17 @@ def evolve(
             reason = "stalled"
             break
         generation += 1
-        survivors = population.first(settings.survivors)
         children = _cross(survivors.chromosomes, settings, rng)
         if generation >= settings.mutation_start:
             _mutate(children, genome, settings, rng)
         evaluations += len(children)
-        best = population.ranking[0]
-        population = survivors.merged(_evaluated(children, misfit, genome))
-        if population.ranking[0] < best:
+        best = survivors.ranking[0]
+        everyone = survivors.joined(_evaluated(children, misfit, genome))
+        survivors = everyone.best(settings.survivors)
+        if survivors.ranking[0] < best:
             improved = generation
-        rows.append(_record(population, settings, evaluations))
-        progress(evaluations, float(population.ranking[0]))
+        rows.append(_record(survivors, evaluations))
+        progress(evaluations, float(survivors.ranking[0]))
     chromosomes, best_misfit, median_misfit, counts = zip(*rows, strict=True)
     history = History(
         np.array(best_misfit),
@@ -150,8 +150,7 @@ def evolve(
         reason,
         history,
     )
-    last = population.first(settings.survivors)
-    return Evolution(answer, genome.decode(first.chromosomes), genome.decode(last.chromosomes))
+    return Evolution(answer, genome.decode(first.chromosomes), genome.decode(survivors.chromosomes))
 
 
 @dataclass(frozen=True)
@@ -162,20 +161,21 @@ class _Population:
     codes: IntArray
     ranking: np.ndarray[tuple[int], np.dtype[np.float32]]
 
-    def first(self, count: int) -> "_Population":
-        return _Population(self.chromosomes[:count], self.codes[:, :count], self.ranking[:count])
-
-    def merged(self, other: "_Population") -> "_Population":
+    def joined(self, other: "_Population") -> "_Population":
         return _Population(
             np.concatenate((self.chromosomes, other.chromosomes)),
             np.concatenate((self.codes, other.codes), axis=1),
             np.concatenate((self.ranking, other.ranking)),
-        ).ranked()
+        )
 
-    def ranked(self) -> "_Population":
+    def best(self, count: int) -> "_Population":
         """Best first; ties in the order of the chromosomes' codes."""
-        order = np.lexsort((*self.codes[::-1], self.ranking))
-        return _Population(self.chromosomes[order], self.codes[:, order], self.ranking[order])
+        order = np.lexsort((*self.codes[::-1], self.ranking))[:count]
+        return _Population(
+            self.chromosomes.take(order, axis=0),
+            self.codes.take(order, axis=1),
+            self.ranking[order],
+        )
 
 
 def _evaluated(
@@ -186,12 +186,10 @@ def _evaluated(
     return _Population(chromosomes, genome.code(chromosomes), ranking)
 
 
-def _record(
-    population: _Population, settings: GeneticSettings, evaluations: int
-) -> tuple[IntArray, float, float, int]:
-    ranking = population.ranking
-    median = float(ranking[settings.survivors // 2])
-    return population.chromosomes[0], float(ranking[0]), median, evaluations
+def _record(survivors: _Population, evaluations: int) -> tuple[IntArray, float, float, int]:
+    ranking = survivors.ranking
+    median = float(ranking[len(ranking) // 2])
+    return survivors.chromosomes[0], float(ranking[0]), median, evaluations
 
 
 def _cross(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
@@ -211,12 +209,9 @@ def _cross(parents: IntArray, settings: GeneticSettings, rng: np.random.Generato
         for cut in (settings.first_cut, settings.last_cut)
     )
     cut = rng.integers(min(first, last), last, size=(pairs, 1), endpoint=True)
-    mother, father = parents[drawn[:, 0]], parents[drawn[:, 1]]
-    from_mother = np.arange(genes) < cut
-    children = np.concatenate(
-        (np.where(from_mother, mother, father), np.where(from_mother, father, mother))
-    )
-    return children[:wanted]
+    mated = parents.take(drawn.T, axis=0)
+    children = np.where(np.arange(genes) < cut, mated, mated[::-1])
+    return children.reshape(2 * pairs, genes)[:wanted]
 
 
 def _mutate(

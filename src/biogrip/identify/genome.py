@@ -1,6 +1,7 @@
 """The chromosome: three integer genes a parameter (eq. 10, Tables 3 and 4)."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -69,12 +70,11 @@ class Genome:
         (n, n_parameters)
             Each the double nearest to the decimal number that is encoded.
         """
-        exponent, first, second = np.moveaxis(chromosomes.reshape(len(chromosomes), -1, 3), 2, 0)
-        power = exponent - 2
-        mantissa = (10 * first + second).astype(float)
-        # Powers of ten up to 1e22 are exact doubles, so one division or product rounds once.
-        scale = _POWERS_OF_TEN[np.abs(power)]
-        return np.where(power < 0, mantissa / scale, mantissa * scale)
+        exponent, first, second = (chromosomes[:, gene::3] for gene in range(3))
+        # Both powers are exact doubles, and one of them is 1, so this rounds once.
+        power = exponent + (_LARGEST_POWER - 2)
+        parameters: Array = (10 * first + second) * _MULTIPLIER[power] / _DIVISOR[power]
+        return parameters
 
     def code(self, chromosomes: IntArray) -> IntArray:
         """Number chromosomes so that different ones have different numbers.
@@ -84,18 +84,27 @@ class Genome:
         (n_words, n)
             Fifteen genes a word, for sorting and comparing.
         """
+        shifted = chromosomes - self.low
+        return np.array([shifted[:, genes] @ weights for genes, weights in self._words])
+
+    @cached_property
+    def _words(self) -> list[tuple[slice, IntArray]]:
+        """Genes of each word, and what a step of each of them counts."""
         words = []
         for start in range(0, self.genes, _GENES_A_WORD):
-            here = slice(start, start + _GENES_A_WORD)
-            span = (self.high - self.low + 1)[here]
-            weight = np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))
-            words.append((chromosomes[:, here] - self.low[here]) @ weight)
-        return np.array(words)
+            genes = slice(start, start + _GENES_A_WORD)
+            span = (self.high - self.low + 1)[genes]
+            words.append((genes, np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))))
+        return words
 
 
 # Five parameters of the widest range, (37 * 9 * 9)^5, stay below 2^63.
 _GENES_A_WORD = 15
-_POWERS_OF_TEN = np.array([float(f"1e{power}") for power in range(23)])
+# The largest power of ten that is an exact double.
+_LARGEST_POWER = 22
+_POWERS = range(-_LARGEST_POWER, _LARGEST_POWER + 1)
+_MULTIPLIER = np.array([10.0 ** max(power, 0) for power in _POWERS])
+_DIVISOR = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
 def genome_of(model: SampleModel, ranges: dict[str, GeneRange]) -> Genome:

@@ -13,6 +13,7 @@ Written like this no coefficient of D is a difference, so none loses digits.
 """
 
 from dataclasses import dataclass
+from functools import reduce
 from itertools import permutations
 from math import factorial
 from typing import Any
@@ -139,15 +140,17 @@ def transfer_functions(
     z_4 = _arm_polynomial(gripper.right, inertia)
     coupling = gripper.lever_m**2
     if symmetric and gripper.left == gripper.right:
-        numerators = [[q]] * (2 if both_arms else 1)
-        return TransferFunctions(numerators, _add(_multiply(z_2, q), 2 * coupling * p))
+        numerators = [[q.T]] * (2 if both_arms else 1)
+        return TransferFunctions(numerators, _add(_multiply(z_2, q), 2 * coupling * p).T)
     left, right = _multiply(z_4, q), _multiply(z_2, q)
-    numerators = [[left, coupling * p], [right, -_add(right, coupling * p)]]
+    numerators = [
+        [left.T, coupling * p.T],
+        [right.T, -_add(right, coupling * p).T],
+    ]
     numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
     arms = _multiply(z_2, z_4)
-    return TransferFunctions(
-        numerators, _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
-    )
+    denominator = _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
+    return TransferFunctions(numerators, denominator.T)
 
 
 def rotation(
@@ -224,47 +227,43 @@ def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
 
 
 def _sample_polynomials(network: Network) -> tuple[Array, Array]:
-    """P and Q of the sample's impedance P/Q, ascending powers, shape (n, ...).
+    """P and Q of the sample's impedance P/Q, ascending powers, shape (terms, n).
 
     Each branch enters as c_j s / (1 + T_j s) with its relaxation time T_j = c_j/k_j.
     """
-    relaxation = network.c / network.k
-    one = np.ones(len(network.k_p))
-    factors = [np.stack((one, t), axis=1) for t in relaxation.T]
+    one = np.ones((1, len(network.k_p)))
+    factors = [np.concatenate((one, t[None])) for t in (network.c / network.k).T]
     q = _product(factors, one)
-    p = _multiply(np.stack((network.k_p, network.c_p), axis=1), q)
+    p = _multiply(np.array((network.k_p, network.c_p)), q)
     for j, c_j in enumerate(network.c.T):
         others = _product(factors[:j] + factors[j + 1 :], one)
-        p = _add(p, _multiply(np.stack((0 * one, c_j), axis=1), others))
+        p[1 : 1 + len(others)] += c_j * others
     return p, q
 
 
 def _arm_polynomial(arm: Arm, inertia: bool) -> Array:
     coefficients = [arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2]
-    return np.array([coefficients if inertia else coefficients[:2]])
+    return np.array(coefficients if inertia else coefficients[:2])[:, None]
 
 
 def _multiply(a: Array, b: Array) -> Array:
-    n, terms = max(len(a), len(b)), a.shape[1] + b.shape[1] - 1
-    product = np.zeros((n, terms), dtype=np.result_type(a, b))
-    for i in range(a.shape[1]):
-        product[:, i : i + b.shape[1]] += a[:, i, None] * b
+    terms, n = len(a) + len(b) - 1, max(a.shape[1], b.shape[1])
+    product = np.zeros((terms, n), dtype=np.result_type(a, b))
+    for i, a_i in enumerate(a):
+        product[i : i + len(b)] += a_i * b
     return product
 
 
 def _add(a: Array, b: Array) -> Array:
-    terms = max(a.shape[1], b.shape[1])
-    total = np.zeros((max(len(a), len(b)), terms), dtype=np.result_type(a, b))
-    total[:, : a.shape[1]] += a
-    total[:, : b.shape[1]] += b
+    terms, n = max(len(a), len(b)), max(a.shape[1], b.shape[1])
+    total = np.zeros((terms, n), dtype=np.result_type(a, b))
+    total[: len(a)] += a
+    total[: len(b)] += b
     return total
 
 
 def _product(factors: list[Array], one: Array) -> Array:
-    product = one[:, None]
-    for factor in factors:
-        product = _multiply(product, factor)
-    return product
+    return reduce(_multiply, factors) if factors else one
 
 
 def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
@@ -280,9 +279,8 @@ def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
 
 def slope_at_poles(denominator: NDArray[Any], rates: NDArray[Any]) -> NDArray[Any]:
     """Derivative of the denominators at their roots, a product without differences of terms."""
-    slope = np.repeat(denominator[:, -1:], rates.shape[1], axis=1).astype(
-        np.result_type(denominator, rates)
-    )
+    slope = np.empty_like(rates, dtype=np.result_type(denominator, rates))
+    slope[:] = denominator[:, -1:]
     for i, j in permutations(range(rates.shape[1]), 2):
         slope[:, i] *= rates[:, i] - rates[:, j]
     return slope
@@ -304,7 +302,7 @@ def partial_fractions(transfer: TransferFunctions, rates: NDArray[Any]) -> StepR
 
 def evaluate(coefficients: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
     """Polynomials in ascending powers, shape (n, terms), at z of shape (n, n_points)."""
-    value = np.zeros(z.shape, dtype=np.result_type(coefficients, z))
+    value = np.zeros_like(z, dtype=np.result_type(coefficients, z))
     for coefficient in coefficients.T[::-1]:
         value = value * z + coefficient[:, None]
     return value

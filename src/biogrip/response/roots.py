@@ -43,7 +43,7 @@ def real_quadratic_roots(coefficients: Array) -> Array:
     a, b, c = coefficients.T
     discriminant = np.maximum(b * b - 4 * a * c, (SMALLEST_GAP * b) ** 2)
     q = -0.5 * (b + np.sqrt(discriminant))
-    return np.stack((q / c, a / q), axis=1)
+    return np.array((q / c, a / q)).T
 
 
 def roots(coefficients: Array) -> ComplexArray:

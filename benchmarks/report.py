@@ -1,0 +1,100 @@
+"""Runs all benchmarks and writes what they found as Markdown, JSON and figures."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from benchmarks import identification, misfit
+from benchmarks.growth import growth_section
+from benchmarks.identification import identification_section
+from benchmarks.limit import limit_section
+from benchmarks.machine import machine
+from benchmarks.misfit import misfit_section
+from benchmarks.nonlinear import nonlinear_section
+from benchmarks.optimum import optimum_section
+from benchmarks.section import Section, markdown, number
+from benchmarks.timing import clocked
+from biogrip.figures.style import styled
+from biogrip.files import write_text, written_whole
+
+RESULTS = Path(__file__).parent / "results"
+
+SECTIONS = (
+    misfit_section,
+    identification_section,
+    nonlinear_section,
+    optimum_section,
+    growth_section,
+    limit_section,
+)
+
+# Section, peer and how many times faster than it this project means to be.
+AIMS = (
+    ("misfit", misfit.NUMPY, 25),
+    ("identification", identification.DEAP, 3),
+    ("identification", identification.PYGAD, 15),
+    ("identification", identification.PYMOO, 15),
+)
+
+_INTRODUCTION = """\
+# Benchmarks
+
+Written by `make bench`. All competitors run in one process on one thread and take turns, so that a
+slow moment strikes them all. Times are medians; ratios are taken turn by turn, and given as their
+median with the lowest and the highest."""
+
+
+def run() -> None:
+    """Run every benchmark and write `benchmarks/results`."""
+    sections = []
+    for measure in SECTIONS:
+        seconds, section = clocked(measure)
+        print(f"{section.title}: {seconds:.0f} s", flush=True)
+        sections.append(section)
+        _draw(section)
+    described = machine()
+    text = report(described, sections)
+    write_text(RESULTS / "benchmarks.md", text)
+    found = {"machine": described, **{section.name: list(section.rows) for section in sections}}
+    write_text(RESULTS / "benchmarks.json", json.dumps(found, indent=1) + "\n")
+    print(f"\n{text}")
+
+
+def report(described: Mapping[str, str], sections: Sequence[Section]) -> str:
+    """Return everything as Markdown."""
+    parts = [
+        _INTRODUCTION,
+        markdown([described]),
+        "## Aims",
+        markdown(_aims({section.name: section for section in sections})),
+    ]
+    for section in sections:
+        parts += [f"## {section.title}", section.text, section.table()]
+        if section.figure is not None:
+            parts.append(f"![{section.title}]({section.name}.png)")
+    return "\n\n".join(parts) + "\n"
+
+
+def _aims(sections: Mapping[str, Section]) -> list[dict[str, str]]:
+    found = []
+    for name, peer, aim in AIMS:
+        section = sections[name]
+        row = next(row for row in section.rows if peer in row.values())
+        reached = row["times_ours"] >= aim
+        found.append(
+            {
+                "benchmark": section.title,
+                "faster than": peer,
+                "at least": f"{aim} times",
+                "measured": f"{number(row['times_ours'])} times",
+                "reached": "yes" if reached else "no",
+            }
+        )
+    return found
+
+
+def _draw(section: Section) -> None:
+    if section.figure is None:
+        return
+    with styled(), written_whole(RESULTS / f"{section.name}.png") as scratch:
+        section.figure().savefig(scratch, format="png", metadata={"Software": None})
