@@ -1,9 +1,11 @@
 """The paper's genetic algorithm in the libraries of others.
 
-Each runs the operators of `biogrip.identify.genetic` as nearly as its interface
-allows, and as fast: truncation selection, random disjoint pairs, single-point
-crossover, and from `mutation_start` on one gene redrawn in half of the children.
-With ``plain`` it does what it does unless told otherwise.
+Each in two ways. As documented: set up for integers as its documentation shows,
+with its own operators and defaults, at the paper's population and survivors. Lean:
+the operators of `biogrip.identify.genetic` as nearly as its interface allows, and as
+fast: truncation selection, random disjoint pairs, single-point crossover, and from
+`mutation_start` on one gene redrawn in half of the children. Either way it sees the
+same misfit of whole batches.
 """
 
 import random
@@ -18,6 +20,9 @@ from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.core.mutation import Mutation
 from pymoo.core.problem import Problem
 from pymoo.operators.crossover.pntx import SinglePointCrossover
+from pymoo.operators.mutation.pm import PM
+from pymoo.operators.repair.rounding import RoundingRepair
+from pymoo.operators.sampling.rnd import IntegerRandomSampling
 from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
@@ -52,15 +57,17 @@ class Task:
         return self.misfit(self.genome.decode(chromosomes))
 
 
-def by_deap(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
-    """Run a loop of DEAP's tools, whose ``map`` evaluates a whole batch.
+def by_deap(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
+    """Run the loop of DEAP's overview, whose ``map`` evaluates a whole batch.
 
     Parameters
     ----------
     task, seed
         What to do.
-    plain
-        Whether children start as deep copies, DEAP's default, or as new lists.
+    documented
+        Whether children start as deep copies, DEAP's default, and each gene is
+        redrawn by DEAP's own operator with its own probability, one a child on
+        average; or they start as new lists, and one gene is redrawn.
     """
     settings, genome = task.settings, task.genome
     low, high = genome.low.tolist(), genome.high.tolist()
@@ -76,10 +83,12 @@ def by_deap(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, fl
     toolbox.register("evaluate", lambda batch: [(m,) for m in task.of(np.array(batch)).tolist()])
     toolbox.register("map", lambda evaluate, batch: evaluate(batch))
     toolbox.register("select", tools.selBest, k=settings.survivors)
-    if not plain:
-        toolbox.register("clone", creator.Chromosome)
     toolbox.register("mate", tools.cxOnePoint)
-    toolbox.register("mutate", mutate)
+    if documented:
+        toolbox.register("mutate", tools.mutUniformInt, low=low, up=high, indpb=1 / len(low))
+    else:
+        toolbox.register("clone", creator.Chromosome)
+        toolbox.register("mutate", mutate)
 
     def evaluated(batch: list[Any]) -> list[Any]:
         for chromosome, value in zip(batch, toolbox.map(toolbox.evaluate, batch), strict=True):
@@ -102,7 +111,7 @@ def by_deap(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, fl
     return np.array(best), best.fitness.values[0]
 
 
-def by_pygad(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
+def by_pygad(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
     """Run PyGAD on batches.
 
     Its crossover makes one child of each two parents that follow one another.
@@ -112,9 +121,10 @@ def by_pygad(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, f
     ----------
     task, seed
         What to do.
-    plain
-        Whether selection and mutation are PyGAD's own, which mates neighbours
-        in rank and mutates every child from the start, or callables on arrays.
+    documented
+        Whether initial population, selection and mutation are PyGAD's own, which
+        mates neighbours in rank and mutates every child from the start; or
+        callables on arrays.
     """
     settings, genome = task.settings, task.genome
     rng = np.random.default_rng(seed)
@@ -128,20 +138,29 @@ def by_pygad(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, f
             _mutate(children, genome, rng, settings.mutation_probability)
         return children
 
-    operators: dict[str, Any] = {"parent_selection_type": parents, "mutation_type": mutated}
-    if plain:
-        values = [range(a, b + 1) for a, b in zip(genome.low, genome.high, strict=True)]
-        operators = {"mutation_num_genes": settings.mutated_genes, "gene_space": values}
+    how: dict[str, Any]
+    if documented:
+        how = {
+            "sol_per_pop": settings.population,
+            "num_genes": genome.genes,
+            "gene_space": [range(a, b + 1) for a, b in zip(genome.low, genome.high, strict=True)],
+            "mutation_num_genes": settings.mutated_genes,
+        }
+    else:
+        how = {
+            "initial_population": genome.draw(settings.population, rng),
+            "parent_selection_type": parents,
+            "mutation_type": mutated,
+        }
     run = pygad.GA(
         num_generations=settings.max_generations,
         num_parents_mating=settings.survivors,
         keep_elitism=settings.survivors,
-        initial_population=genome.draw(settings.population, rng),
         gene_type=int,
         fitness_func=lambda run, chromosomes, indices: -task.of(chromosomes),
         fitness_batch_size=settings.population,
         crossover_type="single_point",
-        **operators,
+        **how,
         random_seed=seed,
         suppress_warnings=True,
     )
@@ -150,27 +169,39 @@ def by_pygad(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, f
     return best, -fitness
 
 
-def by_pymoo(task: Task, seed: int, *, plain: bool = False) -> tuple[IntArray, float]:
-    """Run pymoo's vectorised genetic algorithm.
+def by_pymoo(task: Task, seed: int, *, documented: bool) -> tuple[IntArray, float]:
+    """Run pymoo's genetic algorithm.
 
     Parameters
     ----------
     task, seed
         What to do.
-    plain
-        Whether children that are there already are replaced, pymoo's default,
-        or kept, as the paper does.
+    documented
+        Whether it is set up as pymoo's page on discrete variables shows, with
+        single-point crossover: tournaments, polynomial mutation of every child,
+        numbers rounded, and children that are there already replaced; or with the
+        paper's pairs and mutation on arrays, and such children kept.
     """
     settings, genome = task.settings, task.genome
+    how: dict[str, Any]
+    if documented:
+        how = {
+            "sampling": IntegerRandomSampling(),
+            "crossover": SinglePointCrossover(prob=1.0, repair=RoundingRepair()),
+            "mutation": PM(prob=1.0, eta=3.0, vtype=float, repair=RoundingRepair()),
+            "eliminate_duplicates": True,
+        }
+    else:
+        how = {
+            "sampling": genome.draw(settings.population, np.random.default_rng(seed)),
+            "selection": _AmongSurvivors(settings.survivors),
+            "crossover": SinglePointCrossover(prob=1.0),
+            "mutation": _OneGene(genome, settings),
+            "eliminate_duplicates": False,
+            "advance_after_initial_infill": True,
+        }
     algorithm = GA(
-        pop_size=settings.survivors,
-        n_offsprings=settings.population - settings.survivors,
-        sampling=genome.draw(settings.population, np.random.default_rng(seed)),
-        selection=_AmongSurvivors(settings.survivors),
-        crossover=SinglePointCrossover(prob=1.0),
-        mutation=_OneGene(genome, settings),
-        eliminate_duplicates=plain,
-        advance_after_initial_infill=True,
+        pop_size=settings.survivors, n_offsprings=settings.population - settings.survivors, **how
     )
     # pymoo counts the initial population as the first generation.
     generations = settings.max_generations + 1

@@ -1,8 +1,8 @@
 """How far an identification is from what the machine can do at all."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -10,106 +10,79 @@ from benchmarks.section import Row, Section, number
 from benchmarks.setup import Problem, problem
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array
+from biogrip.identify.genetic import evolve
 from biogrip.response.misfit_series import SeriesMisfit
 
 _ROUNDS = 15
 _SEEDS, _NONLINEAR_SEEDS = 15, 3
 _LARGE = 1500
+_FEW, _MANY = 1000, 4000
 
 _TEXT = f"""\
 One identification as the paper says, and the misfit of one generation's children in it, on one
-thread. The misfit's long sums are one matrix product, (modes x B) by (B x columns), with the trace
-folded to B rows, and one weighted sum over the columns: 2 modes B columns + 2 modes columns
-additions and multiplications. The exponentials in them, modes (B + N/B), are counted apart, as each
-is dozens of operations. The limit is the time of both at the machine's own rates: of numpy's
-product of two {_LARGE} x {_LARGE} matrices, and of numpy's exp of as many numbers between -1 and 0.
-The misfit exceeds it by smaller matrices, traffic of memory, roots and weights of the modes, and
-what calls of numpy cost."""
+thread. Making the misfit's table sums over the trace at some hundred rates: 2 rates samples
+additions and multiplications, nearly all in one matrix product. They are compared with the
+machine's own rate, that of numpy's product of two {_LARGE} x {_LARGE} matrices; beside them the
+table takes its exponentials and a weighted sum. From then on the misfit runs over no samples. What
+is left is a hundred calls of numpy on short arrays: the misfit of one individual is what the calls
+themselves cost, and what one individual more costs, from {_FEW} to {_MANY}, is their arithmetic.
+The limit of a generation's misfit is that arithmetic alone."""
 
 
-@dataclass(frozen=True)
-class Operations:
-    """What the long sums of a misfit cost.
+class Watched(SeriesMisfit):
+    """Keeps the time spent in the sums over the trace, and in all of the misfit."""
 
-    Parameters
-    ----------
-    modes, block, columns
-        Shape of the matrix product: (modes, block) times (block, columns).
-    exponentials
-        Powers of the modes, one exponential each.
-    """
-
-    modes: int
-    block: int
-    columns: int
-    exponentials: int
-
-    @property
-    def flops(self) -> int:
-        """Additions and multiplications of the product and of the weighted sum."""
-        return 2 * self.modes * self.columns * (self.block + 1)
-
-
-def operations(misfit: SeriesMisfit, individuals: int, modes_each: int) -> Operations:
-    """Count the operations of a misfit's long sums."""
-    block, columns = misfit._folded.shape
-    modes = individuals * modes_each
-    return Operations(modes, block, columns, modes * (block + len(misfit._across)))
-
-
-class _Watched(SeriesMisfit):
-    """Keeps the time spent in the long sums, and in all of the misfit."""
-
-    sums_s = 0.0
-    misfit_s = 0.0
+    def __init__(self, *args: Any) -> None:
+        self.sums_s = self.misfit_s = 0.0
+        self.rates = 0
+        super().__init__(*args)
 
     def __call__(self, parameters: Array) -> Array:
+        """Misfit of parameters of shape (n, n_parameters)."""
         spent_s, found = clocked(partial(super().__call__, parameters))
         self.misfit_s += spent_s
         return found
 
-    def _projections(self, rates: Array) -> Array:
-        spent_s, sums = clocked(partial(super()._projections, rates))
+    def exact_projections(self, rates: Array) -> Array:
+        """Sums over the trace, only asked for to make the table."""
+        spent_s, sums = clocked(partial(super().exact_projections, rates))
         self.sums_s += spent_s
+        self.rates += len(rates)
         return sums
+
+
+def watched(p: Problem) -> Watched:
+    """Return the misfit of a problem, watched."""
+    return Watched(p.gripper, p.model, p.steps, p.interval_s, p.trace_rad)
 
 
 def limit_section() -> Section:
     """Measure shares, rates and what the rates would allow."""
     p = problem()
     children = p.genetic.population - p.genetic.survivors
-    samples = p.population(children)
-    misfit = SeriesMisfit(p.gripper, p.model, p.steps, p.interval_s, p.trace_rad)
-    count = operations(misfit, children, modes_each=2)
-    rng = np.random.default_rng(0)
-    left, folded = rng.random((count.modes, count.block)), rng.random((count.block, count.columns))
-    large = rng.random((_LARGE, _LARGE))
-    exponents = -rng.random(count.exponentials)
-    timed = alternate(
-        {
-            "misfit": lambda: misfit(samples),
-            "product": lambda: left @ folded,
-            "large product": lambda: large @ large,
-            "exp": lambda: np.exp(exponents),
-        },
-        _ROUNDS,
-    )
-    misfit_ms, exp_ms = timed.median_ms("misfit"), timed.median_ms("exp")
-    shape_rate = 2e-6 * count.modes * count.block * count.columns / timed.median_ms("product")
+    misfit, large = p.misfit(), np.random.default_rng(0).random((_LARGE, _LARGE))
+    calls: dict[str, Callable[[], object]] = {
+        str(count): partial(misfit, p.population(count)) for count in (1, children, _FEW, _MANY)
+    }
+    timed = alternate({**calls, "table": p.misfit, "large product": lambda: large @ large}, _ROUNDS)
+    one_ms, children_ms = timed.median_ms("1"), timed.median_ms(str(children))
+    another_ms = (timed.median_ms(str(_MANY)) - timed.median_ms(str(_FEW))) / (_MANY - _FEW)
     large_rate = 2e-6 * _LARGE**3 / timed.median_ms("large product")
-    limit_ms = 1e-6 * count.flops / large_rate + exp_ms
-    shape = f"({count.modes} x {count.block}) by ({count.block} x {count.columns})"
+    operations, table_ms = 2 * watched(p).rates * len(p.time_s), timed.median_ms("table")
     rows = [
         *_shares(p),
-        _row(f"misfit of {children} individuals", misfit_ms, "ms"),
-        _row("its sums: operations", 1e-6 * count.flops, "million"),
-        _row("its sums: exponentials", 1e-6 * count.exponentials, "million"),
-        _row(f"matrix product {shape}", shape_rate, "GFLOP/s"),
+        _row("making the table", table_ms, "ms"),
+        _row("its sums: operations", 1e-6 * operations, "million"),
+        _row("rate of making the table", 1e-6 * operations / table_ms, "GFLOP/s"),
         _row(f"matrix product {_LARGE} x {_LARGE}", large_rate, "GFLOP/s"),
-        _row("exp", 1e-6 * count.exponentials / exp_ms, "per ns"),
-        _row("limit: operations and exponentials at these rates", limit_ms, "ms"),
-        _row("misfit over its limit", misfit_ms / limit_ms, "times"),
-        _row("rate of the whole misfit", 1e-6 * count.flops / misfit_ms, "GFLOP/s"),
+        _row(
+            "making the table over its limit", large_rate * table_ms / (1e-6 * operations), "times"
+        ),
+        _row("misfit of one individual: calls", one_ms, "ms"),
+        _row("misfit of one individual more: arithmetic", 1e3 * another_ms, "µs"),
+        _row(f"misfit of {children} individuals", children_ms, "ms"),
+        _row("limit: arithmetic alone", children * another_ms, "ms"),
+        _row("misfit over its limit", children_ms / (children * another_ms), "times"),
     ]
     columns: dict[str, Callable[[Row], str]] = {
         "quantity": lambda row: row["quantity"],
@@ -119,9 +92,8 @@ def limit_section() -> Section:
 
 
 def _shares(p: Problem) -> list[Row]:
-    """How long an identification takes, and what of it is the misfit and its sums."""
-    whole_s, nonlinear_s, spent_s = 0.0, 0.0, 0.0
-    watched = _Watched(p.gripper, p.model, p.steps, p.interval_s, p.trace_rad)
+    """How long an identification takes, and what of it is the misfit and its table."""
+    whole_s, sums_s, misfit_s, nonlinear_s, spent_s = np.zeros(5)
     nonlinear = p.misfit(nonlinear=True)
 
     def nonlinear_watched(parameters: Array) -> Array:
@@ -130,20 +102,27 @@ def _shares(p: Problem) -> list[Row]:
         spent_s += seconds
         return found
 
+    def identify(seed: int) -> Watched:
+        misfit = watched(p)
+        evolve(misfit, p.genome, p.genetic, np.random.default_rng(seed))
+        return misfit
+
     for seed in range(_SEEDS):
-        rng = np.random.default_rng(seed)
-        whole_s += clocked(partial(genetic, watched, p.genome, p.genetic, rng))[0]
+        seconds, misfit = clocked(partial(identify, seed))
+        whole_s += seconds
+        sums_s += misfit.sums_s
+        misfit_s += misfit.misfit_s
     for seed in range(_NONLINEAR_SEEDS):
         rng = np.random.default_rng(seed)
-        nonlinear_s += clocked(partial(genetic, nonlinear_watched, p.genome, p.genetic, rng))[0]
+        nonlinear_s += clocked(partial(evolve, nonlinear_watched, p.genome, p.genetic, rng))[0]
     return [
         _row("identification", 1e3 * whole_s / _SEEDS, "ms"),
-        _row("of which in the misfit", 100 * watched.misfit_s / whole_s, "%"),
-        _row("of which in the misfit's sums", 100 * watched.sums_s / whole_s, "%"),
+        _row("of which sums over the trace", 100 * sums_s / whole_s, "%"),
+        _row("of which in the misfit", 100 * misfit_s / whole_s, "%"),
         _row("identification on the nonlinear model", 1e3 * nonlinear_s / _NONLINEAR_SEEDS, "ms"),
         _row("of which in the nonlinear misfit", 100 * spent_s / nonlinear_s, "%"),
     ]
 
 
 def _row(quantity: str, value: float, unit: str) -> Row:
-    return {"quantity": quantity, "value": value, "unit": unit}
+    return {"quantity": quantity, "value": float(value), "unit": unit}

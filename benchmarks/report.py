@@ -34,6 +34,9 @@ AIMS = (
     ("identification", identification.DEAP, 3),
     ("identification", identification.PYGAD, 15),
     ("identification", identification.PYMOO, 15),
+    ("identification", identification.DEAP_LEAN, 3),
+    ("identification", identification.PYGAD_LEAN, 15),
+    ("identification", identification.PYMOO_LEAN, 15),
 )
 
 _INTRODUCTION = """\

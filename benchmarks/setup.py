@@ -1,8 +1,9 @@
 """The problem that all benchmarks share: one noisy trace of the default study."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -10,7 +11,10 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.identify.genetic import GeneticSettings
+from biogrip.identify.genetic import settings_of as genetic_settings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.identify.problem import Problem as Posed
+from biogrip.identify.problem import problem_of
 from biogrip.measurement import Noise, add_noise, rms
 from biogrip.protocol import TorqueHistory, sample_times
 from biogrip.response.linear import rotation, step_response
@@ -42,6 +46,8 @@ class Problem:
         RMS of the noise in it.
     ranges, genome, genetic
         Where and how the study searches.
+    blocks
+        All of the case's config.
     """
 
     gripper: Gripper
@@ -54,6 +60,7 @@ class Problem:
     ranges: dict[str, GeneRange]
     genome: Genome
     genetic: GeneticSettings
+    blocks: Mapping[str, Any]
 
     @property
     def interval_s(self) -> float:
@@ -64,6 +71,12 @@ class Problem:
         """Return the study's misfit of a population against the trace."""
         return misfit_of(
             self.gripper, self.model, self.steps, self.time_s, self.trace_rad, nonlinear=nonlinear
+        )
+
+    def posed(self) -> Posed:
+        """Pose the identification as the study does."""
+        return problem_of(
+            self.gripper, self.model, self.steps, self.time_s, self.trace_rad, self.ranges
         )
 
     def population(self, count: int = POPULATION) -> Array:
@@ -110,5 +123,6 @@ def problem(
         rms(trace - clean),
         ranges,
         genome_of(model, ranges),
-        build.genetic_settings(chosen.blocks["genetic_algorithm"]),
+        genetic_settings(chosen.blocks),
+        chosen.blocks,
     )
