@@ -18,6 +18,8 @@ STAGE_FOLDERS = (
     *("tables", "figures", "logs"),
 )
 
+_ROOM_BYTES = 256 * 1024
+
 
 @dataclass(frozen=True)
 class Case:
@@ -181,8 +183,11 @@ def check_results_folder(folder: Path) -> None:
         probe = place / ".writable"
         try:
             place.mkdir(parents=True, exist_ok=True)
-            probe.touch()
-            probe.unlink()
+            try:
+                # Room for Snakemake's own notes too: it fails half-way through writing its locks.
+                probe.write_bytes(bytes(_ROOM_BYTES if place == folder else 0))
+            finally:
+                probe.unlink(missing_ok=True)
         except OSError as error:
             raise BiogripError(
                 f"{place}: results cannot be written here: {error.strerror}. Allowed is a folder "
