@@ -142,28 +142,32 @@ def is_identification(process: psutil.Process) -> bool:
 
 
 def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Path) -> None:
-    """The study on a file system of its own, with room for a part of it."""
+    """Results on a file system of their own, with room for a part of them, then for nothing."""
     study = tmp_path / "study"
-    study.mkdir()
-    tmpfs = ["mount", "-t", "tmpfs", "-o", "size=40m", "tmpfs", str(study)]
+    shutil.copytree(finished, study, ignore=shutil.ignore_patterns("results"))
+    disk = study / "results"
+    disk.mkdir()
+    tmpfs = ["mount", "-t", "tmpfs", "-o", "size=40m", "tmpfs", str(disk)]
     if subprocess.run(tmpfs, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small file system takes root")
     try:
-        shutil.copytree(finished, study, dirs_exist_ok=True)
-        for stage in ("measurements", "identifications", "histories"):
-            shutil.rmtree(study / "results" / stage / "liquid_drop_2")
-        filler = study / "filler"
-        free = shutil.disk_usage(study).free
-        with filler.open("wb") as stream:
-            stream.write(bytes(free - 36_000))
+        shutil.copytree(finished / "results", disk, dirs_exist_ok=True)
+        shutil.rmtree(disk / "figures")
+        filler = disk / "filler"
+        filler.write_bytes(bytes(shutil.disk_usage(disk).free - 400_000))
+        filling = snakemake(study)
+        with filler.open("ab") as stream:
+            stream.write(bytes(shutil.disk_usage(disk).free))
         full = snakemake(study)
         filler.unlink()
         run = snakemake(study)
         results = whole_results(study)
     finally:
-        subprocess.run(["umount", str(study)], check=True)
+        subprocess.run(["umount", str(disk)], check=True)
+    assert filling.status != 0
+    assert "cannot be written: No space left on device" in filling.output
     assert full.status != 0
-    assert "cannot be written: No space left on device" in full.output
+    assert "results: results cannot be written here: No space left on device" in full.output
     assert run.status == 0, run.output
     assert results == whole_results(finished)
 

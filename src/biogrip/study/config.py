@@ -20,6 +20,8 @@ STAGE_FOLDERS = (
     *("robustness", "tables", "figures", "logs"),
 )
 
+_ROOM_BYTES = 256 * 1024
+
 
 @dataclass(frozen=True)
 class Case:
@@ -190,8 +192,9 @@ def check_results_folder(folder: Path) -> None:
         try:
             place.mkdir(parents=True, exist_ok=True)
             # Jobs of a cluster try this at once: a name of its own for each, or none.
-            with TemporaryFile(dir=place):
-                pass
+            with TemporaryFile(dir=place) as probe:
+                # Room for Snakemake's own notes too: it fails half-way through writing its locks.
+                probe.write(bytes(_ROOM_BYTES if place == folder else 0))
         except OSError as error:
             raise BiogripError(
                 f"{place}: results cannot be written here: {error.strerror}. Allowed is a folder "

@@ -34,10 +34,13 @@ def remove_damaged(results: Path) -> list[Path]:
 
 
 def _damaged(results: Path) -> Iterator[Path]:
+    paths = list(results.glob("[!.]*.*"))
     for stage in STAGE_FOLDERS:
-        for path in sorted((results / stage).rglob("[!.]*")):
-            if stage != "logs" and path.is_file() and not _is_whole(path, stage):
-                yield path
+        if stage != "logs":
+            paths += (results / stage).rglob("[!.]*")
+    for path in sorted(paths):
+        if path.is_file() and not _is_whole(path, path.relative_to(results).parts[0]):
+            yield path
 
 
 def _is_whole(path: Path, stage: str) -> bool:
