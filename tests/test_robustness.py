@@ -139,8 +139,8 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
     sigma = 0.2 * (np.full_like(phi, phi.max()) if column == "additive, any" else np.abs(phi))
     wanted = 100 * np.sqrt(np.diag(_by_hand(sigma)))
     np.testing.assert_allclose(found[["k", "k_p", "c"]], wanted, rtol=1e-3)
-    # c_p of 1e-3 beside c of 299.9 is told by the prior alone, 100 e-folds wide.
-    assert found["c_p"] == pytest.approx(1e4, rel=1e-3)
+    # Of c_p = 1e-3 beside c = 299.9 the trace carries no information.
+    assert np.isinf(found["c_p"])
 
 
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:

@@ -82,6 +82,7 @@ def test_maxwell_liquid_flows_at_the_rate_of_its_damper(gripper: Gripper) -> Non
 SPRING_OR_DAMPER: dict[str, Callable[..., complex]] = {
     "generalized_maxwell": lambda s, k, k_p, c, c_p: k_p + c_p * s + series(k, c * s),
     "liquid_drop": lambda s, k, k_p, c: k_p + series(k, c * s),
+    "damper": lambda s, c_p: c_p * s,
     "kelvin_voigt": lambda s, k_p, c_p: k_p + c_p * s,
     "maxwell": lambda s, k, c: series(k, c * s),
     "zener_maxwell": lambda s, k, k_p, c: k_p + series(k, c * s),

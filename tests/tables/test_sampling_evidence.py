@@ -48,9 +48,12 @@ def test_ten_times_the_samples_are_worth_about_the_root_of_ten(
 ) -> None:
     """From 1 to 10 Hz; elsewhere times are too coarse, or so fine that more is seen of k."""
     for row in sampling_evidence(settings, []).rows[:-1]:
+        # Infinite where so few samples carry no information.
         bounds = np.array(row[3:], dtype=float)
-        assert np.all(bounds[:-1] / bounds[1:] > 2)
-        assert bounds[1] / bounds[2] == pytest.approx(np.sqrt(10), rel=0.05)
+        told = bounds[np.isfinite(bounds)]
+        assert np.all(told[:-1] / told[1:] > 2)
+        if np.isfinite(bounds[1]):
+            assert bounds[1] / bounds[2] == pytest.approx(np.sqrt(10), rel=0.05)
 
 
 def test_what_the_paper_does_not_give_has_no_row(settings: dict[str, Any]) -> None:
