@@ -17,14 +17,9 @@ measurement: {rate_Hz: 1.0}
 methods: [genetic, least_squares, differential_evolution]
 least_squares: {candidates: 100, starts: 4}
 differential_evolution: {popsize: 5, maxiter: 20}
-identifiability: {coverage_seeds: 4}
+identifiability: {coverage_seeds: 6}
 model_selection: {models: [maxwell, generalized_maxwell]}
 genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
-genetic_refined: {first: 2, last: 1}
-least_squares: {candidates: 200, starts: 3}
-differential_evolution: {popsize: 5, maxiter: 40}
-identifiability: {coverage_seeds: 4}
-model_selection: {models: [damper, liquid_drop]}
 cases:
   liquid_drop_1: null
 """
@@ -44,7 +39,11 @@ class Run:
     def all_jobs(self) -> dict[str, int]:
         """How many jobs of each rule were run or would be (from the job table)."""
         rows = [line.split() for line in self.output.splitlines()]
-        table = {row[0]: int(row[1]) for row in rows if len(row) == 2 and row[1].isdigit()}
+        table = {
+            row[0]: int(row[1])
+            for row in rows
+            if len(row) == 2 and row[0].isidentifier() and row[1].isdigit()
+        }
         return {rule: jobs for rule, jobs in table.items() if rule not in ("all", "total")}
 
 
