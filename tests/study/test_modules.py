@@ -26,7 +26,9 @@ def test_a_stage_names_what_it_imports_and_nothing_else() -> None:
     [
         *(f"biogrip.stages.{s}" for s in ("target", "measurement", "identification", "collection")),
         "biogrip.tables.evidence",
+        "biogrip.stages.robustness",
         "biogrip.figures.fit",
+        "biogrip.figures.robustness",
     ],
 )
 def test_no_module_that_python_loads_is_forgotten(module: str) -> None:
