@@ -34,6 +34,7 @@ localrules:
     models_table,
     coverage_table,
     timings_table,
+    joined,
     summary,
 
 
