@@ -107,6 +107,7 @@ def test_a_calibrated_gripper_can_be_laid_over_a_study(study: Path, tmp_path: Pa
 
 
 def test_shipped_configurations_are_valid(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "data", tmp_path / "data")
     for file in (ROOT / "config").glob("*.yaml"):
         run = snakemake(tmp_path, "-n", config=file.read_text())
         assert run.status == 0, run.output

@@ -1,5 +1,6 @@
 """What a study writes, and that it is always the same."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -19,6 +20,9 @@ COLUMNS = (
     *("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"),
 )
 CASES = ("endothelial_cell", "liquid_drop_2")
+METHODS = ("genetic", "least_squares", "differential_evolution")
+QUANTITIES = ["k", "k_p", "c", "c_p", "c + c_p"]
+PER_CASE = ("fit", "convergence", "evolution", "waterfall", "scatter", "profiles", "valley")
 
 
 def test_results_have_the_names_and_columns_they_promise(finished: Path) -> None:
@@ -30,20 +34,34 @@ def test_results_have_the_names_and_columns_they_promise(finished: Path) -> None
         assert target["rotation_rad"].max() > 0
         found = pd.read_csv(results / "identifications" / f"{case}.csv")
         assert tuple(found.columns) == COLUMNS
-        assert found["seed"].tolist() == [0, 1, 2, 3]
+        assert found["method"].unique().tolist() == list(METHODS)
+        assert found["seed"].tolist() == [0, 1, 2, 3] * len(METHODS)
         history = pd.read_parquet(results / "histories" / f"{case}.parquet")
-        last = history.groupby("seed")["best_misfit_rad"].last().to_numpy()
+        ends = history.groupby(["method", "seed"], sort=False)["best_misfit_rad"].last()
+        last = ends.to_numpy()
         np.testing.assert_allclose(last, found["misfit_rad"], rtol=1e-6)
         for suffix in (".csv", ".md", ".tex", ".html"):
             assert (results / "tables" / f"errors_{case}{suffix}").stat().st_size > 300
-        for figure in ("fit", "convergence", "evolution"):
+        told = json.loads((results / "identifiability" / f"{case}.json").read_text())
+        assert [item["quantity"] for item in told["quantities"]] == QUANTITIES
+        assert (results / "summaries" / f"{case}.html").stat().st_size > 5000
+        assert (results / "tables" / f"verdicts_{case}.csv").stat().st_size > 300
+        for figure in PER_CASE:
             for suffix in (".png", ".pdf"):
                 path = results / "figures" / f"{figure}_{case}{suffix}"
                 assert path.stat().st_size > 5000
     for figure in ("overview", "torque", "linkage", "comb"):
         assert (results / "figures" / f"{figure}.png").stat().st_size > 5000
     errors = pd.read_csv(results / "tables" / "errors.csv")
-    assert errors["parameter"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"] * 2
+    assert errors["parameter"].tolist() == QUANTITIES * 2
+    methods = pd.read_csv(results / "tables" / "methods.csv")
+    assert len(methods) == len(CASES) * len(METHODS)
+    assert methods["optimum_share"].between(0, 1).all()
+    coverage = pd.read_csv(results / "tables" / "coverage.csv")
+    assert coverage["coverage_percent"].between(0, 100).all()
+    models = pd.read_csv(results / "tables" / "models.csv")
+    assert models.groupby("case")["chosen_by_aic"].sum().tolist() == [4, 4]
+    assert len(pd.read_csv(results / "timings.csv")) == len(CASES) * len(METHODS)
 
 
 def test_measurements_are_target_and_noise_and_can_be_opened(finished: Path) -> None:
