@@ -35,6 +35,7 @@ localrules:
     coverage_table,
     timings_table,
     joined,
+    sampling_evidence_table,
     summary,
 
 
