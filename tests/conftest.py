@@ -1,3 +1,8 @@
+import os
+
+# Workers share the cores; BLAS reads this once, while numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
 from biogrip.gripper import Arm, Gripper

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -182,9 +182,9 @@ def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
     if np.ptp(trace) == 0 or np.sum((trace - trace.mean()) ** 2) <= left_over:
         return False
     if noise_rad is not None:
-        return bool(explained > noise_rad**2 * chi2.isf(FALSE_ALARM, fit.unknowns))
+        return bool(explained > noise_rad**2 * chdtri(fit.unknowns, FALSE_ALARM))
     freedom = len(trace) - fit.unknowns
-    ratio = f.isf(FALSE_ALARM, fit.unknowns, freedom)
+    ratio = fdtri(fit.unknowns, freedom, 1 - FALSE_ALARM)
     return bool(explained / fit.unknowns > ratio * left_over / freedom)
 
 

@@ -8,9 +8,10 @@ voltage, as voltage.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from biogrip.arrays import Array, ComplexArray
 
@@ -96,6 +97,24 @@ class TorqueHistory:
         return bool(same and np.array_equal(self.harmonic_left, self.harmonic_right))
 
     @cached_property
+    def jumps(self) -> list[tuple[float, int, Array]]:
+        """What sets in as a power of time: when, t^order/order!, height of each drive."""
+        heights = drives(self.left, self.right, self.symmetric)
+        return [
+            (float(start), order, heights[:, event, order])
+            for event, start in enumerate(self.time_s)
+            for order in range(heights.shape[2])
+            if np.any(heights[:, event, order])
+        ]
+
+    @cached_property
+    def swings(self) -> list[tuple[float, float, ComplexArray]]:
+        """What sets in as a sinusoid: when, angular frequency, amplitude of each drive."""
+        amplitudes = drives(self.harmonic_left, self.harmonic_right, self.symmetric)
+        rows = zip(self.harmonic_time_s, self.omega_rad_per_s, amplitudes.T, strict=True)
+        return [(float(start), float(omega), a) for start, omega, a in rows]
+
+    @cached_property
     def only_steps(self) -> bool:
         """Whether the torque is piecewise constant."""
         ramps = np.any(self.left[:, 1:]) or np.any(self.right[:, 1:])
@@ -106,6 +125,26 @@ def held(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None
     """Return a phase that holds a torque, the same on both arms unless a right one is given."""
     right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
     return Phase(duration_s, Load(torque_left_Nm), Load(right))
+
+
+def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
+    """Combine what the two arms do into the drives of `step_response`.
+
+    One drive, the common one, if both arms are driven alike; else that of the
+    left arm, and left minus right.
+
+    Parameters
+    ----------
+    left, right : (...)
+        Torques, or jumps of torque, of the arms.
+    symmetric
+        Whether they are the same.
+
+    Returns
+    -------
+    (n_drives, ...)
+    """
+    return left[None] if symmetric else np.stack((left, left - right))
 
 
 def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:

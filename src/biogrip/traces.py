@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.files import written_whole
+from biogrip.parquet import column_names, read_columns, table_of, write_tables
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad")
 
@@ -83,8 +82,8 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     if measurements.target_rad is not None:
         columns["target_rad"] = measurements.target_rad
     columns |= {f"seed_{seed}": trace for seed, trace in measurements.rotation_rad.items()}
-    with written_whole(path) as scratch:
-        pq.write_table(pa.table(columns), scratch, use_dictionary=False)
+    table = table_of(columns, len(measurements.time_s))
+    write_tables(path, [table], dictionary=False)
 
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
@@ -95,14 +94,10 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     BiogripError
         If the file is missing, damaged, or lacks a seed.
     """
-    try:
-        present = pq.read_schema(path).names
-        kept = [name for name in ("time_s", "target_rad") if name in present]
-        wanted = present if seeds is None else [*kept, *(f"seed_{seed}" for seed in seeds)]
-        table = pq.read_table(path, columns=wanted)
-        columns = {name: table[name].to_numpy() for name in wanted}
-        time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
-    except (OSError, KeyError, pa.ArrowInvalid) as error:
-        raise BiogripError(f"{path}: cannot be read as measurements: {error}.") from error
+    present = column_names(path)
+    kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
+    wanted = present if seeds is None else [*kept, *(f"seed_{seed}" for seed in seeds)]
+    columns = read_columns(path, wanted)
+    time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
     traces = {int(name.removeprefix("seed_")): trace for name, trace in columns.items()}
     return Measurements(time_s, target, traces)

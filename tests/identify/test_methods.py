@@ -88,6 +88,10 @@ def test_evaluations_are_counted(method: str) -> None:
             counted[0] += 1
             return residuals(x)
 
+        def condensed(self, x: Array) -> tuple[Array, Array]:
+            counted[0] += 1
+            return residuals.condensed(x)
+
     watched: Any = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)  # type: ignore[arg-type]
     assert run(method, watched).evaluations == counted[0]
 

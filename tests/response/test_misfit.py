@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory, held, sample_times, torque_history
-from biogrip.response.linear import drives, rotation, step_response
+from biogrip.protocol import TorqueHistory, drives, held, sample_times, torque_history
+from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.sample import MODELS
 from tests.response.reference import random_samples

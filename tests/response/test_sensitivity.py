@@ -1,13 +1,12 @@
 """Exact derivatives, against 50 digits and against differences of independent code."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.nuisance import nuisance_basis, within, without
@@ -152,10 +151,10 @@ def test_residuals_do_not_see_what_the_instrument_added(
     model, x = MODELS["maxwell"], np.log([2.0, 50.0])
     times = np.arange(401.0)
     trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4
-    given: dict[str, Any] = {"nonlinear": False}
     basis = nuisance_basis(times, offset=True, drift=True)
+    condensed = Condensed(steps, times, basis)
     plain, shifted = (
-        Residuals(gripper, model, steps, times, trace + added, nuisance=basis, **given)
+        Residuals(gripper, model, steps, times, trace + added, condensed, nonlinear=False)
         for added in (0.0, 5e-3 + 1e-5 * times)
     )
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)

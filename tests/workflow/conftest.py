@@ -1,3 +1,4 @@
+import fcntl
 import os
 import subprocess
 import sys
@@ -77,11 +78,16 @@ def snakemake(
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A finished small study; copy it before changing anything."""
-    folder = tmp_path_factory.mktemp("finished")
-    run = snakemake(folder)
-    assert run.status == 0, run.output
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """A finished small study, one for all workers; copy it before changing anything."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own if worker_id == "master" else own.parent) / "finished"
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not folder.exists():
+            folder.mkdir()
+            run = snakemake(folder)
+            assert run.status == 0, run.output
     return folder
 
 

@@ -42,10 +42,12 @@ try:
 except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 
+PLAN = Plan(STUDY, Path("results"))
+
 if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
     release_dead_locks(Path(".snakemake"))
-    for damaged in remove_damaged(Path("results")):
-        print(f"biogrip: {damaged}: was cut short; making it again.", file=sys.stderr)
+    for damaged, how in remove_damaged(Path("results"), PLAN.rows()).items():
+        print(f"biogrip: {damaged}: {how}; making it again.", file=sys.stderr)
 
 
 onstart:
@@ -54,7 +56,6 @@ onstart:
 
 # Matches no case.
 NONE = "(?!)"
-PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
 COMPARES_MODELS = bool(STUDY.config["model_selection"]["models"])
 # Asked for by themselves, or one that is lost would be missed only when it is needed.

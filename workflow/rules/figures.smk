@@ -25,17 +25,17 @@ FIGURES = [
 rule overview_figure:
     input:
         identifications=collect(
-            "results/identifications/{case}.csv", case=PLAN.simulated
+            "results/identifications/{case}.csv", case=PLAN.overviewed
         ),
         measurements=[
             file
-            for case in PLAN.simulated[:1]
+            for case in PLAN.overviewed[:1]
             for file in PLAN.batch_files(
                 "results/measurements/{case}/{batch}.parquet", case
             )
         ],
         calibrated=[
-            file for case in PLAN.simulated[:1] for file in calibrations_of(case)
+            file for case in PLAN.overviewed[:1] for file in calibrations_of(case)
         ],
         code=source_files("biogrip.figures.overview"),
     output:

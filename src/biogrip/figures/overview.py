@@ -24,30 +24,29 @@ from biogrip.identify.identifications import at_noise_floor, read_identification
 from biogrip.study import build
 
 _WORST = 1e3
-_MOST_CASES = 3
 _TITLE_LETTERS = 19
 
 
 def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
-    """Draw the first case's best fit, and identified over target values of all cases.
+    """Draw the first case's best fit, and identified over target values of a few cases.
 
     Parameters
     ----------
     settings
-        ``cases``: settings of each case, with the ``method`` to show;
+        ``cases``: settings of each, with the ``method`` to show;
         ``noise_floor_tolerance``.
     inputs
-        Identifications of all cases in their order (CSV), measurements of the
+        Identifications of the cases in their order (CSV), measurements of the
         first (Parquet).
     """
     identifications = [path for path in inputs if path.suffix == ".csv"]
     others = [path for path in inputs if path.suffix != ".csv"]
-    cases = list(settings["cases"].values())[:_MOST_CASES]
+    cases = list(settings["cases"].values())
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     _fit(axes[0], cases[0], identifications[0], others)
     seeds = 0
-    for index, (case, path) in enumerate(zip(cases, identifications, strict=False)):
+    for index, (case, path) in enumerate(zip(cases, identifications, strict=True)):
         found = read_identifications(path, case["method"])
         seeds = len(found)
         tolerance = settings["noise_floor_tolerance"]

@@ -66,6 +66,8 @@ def save(drawn: Figure, output: Path) -> None:
     """Write a figure as PNG, and beside it as PDF, without dates."""
     with written_whole(output) as scratch:
         drawn.savefig(scratch, format="png", metadata={"Software": None})
+    # Laid out once for both.
+    drawn.set_layout_engine("none")
     with written_whole(output.with_suffix(".pdf")) as scratch:
         drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 

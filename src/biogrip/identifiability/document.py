@@ -2,19 +2,21 @@
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from biogrip.errors import BiogripError
-from biogrip.identifiability.diagnosis import Diagnosis
-from biogrip.identifiability.verdicts import Finding
+
+if TYPE_CHECKING:
+    from biogrip.identifiability.diagnosis import Diagnosis
+    from biogrip.identifiability.verdicts import Finding
 
 # Far more than is determined, far fewer than those in which processors differ.
 _DIGITS = 5
 
 
-def diagnosis_data(diagnosis: Diagnosis) -> dict[str, Any]:
+def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
     """Return a diagnosis as dictionaries, lists, text and numbers in SI units."""
     likelihood = diagnosis.likelihood
     return {
@@ -57,7 +59,7 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
+def _finding(finding: "Finding") -> dict[str, Any]:
     profile = finding.profile
     return {
         "quantity": finding.quantity.label,

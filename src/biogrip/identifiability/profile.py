@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2, f
+from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
 from biogrip.identifiability.fisher import bound
@@ -123,13 +123,13 @@ def likelihood_of(
     noise_rad
         Standard deviation of the noise if it is known.
     """
-    levels = [confidence, _CERTAIN]
+    levels = np.array([confidence, _CERTAIN])
     if noise_rad is not None:
-        threshold, certainty = chi2.ppf(levels, 1)
+        threshold, certainty = chdtri(1, 1 - levels)
     else:
         left = problem.residuals.free - len(best)
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
-        threshold, certainty = f.ppf(levels, 1, left)
+        threshold, certainty = fdtri(1, left, levels)
     return Likelihood(problem, best, misfit_rad, noise_rad, float(threshold), float(certainty))
 
 
@@ -149,13 +149,16 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
         )
     )
     middle = int(np.searchsorted(grid, start))
-    points: list[tuple[float, Array] | None] = [None] * len(grid)
-    points[middle] = 0.0, likelihood.best
-    outwards = [*range(middle + 1, len(grid)), *range(middle - 1, -1, -1)]
-    for order in (outwards, [*range(1, middle), *range(len(grid) - 2, middle, -1)]):
-        for index in order:
-            points[index] = _best_of(fits, grid, points, index)
-    done = [point for point in points if point is not None]
+    outwards = [(i, i - 1) for i in range(middle + 1, len(grid))]
+    outwards += [(i, i + 1) for i in range(middle - 1, -1, -1)]
+    inwards = [(i, i - 1) for i in range(1, middle)]
+    inwards += [(i, i + 1) for i in range(len(grid) - 2, middle, -1)]
+    done = [(0.0, likelihood.best)] * len(grid)
+    for index, neighbour in outwards:
+        done[index] = fits.at(grid[index], done[neighbour][1])
+    for index, neighbour in inwards:
+        found = fits.at(grid[index], done[neighbour][1])
+        done[index] = min(done[index], found, key=lambda point: point[0])
     rises = np.array([rise for rise, _ in done])
     inside = np.flatnonzero(rises < likelihood.threshold)
     certainty = max(likelihood.certainty, likelihood.threshold)
@@ -242,14 +245,3 @@ class _Held:
         width = abs(float(grid[inside] - grid[outside]))
         xtol = self._accuracy.limit * width
         return float(brentq(excess, grid[inside], grid[outside], xtol=xtol, rtol=1e-12))
-
-
-def _best_of(
-    fits: _Held, grid: Array, points: list[tuple[float, Array] | None], index: int
-) -> tuple[float, Array]:
-    """Fit a point from each neighbour that has a fit, and keep the lower with what there was."""
-    known = points[index]
-    found = [known] if known is not None else []
-    neighbours = [points[i] for i in (index - 1, index + 1) if 0 <= i < len(points)]
-    found += [fits.at(grid[index], near[1]) for near in neighbours if near is not None]
-    return min(found, key=lambda point: point[0])

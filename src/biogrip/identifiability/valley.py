@@ -78,5 +78,5 @@ def _rest_fitted(
         high=np.delete(problem.high, pair),
     )
     starts = (start, np.delete(likelihood.best, pair))
-    found = min((local_fit(rest, x) for x in starts), key=lambda fit: fit.misfit_rad)
+    found = min((local_fit(rest, x, 1e-6) for x in starts), key=lambda fit: fit.misfit_rad)
     return likelihood.rise(found.misfit_rad), found.log_parameters

@@ -8,7 +8,6 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.identify.problem import Problem
-from biogrip.measurement import rms
 
 PRIOR_WIDTH = 100.0
 """Width in e-folds of the prior that every parameter has, about the middle of its range.
@@ -64,28 +63,34 @@ class Objective:
         What is fitted.
     held
         Values, and derivatives by the log-parameters, of rows that hold the fit to something.
+    condensed
+        Whether few rows may stand for all samples, at the price of some digits.
     """
 
-    def __init__(self, problem: Problem, held: Rows | None = None) -> None:
+    def __init__(
+        self, problem: Problem, held: Rows | None = None, *, condensed: bool = True
+    ) -> None:
+        self._of = problem.residuals.condensed if condensed else problem.residuals
         self._held = held
         self._residuals = problem.residuals
         self._middle = 0.5 * (problem.low + problem.high)
-        self._last: tuple[Array, Array, Array] | None = None
+        self._prior = np.eye(len(self._middle)) / PRIOR_WIDTH
+        self._last: tuple[Array, Array, Array, float] | None = None
         self.evaluations = 0
 
     def both(self, x: Array) -> tuple[Array, Array]:
         """Residual rows and their Jacobian; the last are kept, for both are asked for in turn."""
         if self._last is None or not np.array_equal(self._last[0], x):
             scale = self._residuals.noise_scale_rad
-            residual, sensitivity = self._residuals(x)
-            prior = np.eye(len(x)) / PRIOR_WIDTH
+            residual, sensitivity = self._of(x)
             rows = [residual / scale, (x - self._middle) / PRIOR_WIDTH]
-            slopes = [sensitivity.T / scale, prior]
+            slopes = [sensitivity.T / scale, self._prior]
             if self._held is not None:
                 values, derivatives = self._held(x)
                 rows.append(values)
                 slopes.append(derivatives)
-            self._last = x.copy(), np.concatenate(rows), np.concatenate(slopes)
+            misfit = float(np.linalg.norm(residual)) / np.sqrt(self._residuals.samples)
+            self._last = x.copy(), np.concatenate(rows), np.concatenate(slopes), misfit
             self.evaluations += 1
         return self._last[1], self._last[2]
 
@@ -99,7 +104,9 @@ class Objective:
 
     def misfit_rad(self, x: Array) -> float:
         """RMS misfit."""
-        return rms(self.both(x)[0][: self._residuals.samples]) * self._residuals.noise_scale_rad
+        self.both(x)
+        assert self._last is not None
+        return self._last[3]
 
 
 def local_fit(
@@ -137,10 +144,10 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
     """Take Gauss-Newton steps until an optimum stands still to the last digits.
 
     A trust region compares sums of squares, and so finds an optimum to half the
-    digits; where the gradient vanishes can be found to all of them. Parameters
-    that push against a bound stay on it.
+    digits; where the gradient vanishes can be found to all of them, from all the
+    samples. Parameters that push against a bound stay on it.
     """
-    objective = Objective(problem)
+    objective = Objective(problem, condensed=False)
     x, left = found.log_parameters, _MOST_STEPS
     while left > 0:
         rows, jacobian = objective.both(x)
@@ -152,7 +159,9 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
         x = np.where(stuck & (downhill < 0), problem.low, x)
         x = np.where(stuck & (downhill > 0), problem.high, x)
         step = np.zeros_like(x)
-        step[~stuck] = np.linalg.lstsq(jacobian[:, ~stuck], -rows, rcond=None)[0]
+        free = jacobian[:, ~stuck]
+        # The prior keeps this regular; what rounding does to a step, the next one mends.
+        step[~stuck] = np.linalg.solve(free.T @ free, downhill[~stuck])
         x = np.clip(x + step, problem.low, problem.high)
         nearly = left > _LAST_STEPS and np.max(np.abs(step)) < _NEARLY_SETTLED
         left = _LAST_STEPS if nearly else left - 1

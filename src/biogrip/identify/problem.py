@@ -9,6 +9,7 @@ from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.protocol import TorqueHistory
+from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import misfit_of
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
@@ -50,6 +51,7 @@ def problem_of(
     offset: bool = False,
     drift: bool = False,
     noise_rad: float | None = None,
+    condensed: Condensed | None = None,
 ) -> Problem:
     """Pose the identification of one trace.
 
@@ -67,12 +69,20 @@ def problem_of(
         Whether the instrument may have added a constant, and a drift linear in time.
     noise_rad
         Standard deviation of the noise, if it is known.
+    condensed
+        What `condensed_of` gives for the same times, if there is one already.
     """
-    nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
+    condensed = condensed or condensed_of(torque, time_s, offset=offset, drift=drift)
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     return Problem(
         misfit_of(
-            gripper, model, torque, time_s, rotation_rad, nonlinear=nonlinear, nuisance=nuisance
+            gripper,
+            model,
+            torque,
+            time_s,
+            rotation_rad,
+            nonlinear=nonlinear,
+            nuisance=condensed.nuisance,
         ),
         Residuals(
             gripper,
@@ -80,11 +90,16 @@ def problem_of(
             torque,
             time_s,
             rotation_rad,
+            condensed,
             nonlinear=nonlinear,
-            nuisance=nuisance,
             noise_rad=noise_rad,
         ),
         genome_of(model, ranges),
         np.log([genes.low for genes in chosen]),
         np.log([genes.high for genes in chosen]),
     )
+
+
+def condensed_of(torque: TorqueHistory, time_s: Array, *, offset: bool, drift: bool) -> Condensed:
+    """Condense the residuals of all traces that are sampled at the same times."""
+    return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))

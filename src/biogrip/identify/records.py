@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from biogrip.arrays import Array
 from biogrip.files import written_whole
 from biogrip.identify.answer import Identification
+from biogrip.parquet import Table, table_of, write_tables
 from biogrip.sample import SINGLE_BRANCH, Parameter, SampleModel
 
 LEADING = ("case", "method", "seed")
@@ -93,8 +92,7 @@ def write_identifications(path: Path, records: list[Record]) -> None:
 
 def write_histories(path: Path, records: list[Record]) -> None:
     """Write one row a seed and generation as Parquet."""
-    with written_whole(path) as scratch:
-        pq.write_table(pa.concat_tables([_history(record) for record in records]), scratch)
+    write_tables(path, [_history(record) for record in records])
 
 
 def write_timings(path: Path, records: list[Record]) -> None:
@@ -111,14 +109,14 @@ def _by_name(record: Record, identified: Array) -> dict[str, Any]:
     return {**record.fixed, **dict(zip(record.searched.names, identified, strict=True))}
 
 
-def _history(record: Record) -> pa.Table:
+def _history(record: Record) -> Table:
     history = record.answer.history
     generations = len(history.best_misfit)
     values = _by_name(record, history.best_parameters.T)
-    return pa.table(
+    return table_of(
         {
-            "case": pa.array([record.case] * generations, pa.string()),
-            "method": pa.array([record.method] * generations, pa.string()),
+            "case": record.case,
+            "method": record.method,
             "seed": np.full(generations, record.seed, dtype=np.int64),
             "generation": np.arange(generations, dtype=np.int64),
             "evaluations": history.evaluations,
@@ -128,5 +126,6 @@ def _history(record: Record) -> pa.Table:
                 p.column: np.broadcast_to(values.get(p.name, 0.0), generations)
                 for p in parameters_in_file(record.model)
             },
-        }
+        },
+        generations,
     )

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.protocol import TorqueHistory, drives
 from biogrip.response.roots import real_quadratic_roots, roots, separate
 from biogrip.sample import Network
 
@@ -66,26 +66,6 @@ class TransferFunctions:
 
     numerators: list[list[NDArray[Any]]]
     denominator: NDArray[Any]
-
-
-def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
-    """Combine what the two arms do into the drives of `step_response`.
-
-    One drive, the common one, if both arms are driven alike; else that of the
-    left arm, and left minus right.
-
-    Parameters
-    ----------
-    left, right : (...)
-        Torques, or jumps of torque, of the arms.
-    symmetric
-        Whether they are the same.
-
-    Returns
-    -------
-    (n_drives, ...)
-    """
-    return left[None] if symmetric else np.stack((left, left - right))
 
 
 def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:

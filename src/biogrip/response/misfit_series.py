@@ -14,9 +14,9 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.protocol import TorqueHistory, drives
 from biogrip.response.decay_table import DecayTable
-from biogrip.response.linear import LEFT, StepResponse, drives, step_response
+from biogrip.response.linear import LEFT, StepResponse, step_response
 from biogrip.sample import SampleModel
 
 # Rate of a constant, over the sampling rate: z^n is 1 for any n.

@@ -26,12 +26,11 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueHistory, torque_at
+from biogrip.protocol import TorqueHistory, drives, torque_at
 from biogrip.response.linear import (
     LEFT,
     RIGHT,
     StepResponse,
-    drives,
     is_symmetric,
     rotation,
     rotation_rate,

@@ -1,12 +1,14 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
 from copy import copy
+from functools import cached_property
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
+from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from biogrip.sample import SampleModel
@@ -21,10 +23,10 @@ class Residuals:
         What is simulated, without inertia.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
+    condensed
+        Of the protocol and the sampling times; knows what the instrument may have added.
     nonlinear
         Whether to simulate the nonlinear model.
-    nuisance : (n_functions, n_samples)
-        Orthonormal functions that the instrument may have added, see `nuisance_basis`.
     noise_rad
         Standard deviation of the noise; by default what neighbouring samples suggest.
     """
@@ -36,9 +38,9 @@ class Residuals:
         torque: TorqueHistory,
         time_s: Array,
         rotation_rad: Array,
+        condensed: Condensed,
         *,
         nonlinear: bool,
-        nuisance: Array,
         noise_rad: float | None = None,
     ) -> None:
         self._gripper = gripper
@@ -46,8 +48,9 @@ class Residuals:
         self._torque = torque
         self._time_s = time_s
         self._nonlinear = nonlinear
-        self._nuisance = nuisance
-        self._rotation_rad = without(nuisance, rotation_rad)
+        self._nuisance = condensed.nuisance
+        self._condensed = condensed
+        self._rotation_rad = without(self._nuisance, rotation_rad)
         self.samples = len(time_s)
         self.duration_s = float(time_s[-1])
         if noise_rad is None:
@@ -80,16 +83,46 @@ class Residuals:
         sensitivity : (n_parameters, n_samples)
             In rad.
         """
-        rotation, sensitivity = rotation_and_sensitivity(
+        rotation, sensitivity = self._simulated(log_parameters, self._time_s)
+        residual = without(self._nuisance, rotation) - self._rotation_rad
+        return residual, without(self._nuisance, sensitivity)
+
+    def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
+        """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
+
+        On the nonlinear model these are the residuals themselves.
+
+        Parameters
+        ----------
+        log_parameters : (n_parameters,)
+            Natural logarithms of the parameters in SI units.
+
+        Returns
+        -------
+        rows : (n_rows,)
+            In rad.
+        slopes : (n_parameters, n_rows)
+            In rad.
+        """
+        if self._nonlinear:
+            return self(log_parameters)
+        rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
+        to_rows = self._condensed.to_rows
+        return rotation @ to_rows - self._condensed_trace, sensitivity @ to_rows
+
+    @cached_property
+    def _condensed_trace(self) -> Array:
+        return self._condensed.of_trace(self._rotation_rad)
+
+    def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
+        return rotation_and_sensitivity(
             self._gripper,
             self._model,
             self._torque,
-            self._time_s,
+            time_s,
             np.exp(log_parameters),
             nonlinear=self._nonlinear,
         )
-        residual = without(self._nuisance, rotation) - self._rotation_rad
-        return residual, without(self._nuisance, sensitivity)
 
 
 def noise_of(rotation_rad: Array) -> float:

@@ -8,17 +8,15 @@ below, with no cancellation at either end.
 """
 
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, ComplexArray
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import (
     LEFT,
-    drives,
     evaluate,
     partial_fractions,
     phi_function,
@@ -83,7 +81,8 @@ def rotation_and_sensitivity(
     sensitivity : (n_parameters, n_times)
         In rad.
     """
-    phi, slopes = _in_time(modes_of(gripper, model, torque, parameters), torque, time_s)
+    modes = modes_of(gripper, model, torque, parameters)
+    phi, slopes = _mixed(modes, *responses_of_modes(modes.rates, torque, time_s))
     if nonlinear:
         steps = _STEP * np.concatenate((np.zeros((1, len(parameters))), _both_ways(parameters)))
         found = correction(gripper, model.network(parameters * np.exp(steps)), torque, COARSE)
@@ -97,15 +96,21 @@ def modes_of(
     gripper: Gripper, model: SampleModel, torque: TorqueHistory, parameters: Array
 ) -> Modes:
     """Poles and weights of one sample without inertia, with their derivatives."""
-    count = len(parameters)
-    # The first row is the sample itself, each other has one parameter tilted.
-    tilted = parameters * (1 + 1j * _TILT * np.eye(count + 1, count, -1))
+    tilted = parameters * _tilts(len(parameters))
     transfer = transfer_functions(gripper, model.network(tilted), symmetric=torque.symmetric)
     real: Array = transfer.denominator[:1].real
-    rates = np.repeat(poles(real, real=True), count + 1, axis=0)
+    rates = np.repeat(poles(real, real=True), len(tilted), axis=0)
     newton = -evaluate(transfer.denominator, rates).imag / slope_at_poles(real, rates[:1])
     weights = partial_fractions(transfer, rates + 1j * newton).weights[:, LEFT]
     return Modes(rates[0], weights[0].real, newton[1:] / _TILT, weights[1:].imag / _TILT)
+
+
+@cache
+def _tilts(count: int) -> ComplexArray:
+    """Factors with the sample itself in the first row, and one parameter tilted in each other."""
+    tilts = np.ones((count + 1, count), dtype=np.complex128)
+    tilts[1:].imag = _TILT * np.eye(count)
+    return tilts
 
 
 def _both_ways(parameters: Array) -> Array:
@@ -114,37 +119,51 @@ def _both_ways(parameters: Array) -> Array:
     return np.stack((unit, -unit), axis=1).reshape(-1, len(parameters))
 
 
-def _in_time(modes: Modes, torque: TorqueHistory, time_s: Array) -> tuple[Array, Array]:
-    """Superpose what every jump and sinusoid of the torque sets off."""
-    # First row the rotation, then its derivatives.
-    rows = np.zeros((1 + len(modes.rate_slopes), len(time_s)))
-    symmetric = len(modes.weights) == 1
-    rate = modes.rates[:, None]
-    jumps = drives(torque.left, torque.right, symmetric)
-    for start, jump in zip(torque.time_s, np.moveaxis(jumps, 1, 0), strict=True):
-        first = np.searchsorted(time_s, start)
-        elapsed = time_s[first:] - start
-        for order in np.flatnonzero(np.any(jump != 0, axis=0)):
-            growth, slope = _growth(int(order), rate, elapsed)
-            rows[:, first:] += _mix(modes, jump[:, order], growth, slope)
-    amplitudes = drives(torque.harmonic_left, torque.harmonic_right, symmetric)
-    for start, omega, a in zip(
-        torque.harmonic_time_s, torque.omega_rad_per_s, amplitudes.T, strict=True
-    ):
-        first = np.searchsorted(time_s, start)
-        swung = _swing(omega, rate, time_s[first:] - start)
-        rows[:, first:] += _mix(modes, a, *swung).real
-    return rows[0], rows[1:]
+def responses_of_modes(rates: Array, torque: TorqueHistory, time_s: Array) -> tuple[Array, Array]:
+    """Superpose what every jump and sinusoid of the torque sets off in modes of unit weight.
+
+    Parameters
+    ----------
+    rates : (n_modes,)
+        In 1/s, real and negative.
+    torque
+        The protocol; decides the drives, see `drives`.
+    time_s : (n_times,)
+        Ascending times.
+
+    Returns
+    -------
+    growth, slope : (n_drives, n_modes, n_times)
+        The responses in N m, and their derivatives by the rate.
+    """
+    rate = rates[:, None]
+    growth, slope = np.zeros((2, 1 if torque.symmetric else 2, len(rates), len(time_s)))
+    for start, order, heights in torque.jumps:
+        first = time_s.searchsorted(start)
+        grown, slanted = _growth(order, rate, time_s[first:] - start)
+        height = heights[:, None, None]
+        growth[..., first:] += height * grown
+        slope[..., first:] += height * slanted
+    for start, omega, amplitudes in torque.swings:
+        first = time_s.searchsorted(start)
+        swung, swung_slanted = _swing(omega, rate, time_s[first:] - start)
+        phasor = amplitudes[:, None, None]
+        growth[..., first:] += (phasor * swung).real
+        slope[..., first:] += (phasor * swung_slanted).real
+    return growth, slope
 
 
-def _mix(
-    modes: Modes, height: NDArray[Any], growth: NDArray[Any], slope: NDArray[Any]
-) -> NDArray[Any]:
+def _mixed(modes: Modes, growth: Array, slope: Array) -> tuple[Array, Array]:
     """Weigh what the modes do; d(w g) = dw g + w dr dg/dr."""
-    weight = height @ modes.weights
-    by_growth = np.concatenate((weight[None], height @ modes.weight_slopes))
-    by_slope = np.concatenate((np.zeros_like(weight)[None], weight * modes.rate_slopes))
-    return np.concatenate((by_growth, by_slope), axis=1) @ np.concatenate((growth, slope))
+    weights, times = modes.weights, growth.shape[-1]
+    slanted = weights * modes.rate_slopes[:, None]
+    by_growth = np.concatenate((weights[None], modes.weight_slopes))
+    by_slope = np.concatenate((np.zeros_like(weights)[None], slanted))
+    both = np.concatenate(
+        (by_growth.reshape(len(by_growth), -1), by_slope.reshape(len(by_slope), -1)), axis=1
+    )
+    rows: Array = both @ np.concatenate((growth, slope)).reshape(-1, times)
+    return rows[0], rows[1:]
 
 
 def _growth(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
@@ -162,9 +181,7 @@ def _growth(order: int, rate: Array, elapsed: Array) -> tuple[Array, Array]:
     return rate * power * this, power * (before - order * this)
 
 
-def _swing(
-    omega: float, rate: Array, elapsed: Array
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+def _swing(omega: float, rate: Array, elapsed: Array) -> tuple[ComplexArray, ComplexArray]:
     """Response of a mode to e^(i omega t), over its weight, and its derivative by the rate."""
     decay = np.exp(rate * elapsed)
     difference = np.exp(1j * omega * elapsed) - decay

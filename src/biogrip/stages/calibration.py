@@ -3,14 +3,11 @@
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from biogrip.calibrated_gripper import calibration_yaml
 from biogrip.calibration import FreeMotion, calibrate, free_motion
-from biogrip.files import write_text, written_whole
+from biogrip.files import write_text
 from biogrip.measurement import Noise, add_noise
+from biogrip.parquet import table_of, write_tables
 from biogrip.protocol import sample_times
 from biogrip.random_streams import stream
 from biogrip.study import build
@@ -44,8 +41,5 @@ def run(settings: dict[str, Any], output: Path, traces: Path) -> None:
         )
         columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
         found[name] = calibrate(record, *causes)
-    with written_whole(traces) as scratch:
-        pq.write_table(
-            pa.table({key: np.asarray(value) for key, value in columns.items()}), scratch
-        )
+    write_tables(traces, [table_of(columns, len(time_s))], dictionary=False)
     write_text(output, calibration_yaml(found["left"], found["right"]))

@@ -6,8 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-MOST_BATCHES = 40
-"""Batches that a fresh case is cut into at most."""
+_SMALLEST, _LARGEST = 25, 1000
+_BATCHES = 20
 
 
 class Batch(NamedTuple):
@@ -59,12 +59,13 @@ def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) ->
     return plan + _cut(covered, seeds, batch_size)
 
 
-def seeds_a_batch(seeds: int, batch_size: int) -> int:
-    """Size of the batches of a case: the one asked for, or more where there are very many seeds.
+def seeds_a_batch(seeds: int) -> int:
+    """Size of the batches of a case where the study does not say.
 
-    Snakemake thinks about each job for a millisecond, before every run.
+    Enough that starting a job is little beside its work and that there are not
+    too many jobs to plan, and no more than fit into little memory.
     """
-    return max(batch_size, -(-seeds // MOST_BATCHES))
+    return min(max(_SMALLEST, -(-seeds // _BATCHES)), _LARGEST)
 
 
 def existing_batches(folder: Path) -> list[Batch]:

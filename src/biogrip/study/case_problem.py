@@ -1,7 +1,7 @@
 """The identification problem of a case, from the settings that its jobs are handed."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +11,9 @@ from biogrip.arrays import Array
 from biogrip.calibrated_gripper import read_calibrated_arms
 from biogrip.gripper import Gripper
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.protocol import TorqueHistory
+from biogrip.response.condensed import Condensed
 from biogrip.sample import SampleModel, with_fixed
 from biogrip.study import build
 
@@ -41,6 +42,7 @@ class CaseProblem:
     model: SampleModel
     searched: SampleModel
     fixed: dict[str, float]
+    _condensed: dict[bytes, Condensed] = field(default_factory=dict, init=False)
 
     def of(
         self,
@@ -61,7 +63,17 @@ class CaseProblem:
             offset=self.offset,
             drift=self.drift,
             noise_rad=noise_rad or self.noise_rad,
+            condensed=self._condensed_at(time_s),
         )
+
+    def _condensed_at(self, time_s: Array) -> Condensed:
+        # Once for all traces of a case: it takes as long as some fifty responses.
+        sampled = time_s.tobytes()
+        if sampled not in self._condensed:
+            self._condensed[sampled] = condensed_of(
+                self.torque, time_s, offset=self.offset, drift=self.drift
+            )
+        return self._condensed[sampled]
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Logarithms of the searched parameters' values, zeros lifted into the search range."""

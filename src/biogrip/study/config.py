@@ -99,9 +99,10 @@ class Study:
         return list(self.config["methods"])
 
     @property
-    def batch_size(self) -> int:
-        """Number of seeds a job."""
-        return int(self.config["batch_size"])
+    def batch_size(self) -> int | None:
+        """Number of seeds a job, if the study says."""
+        size: int | None = self.config.get("batch_size")
+        return size
 
 
 def load_study(

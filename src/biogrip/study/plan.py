@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ from biogrip.identify.methods import METHODS
 from biogrip.study import build
 from biogrip.study.batches import Batch, existing_batches, plan_batches, seeds_a_batch
 from biogrip.study.config import Case, Study, overlaid
+
+_OVERVIEWED = 3
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ class Plan:
         # Listed once: a plan does not change while it is carried out.
         if folder not in self._planned:
             existing = existing_batches(self.results.joinpath(*folder))
-            size = seeds_a_batch(seeds, self.study.batch_size)
+            size = self.study.batch_size or seeds_a_batch(seeds)
             self._planned[folder] = plan_batches(seeds, size, existing)
         return self._planned[folder]
 
@@ -77,6 +80,17 @@ class Plan:
             return [f"results/{stage}/{case}/{batch.name}{suffix}" for batch in planned(case)]
         method = "" if stage == "measurements" else "{method}/"
         return self.batch_files(f"results/{stage}/{{case}}/{method}{{batch}}{suffix}", case)
+
+    def rows(self) -> dict[str, int]:
+        """Rows that files of whole cases have at least, by their paths in the results."""
+        found = {f"targets/{case}.csv": self._samples(case) for case in self.simulated}
+        models = self.study.config["model_selection"]["models"]
+        for case in self.study.cases:
+            seeds = self.seeds(case)
+            found[f"identifications/{case}.csv"] = seeds * len(self.study.methods)
+            found[f"timings/{case}.csv"] = seeds * len(self.study.methods)
+            found[f"selection/{case}.csv"] = seeds * len(models)
+        return found
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
@@ -257,7 +271,7 @@ class Plan:
                 "noise": c.blocks["measurement"]["noise"],
                 "seeds": c.blocks["identifiability"]["coverage_seeds"],
             }
-        return json.dumps({"cases": cases})
+        return json.dumps(_shared("cases", cases))
 
     def models_table(self) -> str:
         """Settings of the table of sample models."""
@@ -290,19 +304,18 @@ class Plan:
             if self._case(name).blocks["identifiability"]["coverage_seeds"] > 0
         ]
 
+    @property
+    def overviewed(self) -> list[str]:
+        """Cases that the overview has room for."""
+        return self.simulated[:_OVERVIEWED]
+
     def overview(self) -> str:
         """Settings of the overview figure."""
         cases = {
-            name: {**self._fit(case), **self._truth(case)}
-            for name, case in self.study.cases.items()
-            if not case.recorded
+            name: {**self._fit(self._case(name)), **self._truth(self._case(name))}
+            for name in self.overviewed
         }
-        return json.dumps(
-            {
-                "cases": cases,
-                "noise_floor_tolerance": self._tolerance,
-            }
-        )
+        return json.dumps({"cases": cases, "noise_floor_tolerance": self._tolerance})
 
     def blocks(self, *keys: str) -> str:
         """Study-wide blocks by name, for tables and figures that show them."""
@@ -356,18 +369,12 @@ class Plan:
             }
             for point in self.study.sweeps[sweep].points(case)
         }
-        first, *others = points.values()
-        shared = {k: v for k, v in first.items() if all(other[k] == v for other in others)}
         return json.dumps(
             {
                 "methods": self.study.methods,
                 "noise_floor_tolerance": self._tolerance,
                 "parameters": self._case(case).parameters,
-                **shared,
-                "points": {
-                    name: {key: value for key, value in point.items() if key not in shared}
-                    for name, point in points.items()
-                },
+                **_shared("points", points),
             }
         )
 
@@ -503,6 +510,17 @@ class Plan:
             return self._gripper(case)
         believed: dict[str, Any] = overlaid(self._gripper(case), case.assumed_gripper)
         return believed
+
+
+def _shared(name: str, blocks: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """Say once what all blocks say: a command has room for 128 KiB."""
+    first = next(iter(blocks.values()), {})
+    shared = {k: v for k, v in first.items() if all(block[k] == v for block in blocks.values())}
+    rest = {
+        name: {key: value for key, value in block.items() if key not in shared}
+        for name, block in blocks.items()
+    }
+    return {**shared, name: rest}
 
 
 def _json(**settings: Any) -> str:

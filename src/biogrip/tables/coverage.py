@@ -36,13 +36,14 @@ def coverage(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``cases``: what `case_problem` needs, ``parameters``, ``noise`` and
-        ``seeds``, how many of them count, by case.
+        ``cases`` by name. Of each case, there or for all of them: what `case_problem`
+        needs, ``parameters``, ``noise`` and ``seeds``, how many of them count.
     inputs
         For each case its target and its intervals, CSV, named after it.
     """
     rows: list[tuple[Cell, ...]] = []
-    for name, case in settings["cases"].items():
+    for name, own in settings["cases"].items():
+        case = {**settings, **own}
         posed = case_problem(case)
         log_truth = posed.logs(case["parameters"])
         target, intervals = (path for path in inputs if path.stem == name)

@@ -1,0 +1,93 @@
+"""Columns of numbers and words as Parquet files.
+
+Arrays come from and go to Arrow as the memory they are. Its own conversions load
+pandas first, which takes longer than all else that a short job does.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from biogrip.errors import BiogripError
+from biogrip.files import written_whole
+
+Table: TypeAlias = pa.Table
+
+
+def table_of(columns: Mapping[str, NDArray[Any] | str], rows: int) -> Table:
+    """Make a table of numbers, (rows,) each, and of words that are the same in every row."""
+    return pa.table(
+        {
+            name: _words(values, rows) if isinstance(values, str) else _numbers(values)
+            for name, values in columns.items()
+        }
+    )
+
+
+def write_tables(path: Path, tables: Sequence[Table], *, dictionary: bool = True) -> None:
+    """Write tables of the same columns one below the other.
+
+    Parameters
+    ----------
+    path
+        The file.
+    tables
+        From `table_of`.
+    dictionary
+        Whether values that come again are written once; noise never comes again.
+    """
+    with written_whole(path) as scratch:
+        pq.write_table(pa.concat_tables(tables), scratch, use_dictionary=dictionary)
+
+
+def column_names(path: Path) -> list[str]:
+    """Names of the columns of a file.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be read.
+    """
+    try:
+        return list(pq.read_schema(path).names)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+
+
+def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
+    """Read some columns of numbers.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be read, or lacks a column.
+    """
+    missing = set(names) - set(column_names(path))
+    if missing:
+        raise BiogripError(f"{path}: has no column {min(missing)}.")
+    try:
+        with pq.ParquetFile(path) as file:
+            table = file.read(columns=list(names))
+    except (OSError, pa.ArrowInvalid) as error:
+        raise BiogripError(f"{path}: cannot be read: {error}.") from error
+    return {
+        name: np.concatenate([np.from_dlpack(chunk) for chunk in table[name].chunks])
+        for name in names
+    }
+
+
+def _numbers(values: NDArray[Any]) -> pa.Array:
+    kept = np.ascontiguousarray(values)
+    buffers = [None, pa.py_buffer(kept)]
+    return pa.Array.from_buffers(pa.from_numpy_dtype(kept.dtype), len(kept), buffers)
+
+
+def _words(text: str, rows: int) -> pa.Array:
+    encoded = text.encode()
+    ends = np.arange(rows + 1, dtype=np.int32) * np.int32(len(encoded))
+    return pa.StringArray.from_buffers(rows, pa.py_buffer(ends), pa.py_buffer(encoded * rows))

@@ -1,0 +1,100 @@
+"""A few sampling times that stand for all: the same least squares with fewer rows.
+
+Whatever the sample, the linear rotation is a weighted sum of what modes do
+under the protocol, g(t; r), and all of these, over all rates r, nearly span a
+space of some forty dimensions only. In it a function is known from its values
+at as many well-chosen times. So a response is simulated at those, and a square
+matrix turns what it is there into rows whose sum of squares, gradients and all,
+is that of the residuals at every sample.
+"""
+
+from functools import cached_property
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.protocol import TorqueHistory
+from biogrip.response.nuisance import without
+from biogrip.response.sensitivity import responses_of_modes
+
+# Neighbouring rates, in log(1 - T r), T the last time: far closer than modes can be told apart.
+_SPACING = 0.25
+# Rates go from next to nothing to where only what has not begun to decay is left.
+_SLOWEST, _FASTEST = 1e-6, 1e3
+# Directions that matter less than this are rounding.
+_RANK = 1e-14
+
+
+class Condensed:
+    """Rows that stand for the samples of any trace of a protocol, on the linear model.
+
+    Parameters
+    ----------
+    torque
+        The protocol.
+    time_s : (n_samples,)
+        Ascending sampling times.
+    nuisance : (n_functions, n_samples)
+        What is taken out of trace and responses, see `nuisance_basis`.
+    """
+
+    def __init__(self, torque: TorqueHistory, time_s: Array, nuisance: Array) -> None:
+        self.nuisance = nuisance
+        self._torque = torque
+        self._all_s = time_s
+
+    def of_trace(self, rotation_rad: Array) -> Array:
+        """Rows of a trace less nuisance.
+
+        Returns
+        -------
+        (n_rows,)
+            The last is what no response can reach.
+        """
+        rows = rotation_rad @ self._basis
+        return np.append(rows, np.linalg.norm(rotation_rad - self._basis @ rows))
+
+    @cached_property
+    def time_s(self) -> Array:
+        """Times that stand for all, (n_times,)."""
+        return self._all_s[self._chosen]
+
+    @cached_property
+    def to_rows(self) -> Array:
+        """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
+        matrix = np.linalg.solve(
+            self._span[self._chosen].T, (without(self.nuisance, self._span.T) @ self._basis)
+        )
+        return np.pad(matrix, ((0, 0), (0, 1)))
+
+    @cached_property
+    def _span(self) -> Array:
+        """Orthonormal functions that span all responses, (n_samples, n_rows)."""
+        end_s = self._all_s[-1]
+        shortest_s = np.diff(self._all_s).min()
+        last = np.log1p(_FASTEST * end_s / shortest_s)
+        rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
+        growth, slope = responses_of_modes(rates, self._torque, self._all_s)
+        size = np.linalg.norm(growth, axis=2, keepdims=True)
+        size[size == 0] = 1.0
+        family = np.concatenate((growth / size, rates[:, None] * slope / size))
+        basis, triangle = np.linalg.qr(family.reshape(-1, len(self._all_s)).T)
+        turned, share, _ = np.linalg.svd(triangle)
+        span: Array = basis @ turned[:, share > _RANK * share[0]]
+        return span
+
+    @cached_property
+    def _chosen(self) -> IntArray:
+        """Samples at which the functions of the span differ most."""
+        # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
+        from scipy.linalg import qr
+
+        span = self._span
+        _, order = qr(span.T, mode="r", pivoting=True)
+        chosen: IntArray = np.sort(order[: span.shape[1]])
+        return chosen
+
+    @cached_property
+    def _basis(self) -> Array:
+        """Orthonormal functions that span all responses less nuisance, (n_samples, n_rows - 1)."""
+        return np.linalg.qr(without(self.nuisance, self._span.T).T)[0]
