@@ -80,6 +80,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     settings = {
         "title": "A cell",
         "method": "genetic",
+        "step": "generation",
         "noise_floor_tolerance": 0.02,
         "mutation_start": 20,
     }

@@ -1,4 +1,4 @@
-"""Figure 8: how the best misfit falls from generation to generation."""
+"""Figure 8: how the best misfit falls from step to step."""
 
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``method``, ``title``, ``noise_floor_tolerance``, ``mutation_start``, None for
+        ``method``, its ``step``, ``title``, ``noise_floor_tolerance``, ``mutation_start``, None for
         a method without.
     inputs
         Identifications (CSV) and histories (Parquet) of the case.
@@ -59,7 +59,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(0, history["generation"].max())
-    axes.set_xlabel("generation")
+    axes.set_xlabel(settings["step"])
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     share = f": {reached.sum()} of {len(found)} at the noise floor" if noisy else ""
     axes.set_title(settings["title"] + share)

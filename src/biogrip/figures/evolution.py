@@ -1,4 +1,4 @@
-"""Figure 10: the best individual's parameters from generation to generation."""
+"""Figure 10: the best individual's parameters from step to step."""
 
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``title``, ``model``, ``parameters``, ``published``.
+        ``method``, its ``step``, ``title``, ``model``, ``parameters``, ``published``.
     inputs
         Identifications (CSV) and histories (Parquet) of the case.
     """
@@ -46,7 +46,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     columns = len(grid) // 2
     for axes, below in zip(grid[:columns], grid[columns:], strict=True):
         lowest = below if below.get_visible() and below.axison else axes
-        lowest.set_xlabel("generation")
+        lowest.set_xlabel(settings["step"])
         lowest.tick_params(labelbottom=True)
     lines = [
         grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],

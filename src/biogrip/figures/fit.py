@@ -16,7 +16,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     Parameters
     ----------
     settings
-        ``title``, ``model``, ``gripper``, ``protocol``.
+        ``title``, ``model``, ``gripper``, ``protocol``; ``method``, and its ``step``.
     inputs
         Identifications (CSV), then measurements (Parquet) of the case.
     """
@@ -29,7 +29,7 @@ def draw(settings: dict[str, Any], inputs: list[Path]) -> Figure:
     traces.plot([], [], ".", color=MEASURED, markersize=4, label="noisy measurement")
     if fit.target_rad is not None:
         traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    label = f"best fit (seed {fit.seed}, generation {fit.generations})"
+    label = f"best fit (seed {fit.seed}, {settings['step']} {fit.generations})"
     traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
     traces.set_ylabel(f"closing rotation ({unit})")
     # Room for the legend above the data.

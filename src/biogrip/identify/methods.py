@@ -29,11 +29,14 @@ class Method:
         In the config and in files; in print.
     blocks
         Config blocks that hold its settings.
+    step
+        What a row of its history follows.
     """
 
     name: str
     title: str
     blocks: tuple[str, ...]
+    step: str
 
     @property
     def module(self) -> str:
@@ -44,10 +47,20 @@ class Method:
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        Method("genetic", "genetic algorithm", ("genetic_algorithm",)),
-        Method("genetic_refined", "genetic, polished", ("genetic_algorithm", "genetic_refined")),
-        Method("least_squares", "multi-start least squares", ("least_squares",)),
-        Method("differential_evolution", "differential evolution", ("differential_evolution",)),
+        Method("genetic", "genetic algorithm", ("genetic_algorithm",), "generation"),
+        Method(
+            "genetic_refined",
+            "genetic, polished",
+            ("genetic_algorithm", "genetic_refined"),
+            "generation, then local fit",
+        ),
+        Method("least_squares", "multi-start least squares", ("least_squares",), "local fit"),
+        Method(
+            "differential_evolution",
+            "differential evolution",
+            ("differential_evolution",),
+            "generation",
+        ),
     )
 }
 

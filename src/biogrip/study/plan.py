@@ -196,17 +196,19 @@ class Plan:
         return _json(
             title=c.title,
             method=self.shown,
+            step=METHODS[self.shown].step,
             mutation_start=c.blocks["genetic_algorithm"]["mutation_start"] if mutates else None,
             noise_floor_tolerance=self._tolerance,
         )
 
     def fit(self, case: str) -> str:
         """Settings of the figure of a case's best fit."""
-        return _json(**self._fit(self._case(case)))
+        return _json(**self._fit(self._case(case)), step=METHODS[self.shown].step)
 
     def evolution(self, case: str) -> str:
         """Settings of the figure of the parameters' evolution."""
-        return _json(method=self.shown, **self._truth(self._case(case)))
+        step = METHODS[self.shown].step
+        return _json(method=self.shown, step=step, **self._truth(self._case(case)))
 
     def methods(self) -> str:
         """Settings of the comparison of methods."""
