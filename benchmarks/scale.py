@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
@@ -20,7 +21,8 @@ identifiability: {{coverage_seeds: 0}}
 model_selection: {{models: []}}
 genetic_algorithm: {{population: {population}, survivors: {survivors}}}
 """
-SAMPLED_EVERY_S = 0.1
+# Often enough to see every job, not so often that looking takes their time.
+SAMPLED_EVERY_S = 0.25
 CORES = 2
 
 
@@ -42,26 +44,51 @@ def main() -> None:
         command += ["--configfile", str(config)]
         start = time.monotonic()
         running = subprocess.Popen(command, cwd=ROOT)
-        peaks = _watched(running)
+        seen = _watched(running)
         wall_s = time.monotonic() - start
         if running.returncode:
             sys.exit(running.returncode)
-        _report(folder / "results", wall_s, peaks)
+        _report(folder / "results", wall_s, seen)
 
 
-def _watched(running: subprocess.Popen[bytes]) -> dict[str, int]:
-    """Largest resident memory in bytes of each kind of process, by name."""
-    peaks: dict[str, int] = defaultdict(int)
+@dataclass
+class Seen:
+    """What was seen of a process, or of all of a kind.
+
+    Parameters
+    ----------
+    processes
+        How many.
+    cpu_s
+        Processor time when they were last looked at.
+    peak_bytes
+        Largest resident memory of one.
+    """
+
+    processes: int = 0
+    cpu_s: float = 0.0
+    peak_bytes: int = 0
+
+
+def _watched(running: subprocess.Popen[bytes]) -> dict[str, Seen]:
+    """Follow the processes of a run; by kind, see `_kind`."""
+    seen: dict[tuple[str, int], Seen] = defaultdict(Seen)
     parent = psutil.Process(running.pid)
     while running.poll() is None:
         for process in [parent, *parent.children(recursive=True)]:
             try:
-                kind = _kind(process.cmdline())
-                peaks[kind] = max(peaks[kind], process.memory_info().rss)
+                one = seen[_kind(process.cmdline()), process.pid]
+                one.peak_bytes = max(one.peak_bytes, process.memory_info().rss)
+                one.cpu_s = sum(process.cpu_times()[:2])
             except psutil.Error:
                 continue
         time.sleep(SAMPLED_EVERY_S)
-    return peaks
+    kinds: dict[str, Seen] = defaultdict(Seen)
+    for (kind, _), one in seen.items():
+        kinds[kind].processes += 1
+        kinds[kind].cpu_s += one.cpu_s
+        kinds[kind].peak_bytes = max(kinds[kind].peak_bytes, one.peak_bytes)
+    return kinds
 
 
 def _kind(command: list[str]) -> str:
@@ -72,7 +99,7 @@ def _kind(command: list[str]) -> str:
     return "snakemake" if "snakemake" in command else "others"
 
 
-def _report(results: Path, wall_s: float, peaks: dict[str, int]) -> None:
+def _report(results: Path, wall_s: float, seen: dict[str, Seen]) -> None:
     files = sorted((results / "timings").glob("*.csv"))
     identifying_s = sum(float(pd.read_csv(file)["cpu_s"].sum()) for file in files)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -82,8 +109,12 @@ def _report(results: Path, wall_s: float, peaks: dict[str, int]) -> None:
         ("processor time, which other programs disturb less", used.ru_utime + used.ru_stime),
     ):
         print(f"all else: {100 * (1 - identifying_s / spent_s):.1f} % of {spent_s:.0f} s of {what}")
-    for kind, peak in sorted(peaks.items(), key=lambda item: -item[1]):
-        print(f"{peak / 1e6:7.0f} MB  {kind}")
+    print("processor time, until last looked at, and largest memory:")
+    for kind, of_kind in sorted(seen.items(), key=lambda item: -item[1].cpu_s):
+        print(
+            f"{of_kind.cpu_s:7.1f} s  {of_kind.peak_bytes / 1e6:5.0f} MB  "
+            f"{of_kind.processes:4d} x {kind}"
+        )
     for folder in sorted(path for path in results.iterdir() if path.is_dir()):
         sizes = [file.stat().st_size for file in folder.rglob("*") if file.is_file()]
         if sizes:

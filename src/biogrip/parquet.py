@@ -55,7 +55,7 @@ def column_names(path: Path) -> list[str]:
     """
     try:
         return list(pq.read_schema(path).names)
-    except (OSError, pa.ArrowInvalid) as error:
+    except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
 
 
@@ -73,18 +73,25 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
     try:
         with pq.ParquetFile(path) as file:
             table = file.read(columns=list(names))
-    except (OSError, pa.ArrowInvalid) as error:
+        return {
+            name: np.concatenate([_values(chunk) for chunk in table[name].chunks]) for name in names
+        }
+    except (OSError, ValueError) as error:
+        # Arrow's own errors are of these types, too.
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
-    return {
-        name: np.concatenate([np.from_dlpack(chunk) for chunk in table[name].chunks])
-        for name in names
-    }
 
 
 def _numbers(values: NDArray[Any]) -> pa.Array:
     kept = np.ascontiguousarray(values)
     buffers = [None, pa.py_buffer(kept)]
     return pa.Array.from_buffers(pa.from_numpy_dtype(kept.dtype), len(kept), buffers)
+
+
+def _values(chunk: pa.Array) -> NDArray[Any]:
+    if chunk.null_count:
+        raise ValueError(f"{chunk.null_count} values are missing")
+    whole = np.frombuffer(chunk.buffers()[1], dtype=chunk.type.to_pandas_dtype())
+    return whole[chunk.offset : chunk.offset + len(chunk)]
 
 
 def _words(text: str, rows: int) -> pa.Array:

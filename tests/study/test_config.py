@@ -1,4 +1,5 @@
 import copy
+import json
 import re
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -9,6 +10,7 @@ import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.study.config import Study, check_results_folder, load_study
+from biogrip.study.plan import Plan
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
 DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
@@ -78,6 +80,8 @@ def test_a_case_set_to_nothing_is_dropped(tmp_path: Path) -> None:
 
 
 BAD = {
+    "seeds: 10000\nbatch_size: 25": r"my.yaml, line 2: batch_size: found 25, which makes too many "
+    r"files for one command; allowed is at least 80 with 10000 seeds, 4 methods",
     "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
     "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",
     "seeds: 0": r"my.yaml, line 1: seeds: found 0, allowed is at least 1",
@@ -189,3 +193,14 @@ def test_results_folder_must_be_a_folder(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("")
     with pytest.raises(BiogripError, match="results cannot be written here"):
         check_results_folder(tmp_path / "results")
+
+
+def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
+    """What only some cases have is not taken for what all have."""
+    volts = "protocol: {phases: [{duration_s: 100.0, voltage_V: 10.0}]}"
+    study = load(tmp_path, f"cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}")
+    settings = json.loads(Plan(study, tmp_path).coverage_table())
+    whole = {name: {**settings, **case} for name, case in settings["cases"].items()}
+    assert whole["endothelial_cell"]["protocol"]["phases"][0]["voltage_V"] == 10.0
+    assert "actuator" in whole["endothelial_cell"]
+    assert "actuator" not in whole["my_drop"]

@@ -42,11 +42,9 @@ try:
 except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 
-PLAN = Plan(STUDY, Path("results"))
-
 if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
     release_dead_locks(Path(".snakemake"))
-    for damaged, how in remove_damaged(Path("results"), PLAN.rows()).items():
+    for damaged, how in remove_damaged(Path("results")).items():
         print(f"biogrip: {damaged}: {how}; making it again.", file=sys.stderr)
 
 
@@ -56,6 +54,7 @@ onstart:
 
 # Matches no case.
 NONE = "(?!)"
+PLAN = Plan(STUDY, Path("results"))
 CASES = list(STUDY.cases)
 COMPARES_MODELS = bool(STUDY.config["model_selection"]["models"])
 # Asked for by themselves, or one that is lost would be missed only when it is needed.

@@ -226,10 +226,12 @@ rule timings_table:
         "results/logs/tables/timings.log",
     conda:
         "../envs/biogrip.yaml"
+    params:
+        settings=PLAN.timings_table(),
     message:
         "Writing what the methods cost on this machine"
     shell:
-        "biogrip table timings --settings '{{}}' "
+        "biogrip table timings --settings {params.settings:q} "
         "--inputs {input.timings:q} --output {output.csv:q} 2> {log:q}"
 
 

@@ -15,7 +15,7 @@ from scipy.special import chdtri, fdtri
 from biogrip.arrays import Array
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import FINE, local_fit
+from biogrip.identify.local_fit import FAIR, FINE, local_fit
 from biogrip.identify.problem import Problem
 
 # Steps away from the best fit, in standard deviations, that every profile has.
@@ -39,7 +39,7 @@ class _Accuracy:
 
 _EXACT = _Accuracy(FINE, 1e-5)
 # Chi^2 to 0.004, and limits to a thousandth of a standard deviation or two: enough to count.
-_FAST = _Accuracy(1e-6, 1e-3)
+_FAST = _Accuracy(FAIR, 1e-3)
 
 
 @dataclass(frozen=True)

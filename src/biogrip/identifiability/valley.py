@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.document import rounded
 from biogrip.identifiability.profile import Likelihood
-from biogrip.identify.local_fit import local_fit
+from biogrip.identify.local_fit import FAIR, local_fit
 from biogrip.sample import SampleModel, with_fixed
 
 # Shares of the first in the sum, and sums over the best sum: fine where the valley is.
@@ -78,5 +78,5 @@ def _rest_fitted(
         high=np.delete(problem.high, pair),
     )
     starts = (start, np.delete(likelihood.best, pair))
-    found = min((local_fit(rest, x, 1e-6) for x in starts), key=lambda fit: fit.misfit_rad)
+    found = min((local_fit(rest, x, FAIR) for x in starts), key=lambda fit: fit.misfit_rad)
     return likelihood.rise(found.misfit_rad), found.log_parameters

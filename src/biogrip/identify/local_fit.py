@@ -18,10 +18,11 @@ the trace says nothing comes out in the middle of the range left to it, not wher
 rounding errors leave it, which differs from processor to processor.
 """
 
-ROUGH, FINE = 1e-5, 1e-8
-"""Stop when a step lowers the cost by less than this share: to tell basins apart; to be there.
+ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-8
+"""Stop when a step lowers the cost by less than this share.
 
-Both are far above rounding, so that every machine stops at the same step.
+To tell basins apart; to know chi^2 of some thousand samples to 0.01; to be there.
+All are far above rounding, so that every machine stops at the same step.
 """
 
 _MOST_EVALUATIONS = 300
@@ -121,7 +122,7 @@ def local_fit(
     start : (n_parameters,)
         Log-parameters; moved into the bounds if need be.
     tolerance
-        `ROUGH` or `FINE`.
+        `ROUGH`, `FAIR` or `FINE`.
     held
         What the fit is held to, see `Objective`.
     """

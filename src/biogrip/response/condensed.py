@@ -2,7 +2,7 @@
 
 Whatever the sample, the linear rotation is a weighted sum of what modes do
 under the protocol, g(t; r), and all of these, over all rates r, nearly span a
-space of some forty dimensions only. In it a function is known from its values
+space of some fifty dimensions only. In it a function is known from its values
 at as many well-chosen times. So a response is simulated at those, and a square
 matrix turns what it is there into rows whose sum of squares, gradients and all,
 is that of the residuals at every sample.
@@ -16,6 +16,9 @@ from biogrip.arrays import Array, IntArray
 from biogrip.protocol import TorqueHistory
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
+
+MOST_SAMPLES = 100_000
+"""Of more samples, finding those that stand for all would take gigabytes."""
 
 # Neighbouring rates, in log(1 - T r), T the last time: far closer than modes can be told apart.
 _SPACING = 0.25
@@ -45,6 +48,10 @@ class Condensed:
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Rows of a trace less nuisance.
+
+        Parameters
+        ----------
+        rotation_rad : (n_samples,)
 
         Returns
         -------

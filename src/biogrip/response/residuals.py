@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
-from biogrip.response.condensed import Condensed
+from biogrip.response.condensed import MOST_SAMPLES, Condensed
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from biogrip.sample import SampleModel
@@ -90,7 +90,7 @@ class Residuals:
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
 
-        On the nonlinear model these are the residuals themselves.
+        On the nonlinear model, or with very many samples, these are the residuals themselves.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class Residuals:
         slopes : (n_parameters, n_rows)
             In rad.
         """
-        if self._nonlinear:
+        if self._nonlinear or self.samples > MOST_SAMPLES:
             return self(log_parameters)
         rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
         to_rows = self._condensed.to_rows

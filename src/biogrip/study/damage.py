@@ -2,11 +2,12 @@
 
 Stages write whole files or none. What a crashed machine or a broken copy cut
 short, though, is there and new: Snakemake takes it for done. Mostly its end is
-missing; a file cut between two rows has too few of them.
+missing; a file cut between two rows no longer agrees with itself or its like.
 """
 
 import json
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 from biogrip.study.batches import parse_batch
@@ -18,36 +19,29 @@ _ENDS = {
     ".pdf": b"%%EOF\n",
     ".csv": b"\n",
     ".yaml": b"\n",
-    ".html": b"</html>",
+    ".html": b"</html>\n",
     ".md": b"\n",
     ".tex": b"\\end{table}\n",
 }
-# Rows of a batch may be none where no quantity is determined.
-_MAY_BE_EMPTY = "coverage"
+# Files whose second column (method, model or quantity) holds each of its values once a seed.
+_BY_SEED = ("identifications", "timings", "selection", "coverage")
 
 
-def remove_damaged(results: Path, rows: Mapping[str, int]) -> dict[Path, str]:
+def remove_damaged(results: Path) -> dict[Path, str]:
     """Remove the files of a study that are not whole.
-
-    Parameters
-    ----------
-    results
-        Folder of the results.
-    rows
-        How many rows a CSV file has at least, by its path in there.
 
     Returns
     -------
     dict
-        What is wrong with each file that was removed.
+        What was wrong with each file that was removed.
     """
-    found = dict(_damaged(results, rows))
+    found = dict(_damaged(results))
     for path in found:
         path.unlink()
     return found
 
 
-def _damaged(results: Path, rows: Mapping[str, int]) -> Iterator[tuple[Path, str]]:
+def _damaged(results: Path) -> Iterator[tuple[Path, str]]:
     paths = list(results.glob("[!.]*.*"))
     for stage in STAGE_FOLDERS:
         if stage != "logs":
@@ -55,14 +49,10 @@ def _damaged(results: Path, rows: Mapping[str, int]) -> Iterator[tuple[Path, str
     for path in sorted(paths):
         if not path.is_file():
             continue
-        name = path.relative_to(results)
         if not _ends_well(path):
             yield path, "was cut short"
-        elif path.suffix == ".csv":
-            found = path.read_bytes().count(b"\n") - 1
-            wanted = _rows_wanted(path, found, rows.get(name.as_posix(), 0), name.parts[0])
-            if found < wanted:
-                yield path, f"has {found} of {wanted} rows"
+        elif _lacks_rows(path, path.relative_to(results).parts):
+            yield path, "lacks rows"
 
 
 def _ends_well(path: Path) -> bool:
@@ -74,20 +64,27 @@ def _ends_well(path: Path) -> bool:
         return True
     end = _ENDS.get(path.suffix, b"")
     with path.open("rb") as stream:
-        size = stream.seek(0, 2)
-        stream.seek(max(0, size - len(end) - 1))
-        return end in stream.read()
+        stream.seek(max(0, stream.seek(0, 2) - len(end)))
+        return stream.read() == end if end else True
 
 
-def _rows_wanted(path: Path, found: int, known: int, stage: str) -> int:
-    """Rows that a CSV file should have at least."""
-    batch = parse_batch(path.stem)
-    if batch is not None:
-        # Every seed has as many.
-        least = 0 if stage == _MAY_BE_EMPTY else 1
-        return len(batch.seeds) * max(least, -(-found // len(batch.seeds)))
-    twin = path.with_suffix(".md")
-    if stage == "tables" and twin.exists():
-        # Above them are the heading and the line below it.
-        return max(0, sum(line.startswith(b"|") for line in twin.read_bytes().splitlines()) - 2)
-    return known
+def _lacks_rows(path: Path, parts: tuple[str, ...]) -> bool:
+    stage = parts[0]
+    if stage == "tables" and path.suffix in (".csv", ".md"):
+        csv, markdown = path.with_suffix(".csv"), path.with_suffix(".md")
+        if not (csv.exists() and markdown.exists()):
+            return False
+        rows = {csv: _lines(csv), markdown: _lines(markdown, b"|") - 1}
+        return rows[path] < max(rows.values())
+    if path.suffix != ".csv" or stage not in _BY_SEED:
+        return False
+    rows_of = Counter(line.split(b",", 2)[1] for line in path.read_bytes().splitlines()[1:])
+    batch = parse_batch(path.stem) if len(parts) > 2 else None
+    if batch is None:
+        return len(set(rows_of.values())) > 1
+    # Of quantities there may be none, where none is determined.
+    return set(rows_of.values()) != {len(batch.seeds)} and (bool(rows_of) or stage != "coverage")
+
+
+def _lines(path: Path, start: bytes = b"") -> int:
+    return sum(line.startswith(start) for line in path.read_bytes().splitlines())

@@ -8,6 +8,7 @@ from typing import Any
 from biogrip.errors import BiogripError, nearest
 from biogrip.sample import SampleModel
 from biogrip.study import build
+from biogrip.study.batches import smallest_batch
 from biogrip.study.source import KeyPath
 
 Problem = tuple[KeyPath, str]
@@ -53,6 +54,11 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     for index, key in enumerate(config["reconstructed"]):
         if not _exists(config, key):
             yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+    size, methods = config.get("batch_size"), len(config["methods"])
+    least = smallest_batch(config["seeds"], methods)
+    if size is not None and size < least:
+        text = f"found {size}, which makes too many files for one command; allowed is at least "
+        yield ("batch_size",), f"{text}{least} with {config['seeds']} seeds, {methods} methods."
 
 
 def _model(case: Mapping[str, Any]) -> SampleModel:
@@ -232,7 +238,9 @@ def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Probl
     if "file" in case["measurement"]:
         return
     here = (*path, "measurement")
-    needed = len(_model(case).names) + 1
+    searched = len(_model(case).names) - len(case.get("fixed", {}))
+    nuisance = sum(case["measurement"].get(key, False) for key in ("offset", "drift"))
+    needed = searched + nuisance + 1
     end = sum(phase["duration_s"] for phase in phases)
     times = case["measurement"].get("times_s")
     if times is None:

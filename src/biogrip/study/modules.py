@@ -6,6 +6,7 @@ package is followed, without running anything.
 
 import ast
 import hashlib
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -60,13 +61,21 @@ def _imports(module: str) -> list[str]:
     file = _file(module)
     assert file is not None
     found: set[str] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in _executed(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
             found.add(node.module)
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
     return [name for name in sorted(found) if _is_ours(name)]
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """Walk over a tree but for what only a type checker sees."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+            yield from _executed(child)
 
 
 def _is_ours(name: str) -> bool:

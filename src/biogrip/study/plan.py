@@ -56,7 +56,7 @@ class Plan:
         # Listed once: a plan does not change while it is carried out.
         if folder not in self._planned:
             existing = existing_batches(self.results.joinpath(*folder))
-            size = self.study.batch_size or seeds_a_batch(seeds)
+            size = self.study.batch_size or seeds_a_batch(seeds, len(self.study.methods))
             self._planned[folder] = plan_batches(seeds, size, existing)
         return self._planned[folder]
 
@@ -80,17 +80,6 @@ class Plan:
             return [f"results/{stage}/{case}/{batch.name}{suffix}" for batch in planned(case)]
         method = "" if stage == "measurements" else "{method}/"
         return self.batch_files(f"results/{stage}/{{case}}/{method}{{batch}}{suffix}", case)
-
-    def rows(self) -> dict[str, int]:
-        """Rows that files of whole cases have at least, by their paths in the results."""
-        found = {f"targets/{case}.csv": self._samples(case) for case in self.simulated}
-        models = self.study.config["model_selection"]["models"]
-        for case in self.study.cases:
-            seeds = self.seeds(case)
-            found[f"identifications/{case}.csv"] = seeds * len(self.study.methods)
-            found[f"timings/{case}.csv"] = seeds * len(self.study.methods)
-            found[f"selection/{case}.csv"] = seeds * len(models)
-        return found
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
@@ -278,10 +267,17 @@ class Plan:
     def models_table(self) -> str:
         """Settings of the table of sample models."""
         cases = {
-            name: None if case.recorded else case.model.name
+            name: {
+                "made_by": None if case.recorded else case.model.name,
+                "seeds": self.seeds(name),
+            }
             for name, case in self.study.cases.items()
         }
         return json.dumps({"cases": cases})
+
+    def timings_table(self) -> str:
+        """Settings of the table of processor times."""
+        return _json(seeds={name: self.seeds(name) for name in self.study.cases})
 
     @property
     def simulated(self) -> list[str]:
@@ -517,7 +513,11 @@ class Plan:
 def _shared(name: str, blocks: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Say once what all blocks say: a command has room for 128 KiB."""
     first = next(iter(blocks.values()), {})
-    shared = {k: v for k, v in first.items() if all(block[k] == v for block in blocks.values())}
+    shared = {
+        key: value
+        for key, value in first.items()
+        if all(key in block and block[key] == value for block in blocks.values())
+    }
     rest = {
         name: {key: value for key, value in block.items() if key not in shared}
         for name, block in blocks.items()

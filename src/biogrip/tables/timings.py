@@ -24,14 +24,15 @@ def timings(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        Nothing is needed.
+        ``seeds``: how many of each case count, by name.
     inputs
-        Processor times of the cases, CSV.
+        Processor times of the cases, CSV; they may hold more seeds, left from a larger study.
     """
     try:
         spent = pd.concat([pd.read_csv(path) for path in inputs])
     except (OSError, ValueError) as error:
         raise BiogripError(f"{inputs[0]} and others: cannot be read as times: {error}.") from error
+    spent = spent[spent["seed"] < spent["case"].map(settings["seeds"])]
     rows: list[tuple[Cell, ...]] = [
         (
             case,
