@@ -26,6 +26,7 @@ def written(results: Path, name: str, content: bytes) -> Path:
         ("identifiability/x.json", b'{"a": 1}\n'),
         ("logs/x.log", b"no line end"),
         ("tables/x.html", b"<html></html>\n"),
+        ("summaries/x.html", b"<html></html>"),
     ],
 )
 def test_what_is_whole_stays(tmp_path: Path, name: str, content: bytes) -> None:

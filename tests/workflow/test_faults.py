@@ -206,6 +206,9 @@ def test_files_that_were_cut_short_are_made_again(finished: Path, tmp_path: Path
         lines = (results / name).read_bytes().splitlines(keepends=True)
         assert len(lines) > 1 + rows
         (results / name).write_bytes(b"".join(lines[: 1 + rows]))
+    left = whole_results(study)
+    assert "making it again" not in snakemake(study, "-n").output
+    assert whole_results(study) == left
     run = snakemake(study)
     assert run.status == 0, run.output
     for name in damaged:

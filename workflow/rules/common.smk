@@ -42,7 +42,7 @@ try:
 except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 
-if workflow.exec_mode == ExecMode.DEFAULT and not workflow.dryrun:
+if workflow.exec_mode == ExecMode.DEFAULT and not workflow.output_settings.dryrun:
     release_dead_locks(Path(".snakemake"))
     for damaged, how in remove_damaged(Path("results")).items():
         print(f"biogrip: {damaged}: {how}; making it again.", file=sys.stderr)

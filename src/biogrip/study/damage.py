@@ -19,7 +19,7 @@ _ENDS = {
     ".pdf": b"%%EOF\n",
     ".csv": b"\n",
     ".yaml": b"\n",
-    ".html": b"</html>\n",
+    ".html": b"</html>",
     ".md": b"\n",
     ".tex": b"\\end{table}\n",
 }
@@ -64,8 +64,9 @@ def _ends_well(path: Path) -> bool:
         return True
     end = _ENDS.get(path.suffix, b"")
     with path.open("rb") as stream:
-        stream.seek(max(0, stream.seek(0, 2) - len(end)))
-        return stream.read() == end if end else True
+        stream.seek(max(0, stream.seek(0, 2) - len(end) - 1))
+        last = stream.read()
+    return last.endswith(end) or (path.suffix == ".html" and last == end + b"\n")
 
 
 def _lacks_rows(path: Path, parts: tuple[str, ...]) -> bool:
