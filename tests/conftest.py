@@ -9,6 +9,11 @@ from biogrip.gripper import Arm, Gripper
 from biogrip.protocol import Phase, TorqueHistory, held, torque_history
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with the test that mostly waits, for Slurm: the others run beside it."""
+    items.sort(key=lambda item: item.path.name != "test_slurm.py")
+
+
 @pytest.fixture(scope="session")
 def gripper() -> Gripper:
     """The default study's gripper."""
