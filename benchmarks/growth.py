@@ -153,7 +153,7 @@ def _draw(rows: list[Row]) -> Figure:
         axes.set_xlabel(over)
         axes.set_ylabel("time (ms)")
         low, high = axes.get_ylim()
-        axes.set_ylim(low, high * (high / low) ** 0.35)
+        axes.set_ylim(low, high * (high / low) ** 0.5)
         axes.legend(loc="upper left")
         panel(axes, letter, title)
     for axes, sizes in ((grid[1, 0], _BRANCHES), (grid[1, 1], _SEEDS)):
