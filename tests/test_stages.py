@@ -5,7 +5,7 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.stages import target
+from biogrip.stages import joined, target
 
 CONFIG = yaml.safe_load((Path(__file__).parents[1] / "config" / "config.yaml").read_text())
 
@@ -31,3 +31,18 @@ def test_arms_cannot_turn_further_than_their_combs(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
     target.run(settings(3e-8), tmp_path / "t.csv")
     assert len((tmp_path / "t.csv").read_text().splitlines()) == 102
+
+
+def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
+    """Methods may have batches that end at different seeds; their files then have as many rows."""
+    batches = [tmp_path / name for name in ("a.csv", "b.csv", "c.csv")]
+    for batch, method, seeds in zip(batches, "xxy", ((0, 1), (2, 3), (0, 1, 2)), strict=True):
+        lines = [f"drop,{method},{seed},0.5" for seed in seeds]
+        batch.write_text("\n".join(["case,method,seed,cpu_s", *lines, ""]))
+    joined.run({"seeds": 3}, batches, tmp_path / "all.csv")
+    rows = (tmp_path / "all.csv").read_text().splitlines()
+    wanted = [f"drop,{method},{seed},0.5" for method in "xy" for seed in range(3)]
+    assert rows == ["case,method,seed,cpu_s", *wanted]
+    batches[1].write_text("case,method,seed\n")
+    with pytest.raises(BiogripError, match=r"b.csv, line 1: found case,method,seed; wanted"):
+        joined.run({"seeds": 3}, batches, tmp_path / "all.csv")

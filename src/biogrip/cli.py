@@ -104,8 +104,7 @@ def _parser() -> argparse.ArgumentParser:
     _outputs(robustness, "output")
 
     text = "join the batches of a case in a stage whose files are tables"
-    joined = stages.add_parser("joined", help=text, description=text)
-    joined.set_defaults(command=_joined)
+    joined = _stage(stages, "joined", _joined, text)
     _inputs(joined, "batches", many=True)
     _outputs(joined, "output")
 
@@ -313,7 +312,7 @@ def _robustness(options: argparse.Namespace) -> None:
 def _joined(options: argparse.Namespace) -> None:
     from biogrip.stages import joined
 
-    joined.run(options.batches, options.output)
+    joined.run(options.settings, options.batches, options.output)
 
 
 def _table(options: argparse.Namespace) -> None:

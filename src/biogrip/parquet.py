@@ -67,16 +67,16 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
     BiogripError
         If it cannot be read, or lacks a column.
     """
-    missing = set(names) - set(column_names(path))
-    if missing:
-        raise BiogripError(f"{path}: has no column {min(missing)}.")
     try:
         with pq.ParquetFile(path) as file:
+            missing = set(names) - set(file.schema_arrow.names)
+            if missing:
+                raise BiogripError(f"{path}: has no column {min(missing)}.")
             table = file.read(columns=list(names))
         return {
             name: np.concatenate([_values(chunk) for chunk in table[name].chunks]) for name in names
         }
-    except (OSError, ValueError) as error:
+    except (OSError, TypeError, ValueError) as error:
         # Arrow's own errors are of these types, too.
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
 

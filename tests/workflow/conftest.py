@@ -1,5 +1,6 @@
 import fcntl
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -85,9 +86,10 @@ def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
     with folder.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
-            folder.mkdir()
-            run = snakemake(folder)
+            building = tmp_path_factory.mktemp("building")
+            run = snakemake(building)
             assert run.status == 0, run.output
+            shutil.copytree(building, folder)
     return folder
 
 

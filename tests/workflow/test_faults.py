@@ -66,12 +66,12 @@ def test_a_damaged_target_is_named(finished: Path, tmp_path: Path) -> None:
     study = tmp_path / "study"
     shutil.copytree(finished, study)
     target = study / "results/targets/endothelial_cell.csv"
-    target.write_text(target.read_text().replace("time_s,", "time,", 1))
+    target.write_text("time,angle\n1,2\n")
     for file in (study / "results/measurements/endothelial_cell").iterdir():
         file.unlink()
     run = snakemake(study, "results/measurements/endothelial_cell/seeds_0-1.parquet")
     assert run.status != 0
-    assert "endothelial_cell.csv, line 1: found the columns time, torque_Nm" in run.output
+    assert "endothelial_cell.csv, line 1: found the columns time, angle" in run.output
     assert "Traceback" not in run.output
 
 

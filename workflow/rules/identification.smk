@@ -40,10 +40,13 @@ rule joined:
         case="|".join(map(re.escape, CASES)),
     conda:
         "../envs/biogrip.yaml"
+    params:
+        settings=lambda wildcards: PLAN.joined(wildcards.stage, wildcards.case),
     message:
         "Putting together the {wildcards.stage} of {wildcards.case}"
     shell:
-        "biogrip joined --batches {input.batches:q} --output {output:q} 2> {log:q}"
+        "biogrip joined --settings {params.settings:q} --batches {input.batches:q} "
+        "--output {output:q} 2> {log:q}"
 
 
 rule collection:

@@ -79,7 +79,9 @@ def _lacks_rows(path: Path, parts: tuple[str, ...]) -> bool:
         return rows[path] < max(rows.values())
     if path.suffix != ".csv" or stage not in _BY_SEED:
         return False
-    rows_of = Counter(line.split(b",", 2)[1] for line in path.read_bytes().splitlines()[1:])
+    rows_of = Counter(
+        line.partition(b",")[2].partition(b",")[0] for line in path.read_bytes().splitlines()[1:]
+    )
     batch = parse_batch(path.stem) if len(parts) > 2 else None
     if batch is None:
         return len(set(rows_of.values())) > 1

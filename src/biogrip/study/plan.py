@@ -37,12 +37,7 @@ class Plan:
 
     def coverage_batches(self, case: str) -> list[Batch]:
         """Batches of the seeds that intervals are tested with."""
-        seeds = (
-            self._case(case).blocks["identifiability"]["coverage_seeds"]
-            if case in self.covered
-            else 0
-        )
-        return self._batches(seeds, "coverage", case)
+        return self._batches(self._coverage_seeds(case), "coverage", case)
 
     def selection_batches(self, case: str) -> list[Batch]:
         """Batches of the seeds that sample models are compared on."""
@@ -51,6 +46,14 @@ class Plan:
     def seeds(self, case: str) -> int:
         """Number of traces of a case; of a recorded one there is one."""
         return 1 if self._case(case).recorded else self.study.seeds
+
+    def joined(self, stage: str, case: str) -> str:
+        """Settings of the joining of a case's batches in a stage."""
+        return _json(seeds=self._coverage_seeds(case) if stage == "coverage" else self.seeds(case))
+
+    def _coverage_seeds(self, case: str) -> int:
+        asked: int = self._case(case).blocks["identifiability"]["coverage_seeds"]
+        return asked if case in self.simulated else 0
 
     def _batches(self, seeds: int, *folder: str) -> list[Batch]:
         # Listed once: a plan does not change while it is carried out.
@@ -260,24 +263,16 @@ class Plan:
                 **self._posed(c),
                 "parameters": c.parameters,
                 "noise": c.blocks["measurement"]["noise"],
-                "seeds": c.blocks["identifiability"]["coverage_seeds"],
             }
         return json.dumps(_shared("cases", cases))
 
     def models_table(self) -> str:
         """Settings of the table of sample models."""
         cases = {
-            name: {
-                "made_by": None if case.recorded else case.model.name,
-                "seeds": self.seeds(name),
-            }
+            name: None if case.recorded else case.model.name
             for name, case in self.study.cases.items()
         }
         return json.dumps({"cases": cases})
-
-    def timings_table(self) -> str:
-        """Settings of the table of processor times."""
-        return _json(seeds={name: self.seeds(name) for name in self.study.cases})
 
     @property
     def simulated(self) -> list[str]:
@@ -296,11 +291,7 @@ class Plan:
     @property
     def covered(self) -> list[str]:
         """Simulated cases whose intervals are tested."""
-        return [
-            name
-            for name in self.simulated
-            if self._case(name).blocks["identifiability"]["coverage_seeds"] > 0
-        ]
+        return [name for name in self.simulated if self._coverage_seeds(name) > 0]
 
     @property
     def overviewed(self) -> list[str]:

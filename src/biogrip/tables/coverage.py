@@ -37,7 +37,7 @@ def coverage(settings: dict[str, Any], inputs: list[Path]) -> Table:
     ----------
     settings
         ``cases`` by name. Of each case, there or for all of them: what `case_problem`
-        needs, ``parameters``, ``noise`` and ``seeds``, how many of them count.
+        needs, ``parameters`` and ``noise``.
     inputs
         For each case its target and its intervals, CSV, named after it.
     """
@@ -48,7 +48,6 @@ def coverage(settings: dict[str, Any], inputs: list[Path]) -> Table:
         log_truth = posed.logs(case["parameters"])
         target, intervals = (path for path in inputs if path.stem == name)
         found = _read(intervals)
-        found = found[found["seed"] < case["seeds"]]
         time_s, _, rotation = read_target(target)
         _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
         noise_rad = standard_deviation(rotation, Noise(**case["noise"]))

@@ -31,18 +31,17 @@ def models(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``cases``, by name: the sample model that ``made_by`` the traces, None of a
-        recorded one; ``seeds``, how many of them count.
+        ``cases``: the sample models that made the traces, by case; None of a recorded one.
     inputs
-        Fits of all models, CSV; they may hold more seeds, left from a larger study.
+        Fits of all models, CSV.
     """
     fits = pd.concat([_read(path) for path in inputs])
     square = fits["samples"] * 2 * np.log(fits["misfit_rad"])
     fits["aic"] = square + 2 * (fits["parameters"] + 1)
     fits["bic"] = square + (fits["parameters"] + 1) * np.log(fits["samples"])
     rows: list[tuple[Cell, ...]] = []
-    for case, made in settings["cases"].items():
-        of_case = fits[(fits["case"] == case) & (fits["seed"] < made["seeds"])]
+    for case, made_by in settings["cases"].items():
+        of_case = fits[fits["case"] == case]
         delta = {}
         for criterion in ("aic", "bic"):
             wide = of_case.pivot(index="seed", columns="model", values=criterion)
@@ -52,7 +51,7 @@ def models(settings: dict[str, Any], inputs: list[Path]) -> Table:
         for name in of_case["model"].unique():
             medians = [float(table[name].median()) for table in delta.values()]
             chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
-            title = MODELS[name].title + (" (made the traces)" if name == made["made_by"] else "")
+            title = MODELS[name].title + (" (made the traces)" if name == made_by else "")
             rows.append(
                 (case, title, len(MODELS[name].names), *medians, *chosen, len(delta["aic"]))
             )

@@ -24,15 +24,14 @@ def timings(settings: dict[str, Any], inputs: list[Path]) -> Table:
     Parameters
     ----------
     settings
-        ``seeds``: how many of each case count, by name.
+        Nothing is needed.
     inputs
-        Processor times of the cases, CSV; they may hold more seeds, left from a larger study.
+        Processor times of the cases, CSV.
     """
     try:
         spent = pd.concat([pd.read_csv(path) for path in inputs])
     except (OSError, ValueError) as error:
         raise BiogripError(f"{inputs[0]} and others: cannot be read as times: {error}.") from error
-    spent = spent[spent["seed"] < spent["case"].map(settings["seeds"])]
     rows: list[tuple[Cell, ...]] = [
         (
             case,
