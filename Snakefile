@@ -39,21 +39,45 @@ localrules:
     summary,
 
 
+# Every file that is made on the way is asked for by itself: what is lost is made again.
+ALL_FILES = [
+    *collect("results/targets/{case}.csv", case=PLAN.simulated),
+    *(
+        file
+        for case in CASES
+        for stage in STAGES_IN_BATCHES
+        for file in PLAN.stage_files(stage, case)
+    ),
+    *collect("results/identifications/{case}.csv", case=CASES),
+    *collect("results/histories/{case}.parquet", case=CASES),
+    *collect("results/timings/{case}.csv", case=CASES),
+    *(
+        f"results/{stage}/{case}.csv"
+        for stage, cases in (("selection", CASES), ("coverage", PLAN.covered))
+        if stage in STAGES_IN_BATCHES
+        for case in cases
+    ),
+    *(
+        file
+        for case in CASES
+        for yaml in calibrations_of(case)
+        for file in (yaml, yaml.replace(".yaml", ".parquet"))
+    ),
+    *collect("results/identifiability/{case}.json", case=CASES),
+    *(file for case in CASES for file in expectation_of(case)),
+    *(["results/linearisation.csv"] if PLAN.simulated else []),
+    *SWEPT_FILES,
+    *collect("results/tables/{table}.{kind}", table=TABLES, kind=TABLE_KINDS),
+    *collect("results/timings.{kind}", kind=TABLE_KINDS),
+    *collect("results/figures/{figure}.{kind}", figure=FIGURES, kind=["png", "pdf"]),
+    *collect("results/summaries/{case}.html", case=CASES),
+]
+
+
 rule all:
     default_target: True
     input:
-        targets=collect("results/targets/{case}.csv", case=PLAN.simulated),
-        batches=[
-            file
-            for case in CASES
-            for stage in STAGES_IN_BATCHES
-            for file in PLAN.stage_files(stage, case)
-        ],
-        identifications=collect("results/identifications/{case}.csv", case=CASES),
-        tables=collect("results/tables/{table}.csv", table=TABLES),
-        timings="results/timings.csv",
-        summaries=collect("results/summaries/{case}.html", case=CASES),
-        figures=collect("results/figures/{figure}.png", figure=FIGURES),
+        ALL_FILES,
 
 
 rule all_tables:

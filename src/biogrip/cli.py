@@ -2,33 +2,87 @@
 
 import argparse
 import json
+import os
+import signal
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
+from biogrip.files import refuse_inputs, watched
+from biogrip.running.journal import recorded_in
+
+RESULTS = Path("results")
+_OUTPUTS = {"output", "history", "timing", "traces"}
 
 # Imports of stages stay inside their command: a job pays only for what it uses.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    options = _parser().parse_args(arguments)
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    parser = _parser()
+    if given[:1] == ["run"] and not {"-h", "--help"} & set(given):
+        # What follows is for Snakemake to read.
+        options = parser.parse_args(given[:1])
+        options.rest = given[1:]
+    else:
+        options = parser.parse_args(given)
+    signal.signal(signal.SIGTERM, _terminated)
     try:
-        options.command(options)
+        # What the workflow makes is recorded; what a person writes elsewhere is theirs.
+        with ExitStack() as stack:
+            if options.recorded:
+                _refuse_inputs(options)
+                stack.enter_context(watched(_refuse_others))
+                stack.enter_context(recorded_in(RESULTS))
+            options.command(options)
     except BiogripError as error:
         print(f"biogrip: {error}", file=sys.stderr)
         return 1
     except KeyError as error:
         print(f"biogrip: --settings: the key {error} is missing.", file=sys.stderr)
         return 1
-    return 0
+    except KeyboardInterrupt:
+        print("biogrip: stopped; nothing was written by halves.", file=sys.stderr)
+        return 128 + signal.SIGINT
+    return options.status
+
+
+def _refuse_inputs(options: argparse.Namespace) -> None:
+    """Refuse to write over what is read."""
+    paths = {
+        name: [value] if isinstance(value, Path) else value
+        for name, value in vars(options).items()
+        if isinstance(value, Path | list)
+    }
+    inputs = [path for name in paths if name not in _OUTPUTS for path in paths[name]]
+    for name in _OUTPUTS & set(paths):
+        refuse_inputs(paths[name], inputs)
+
+
+def _refuse_others(path: Path, scratch: Path) -> None:
+    """Refuse to replace what the study has no record of; Snakemake has removed what it has."""
+    if os.path.lexists(path):
+        from biogrip.running.manifest import Manifest
+        from biogrip.running.wholeness import refuse_others
+
+        refuse_others(Manifest(RESULTS), RESULTS, [path])
+
+
+def _terminated(number: int, frame: FrameType | None) -> None:
+    print("biogrip: ended by SIGTERM; nothing was written by halves.", file=sys.stderr)
+    # Scratch files are tidied up on the way out.
+    raise SystemExit(128 + number)
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="biogrip", description=__doc__)
+    parser.set_defaults(recorded=False, status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     stages = parser.add_subparsers(required=True, metavar="STAGE")
 
@@ -42,7 +96,7 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "write one noisy trace as CSV"
     export = stages.add_parser("export", help=text, description=text)
-    export.set_defaults(command=_export)
+    export.set_defaults(command=_export, recorded=True)
     export.add_argument("--seed", type=int, required=True, help="which trace")
     _inputs(export, "measurements")
     _outputs(export, "output")
@@ -125,6 +179,31 @@ def _parser() -> argparse.ArgumentParser:
 
     _identify_parser(stages)
 
+    text = "run a study"
+    more = "Config files (*.yaml) are laid over the default study; the rest goes to Snakemake."
+    run = stages.add_parser(
+        "run",
+        help=text,
+        description=f"{text.capitalize()}. {more}",
+        usage="biogrip run [CONFIG.yaml ...] [options of Snakemake ...]",
+    )
+    run.set_defaults(command=_run)
+
+    for name, command, text in (
+        ("verify", _verify, "read all results and hold them against their record"),
+        ("clean", _clean, "remove the results of a study, and nothing else"),
+    ):
+        parser_of = stages.add_parser(name, help=text, description=text)
+        parser_of.set_defaults(command=command)
+        parser_of.add_argument(
+            "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
+        )
+
+    publish = stages.add_parser("publish", help="renew published tables and figures")
+    publish.set_defaults(command=_publish)
+    publish.add_argument("results", type=Path, help="results of a finished study")
+    publish.add_argument("published", type=Path, help="folder to publish in")
+
     compare = stages.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
     compare.add_argument("published", type=Path, help="folder of published tables")
@@ -157,11 +236,14 @@ def _identify_parser(stages: Any) -> None:
     identify.add_argument("--offset", action="store_true", help="fit an offset along")
     identify.add_argument("--drift", action="store_true", help="fit a linear drift along")
     identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
+    identify.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
 
 
 def _stage(stages: Any, name: str, command: Any, text: str) -> argparse.ArgumentParser:
     parser: argparse.ArgumentParser = stages.add_parser(name, help=text, description=text)
-    parser.set_defaults(command=command)
+    parser.set_defaults(command=command, recorded=True)
     parser.add_argument(
         "--settings",
         type=_settings,
@@ -334,9 +416,11 @@ def _summary(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.study.one_trace import Wanted, identify_trace, in_words
+    from biogrip.study.one_trace import Wanted, check_output, identify_trace, in_words
 
     output = options.output or options.trace.with_suffix(".identified.json")
+    refuse_inputs([output], [options.trace, *([options.config] if options.config else [])])
+    check_output(output, force=options.force)
     measurement = {
         "time": options.time,
         "rotation": options.rotation,
@@ -350,6 +434,30 @@ def _identify(options: argparse.Namespace) -> None:
     found = identify_trace(Wanted(options.trace, options.model, given, options.config), output)
     print(in_words(found))
     print(f"Written to {output}.")
+
+
+def _run(options: argparse.Namespace) -> None:
+    from biogrip.running.run import run
+
+    options.status = run(options.rest)
+
+
+def _verify(options: argparse.Namespace) -> None:
+    from biogrip.running.manifest import verify
+
+    print(verify(options.results))
+
+
+def _clean(options: argparse.Namespace) -> None:
+    from biogrip.running.manifest import clean
+
+    print(clean(options.results))
+
+
+def _publish(options: argparse.Namespace) -> None:
+    from biogrip.running.published import publish
+
+    print(publish(options.results, options.published))
 
 
 def _compare(options: argparse.Namespace) -> None:

@@ -1,11 +1,26 @@
 """Files written whole or not at all."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from biogrip.errors import BiogripError
+
+Watch = Callable[[Path, Path], None]
+"""Is told of a file, and of the scratch file with its contents, just before it is in place."""
+
+_watches: list[Watch] = []
+
+
+@contextmanager
+def watched(watch: Watch) -> Iterator[None]:
+    """Have every file told to `watch` that is written whole meanwhile."""
+    _watches.append(watch)
+    try:
+        yield
+    finally:
+        _watches.remove(watch)
 
 
 @contextmanager
@@ -21,6 +36,8 @@ def written_whole(path: Path) -> Iterator[Path]:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
+        for watch in _watches:
+            watch(path, scratch)
         os.replace(scratch, path)
     except OSError as error:
         raise BiogripError(f"{path}: cannot be written: {error.strerror or error}.") from error
@@ -32,3 +49,17 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file whole."""
     with written_whole(path) as scratch:
         scratch.write_text(text, encoding="utf-8", newline="\n")
+
+
+def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
+    """Refuse to write a file over one that is read, under whatever name.
+
+    Raises
+    ------
+    BiogripError
+        Names the first.
+    """
+    read = [path for path in inputs if path.exists()]
+    for output in outputs:
+        if output.exists() and any(output.samefile(path) for path in read):
+            raise BiogripError(f"{output}: is read; allowed is another file to write.")

@@ -1,7 +1,6 @@
 import copy
 import json
 import re
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +8,7 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.study.config import Study, check_results_folder, load_study
+from biogrip.study.config import Study, load_study
 from biogrip.study.plan import Plan
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
@@ -181,18 +180,6 @@ def test_files_that_are_no_good_yaml(tmp_path: Path, text: str, message: str) ->
 def test_missing_config_file(tmp_path: Path) -> None:
     with pytest.raises(BiogripError, match=r"nowhere.yaml: cannot be read: No such file"):
         load_study({}, [tmp_path / "nowhere.yaml"])
-
-
-def test_jobs_of_a_cluster_may_try_the_results_folder_at_once(tmp_path: Path) -> None:
-    with ThreadPoolExecutor(8) as pool:
-        list(pool.map(check_results_folder, [tmp_path / "results"] * 200))
-    assert not list((tmp_path / "results").iterdir())
-
-
-def test_results_folder_must_be_a_folder(tmp_path: Path) -> None:
-    (tmp_path / "results").write_text("")
-    with pytest.raises(BiogripError, match="results cannot be written here"):
-        check_results_folder(tmp_path / "results")
 
 
 def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:

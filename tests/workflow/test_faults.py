@@ -176,50 +176,6 @@ def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Pa
     assert results == whole_results(finished)
 
 
-def cut(path: Path, share: float) -> None:
-    content = path.read_bytes()
-    path.write_bytes(content[: int(share * len(content))])
-
-
-def test_files_that_were_cut_short_are_made_again(finished: Path, tmp_path: Path) -> None:
-    study = tmp_path / "study"
-    shutil.copytree(finished, study)
-    results = study / "results"
-    damaged = {
-        "measurements/liquid_drop_2/seeds_0-1.parquet": 0.5,
-        "identifications/liquid_drop_2/genetic/seeds_2-3.csv": 0.8,
-        "histories/liquid_drop_2/genetic/seeds_0-1.parquet": 0.9,
-        "identifications/endothelial_cell.csv": 0.7,
-        "identifiability/endothelial_cell.json": 0.5,
-        "tables/errors.csv": 0.5,
-        "figures/torque.png": 0.5,
-        "targets/liquid_drop_2.csv": 0.7,
-    }
-    for name, share in damaged.items():
-        cut(results / name, share)
-    rows_left = {
-        "timings/liquid_drop_2.csv": 5,
-        "identifications/liquid_drop_2/least_squares/seeds_0-1.csv": 1,
-        "tables/gripper.csv": 3,
-    }
-    for name, rows in rows_left.items():
-        lines = (results / name).read_bytes().splitlines(keepends=True)
-        assert len(lines) > 1 + rows
-        (results / name).write_bytes(b"".join(lines[: 1 + rows]))
-    left = whole_results(study)
-    assert "making it again" not in snakemake(study, "-n").output
-    assert whole_results(study) == left
-    run = snakemake(study)
-    assert run.status == 0, run.output
-    for name in damaged:
-        assert f"results/{name}: was cut short; making it again." in run.output
-    for name in rows_left:
-        assert f"results/{name}: lacks rows; making it again." in run.output
-    assert run.output.count("making it again") == len(damaged) + len(rows_left)
-    assert whole_results(study) == whole_results(finished)
-    assert "Nothing to be done" in snakemake(study, "-n").output
-
-
 def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None:
     """The comparison behind the check, on one changed cell and one missing table."""
     published = tmp_path / "published"

@@ -44,7 +44,4 @@ rule publish:
         "Running the default study afresh and publishing its tables and figures"
     shell:
         f"{RUN_AFRESH}; "
-        "mkdir -p {params.published:q}; "
-        "rm -rf {params.published:q}/tables {params.published:q}/figures; "
-        'cp -r "$scratch/results/tables" "$scratch/results/figures" {params.published:q}; '
-        "rm {params.published:q}/tables/*.html"
+        'biogrip publish "$scratch/results" {params.published:q} 2>> {log:q} | tee -a {log:q}'

@@ -7,11 +7,13 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
+import biogrip
 from biogrip.errors import BiogripError
 from biogrip.identify.methods import METHODS
-from biogrip.study.config import check_results_folder, load_study
-from biogrip.study.damage import remove_damaged
-from biogrip.study.locks import release_dead_locks, sign_locks
+from biogrip.running.locks import sign_locks
+from biogrip.running.manifest import Manifest
+from biogrip.running.wholeness import claim, held_against_record
+from biogrip.study.config import load_study
 from biogrip.study.modules import fingerprint, source_files
 from biogrip.study.plan import Plan
 from biogrip.study.source import read_places
@@ -38,18 +40,42 @@ try:
         files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
         command_line=workflow.config_settings.config,
     )
-    check_results_folder(Path("results"))
 except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 
-if workflow.exec_mode == ExecMode.DEFAULT and not workflow.output_settings.dryrun:
-    release_dead_locks(Path(".snakemake"))
-    for damaged, how in remove_damaged(Path("results")).items():
-        print(f"biogrip: {damaged}: {how}; making it again.", file=sys.stderr)
+RESULTS = Path("results")
+
+if workflow.exec_mode == ExecMode.DEFAULT:
+    workflow.execute = held_against_record(
+        workflow.execute,
+        RESULTS,
+        asked=lambda: ALL_FILES,
+        may_make=lambda file: any(rule.is_producer(file) for rule in workflow.rules),
+    )
 
 
 onstart:
     sign_locks(Path(".snakemake"))
+    try:
+        jobs = list(workflow.dag.needrun_jobs())
+        claim(
+            RESULTS,
+            [Path(file) for job in jobs for file in job.output],
+            [Path(file) for job in jobs for file in job.log],
+        )
+    except BiogripError as error:
+        sys.exit(f"biogrip: {error}")
+
+
+onsuccess:
+    Manifest(RESULTS).save()
+
+
+onerror:
+    Manifest(RESULTS).save()
+    print(
+        "biogrip: not finished. Nothing that is done is lost: the same command goes on."
+    )
 
 
 # Matches no case.

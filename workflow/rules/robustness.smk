@@ -3,6 +3,28 @@
 SWEEPS = [f"robustness_{sweep}" for sweep in STUDY.sweeps]
 TABLES += [*(["sampling_evidence"] if PUBLISHED_CASES else []), *SWEEPS]
 FIGURES += SWEEPS
+SWEPT_FILES = [
+    *(
+        f"results/robustness/{sweep}/{case}.csv"
+        for sweep, block in STUDY.sweeps.items()
+        for case in block.cases
+    ),
+    *(
+        file
+        for point in STUDY.points
+        for stage in ("measurements", "identifications", "histories", "timings")
+        for file in PLAN.stage_files(stage, point)
+    ),
+    *(
+        file
+        for point in STUDY.points
+        for yaml in calibrations_of(point)
+        for file in (yaml, yaml.replace(".yaml", ".parquet"))
+    ),
+    *collect("results/targets/{point}.csv", point=STUDY.points),
+    *collect("results/identifications/{point}.csv", point=STUDY.points),
+    *collect("results/histories/{point}.parquet", point=STUDY.points),
+]
 
 
 rule robustness:

@@ -9,7 +9,7 @@ rule summary:
             for figure in PLAN.summary_figures(wildcards.case)
         ],
         code=source_files("biogrip.summary"),
-        template=Path(workflow.basedir) / "src" / "biogrip" / "summary.html.j2",
+        template=Path(biogrip.__file__).with_name("summary.html.j2"),
     output:
         report(
             "results/summaries/{case}.html",

@@ -7,6 +7,7 @@ INPUT_TABLES = {
     "parameter_ranges": ("search_range",),
     "contact": ("gripper", "actuator"),
 }
+TABLE_KINDS = ["csv", "md", "tex", "html"]
 TABLES = [
     *INPUT_TABLES,
     *(f"errors_{case}" for case in CASES),

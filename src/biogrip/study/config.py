@@ -4,8 +4,9 @@ import copy
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
+
+import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.sample import SampleModel
@@ -14,13 +15,8 @@ from biogrip.study.source import read_places
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
-STAGE_FOLDERS = (
-    *("targets", "measurements", "calibrations", "identifications", "histories", "timings"),
-    *("identifiability", "coverage", "selection", "summaries", "traces"),
-    *("robustness", "tables", "figures", "logs"),
-)
-
-_ROOM_BYTES = 256 * 1024
+TEMPLATING = "__use_yte__"
+"""Key that makes Snakemake evaluate expressions in a config file, before we see it."""
 
 
 @dataclass(frozen=True)
@@ -105,6 +101,29 @@ class Study:
         return size
 
 
+def read_configs(files: Sequence[Path]) -> dict[str, Any]:
+    """Read config files and lay each over the ones before.
+
+    Raises
+    ------
+    BiogripError
+        If a file cannot be read, is no config, or would be taken for a program.
+    """
+    places = read_places(files)
+    merged: dict[str, Any] = {}
+    for file in files:
+        loaded = yaml.safe_load(file.read_text(encoding="utf-8"))
+        if loaded is not None and not isinstance(loaded, dict):
+            raise BiogripError(f"{file}: found no keys, allowed is a config in YAML.")
+        merged = overlaid(merged, loaded or {})
+    if TEMPLATING in merged:
+        raise BiogripError(
+            f"{places.place((TEMPLATING,))}: {TEMPLATING}: makes Snakemake run what the file says; "
+            "allowed is a config of plain values."
+        )
+    return merged
+
+
 def load_study(
     config: Mapping[str, Any],
     files: Sequence[str | Path],
@@ -177,27 +196,3 @@ def _case(name: str, block: dict[str, Any]) -> Case:
         assumed_gripper=block.get("assumed_gripper", {}),
         published=block.get("published", {}),
     )
-
-
-def check_results_folder(folder: Path) -> None:
-    """Make the results folder, and see that it and what is in it can be written to.
-
-    Raises
-    ------
-    BiogripError
-        If it cannot.
-    """
-    for place in (folder, *(folder / stage for stage in STAGE_FOLDERS)):
-        if place != folder and not place.exists():
-            continue
-        try:
-            place.mkdir(parents=True, exist_ok=True)
-            # Jobs of a cluster try this at once: a name of its own for each, or none.
-            with TemporaryFile(dir=place) as probe:
-                # Room for Snakemake's own notes too: it fails half-way through writing its locks.
-                probe.write(bytes(_ROOM_BYTES if place == folder else 0))
-        except OSError as error:
-            raise BiogripError(
-                f"{place}: results cannot be written here: {error.strerror}. Allowed is a folder "
-                "that you may write to, on a disk with space."
-            ) from error

@@ -1,12 +1,17 @@
-"""The default study's config, wherever the package is installed."""
+"""The default study's config and its Snakefile, wherever the package is installed."""
 
 from pathlib import Path
 
+# An installed package carries a copy of what stands at the top of the repository.
+_PACKAGED = Path(__file__).parents[1] / "workflow"
+_TOP = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[3]
+
 
 def default_config() -> Path:
-    """Return the config file of the default study.
+    """Return the config file of the default study."""
+    return _TOP / "config" / "config.yaml"
 
-    An installed package carries a copy; in the repository it stands in config/.
-    """
-    packaged = Path(__file__).with_name("config.yaml")
-    return packaged if packaged.is_file() else Path(__file__).parents[3] / "config" / "config.yaml"
+
+def snakefile() -> Path:
+    """Return the Snakefile that runs a study."""
+    return _TOP / "Snakefile"

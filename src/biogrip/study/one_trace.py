@@ -1,13 +1,13 @@
 """One recorded trace from file to verdicts, without a workflow."""
 
 import json
+import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
+from biogrip import __version__
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
@@ -20,11 +20,13 @@ from biogrip.response.simulation import simulated_rotation
 from biogrip.sample import MODELS
 from biogrip.stages.recording import read_checked
 from biogrip.study.case_problem import CaseProblem, case_problem
-from biogrip.study.config import load_study, overlaid
+from biogrip.study.config import load_study, read_configs
 from biogrip.study.defaults import default_config
 from biogrip.study.plan import Plan
-from biogrip.study.source import read_places
 from biogrip.traces import Measurements
+
+# Tells our files from others, which are not replaced.
+_WRITTEN_BY = "written_by_biogrip"
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,40 @@ class Wanted:
     model: str
     measurement: dict[str, Any]
     config: Path | None
+
+
+def check_output(output: Path, *, force: bool) -> None:
+    """Make sure that a file can be written, and is none of somebody else's.
+
+    Parameters
+    ----------
+    output
+        The file.
+    force
+        Whether to replace what `identify_trace` did not write.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be written or must not be replaced.
+    """
+    folder = output.parent
+    if output.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise BiogripError(
+            f"{output}: cannot be written; allowed is a file in a folder that you may write to."
+        )
+    if os.path.lexists(output) and not force and not _is_ours(output):
+        raise BiogripError(
+            f"{output}: is there, and biogrip did not write it; allowed is another name, "
+            "or --force to replace it."
+        )
+
+
+def _is_ours(output: Path) -> bool:
+    try:
+        return not output.is_symlink() and _WRITTEN_BY in json.loads(output.read_bytes())
+    except (OSError, ValueError, TypeError, RecursionError):
+        return False
 
 
 def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
@@ -78,6 +114,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
     )
     data = {
+        _WRITTEN_BY: __version__,
         "trace": str(wanted.trace),
         "model": posed.model.name,
         "model_title": posed.model.title,
@@ -121,14 +158,7 @@ def _plan(wanted: Wanted) -> Plan:
         hint = nearest(wanted.model, MODELS)
         raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {', '.join(MODELS)}.")
     files = [default_config(), *([wanted.config] if wanted.config else [])]
-    # Places first: they name a file that is missing or no YAML.
-    read_places(files)
-    merged: dict[str, Any] = {}
-    for file in files:
-        loaded = yaml.safe_load(file.read_text(encoding="utf-8"))
-        if loaded is not None and not isinstance(loaded, dict):
-            raise BiogripError(f"{file}: found no keys, allowed is a config in YAML.")
-        merged = overlaid(merged, loaded or {})
+    merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.measurement, "file": str(wanted.trace)}

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import psutil
 
-from biogrip.study.locks import release_dead_locks, sign_locks
+from biogrip.running.locks import release_dead_locks, sign_locks
 
 
 def locked_by(folder: Path, **run: object) -> Path:

@@ -13,6 +13,8 @@ from typing import Any
 
 import psutil
 
+from biogrip.files import write_text
+
 
 def sign_locks(snakemake_folder: Path) -> None:
     """Write down that the locks in a ``.snakemake`` folder are this run's."""
@@ -23,7 +25,7 @@ def sign_locks(snakemake_folder: Path) -> None:
         "started": process.create_time(),
         "locks": _locks(snakemake_folder),
     }
-    (snakemake_folder / "run.json").write_text(json.dumps(run))
+    write_text(snakemake_folder / "run.json", json.dumps(run))
 
 
 def release_dead_locks(snakemake_folder: Path) -> None:
