@@ -11,13 +11,42 @@ BENCH_READY := .venv-bench/.installed
 LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --python-version 3.11 \
   --generate-hashes --no-header --no-annotate --quiet
 
-.PHONY: study test check publish lint format bench report docs lock clean
+# What runs in minutes: all but the tests that start Snakemake again and again.
+QUICK := $(filter-out tests/workflow tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
+  $(wildcard tests/*)) tests/workflow/test_results.py
+
+.PHONY: study test test-lowest test-pythons check verify publish lint format bench report docs lock clean
 
 study: $(READY)
-	$(BIN)/snakemake -j$(JOBS)
+	$(BIN)/biogrip run -j$(JOBS)
 
 test: $(READY)
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
+# A small study and the quick tests, weekly and before a release: with the oldest versions that
+# pyproject.toml allows, and with whichever other Pythons there are.
+test-lowest:
+	$(PYTHON) -m venv --clear .venv-lowest
+	.venv-lowest/bin/python -m pip install --quiet uv
+	.venv-lowest/bin/uv pip compile pyproject.toml --resolution lowest-direct --quiet --no-header \
+	  --output-file .venv-lowest/lowest.txt
+	.venv-lowest/bin/python -m pip install --quiet -r .venv-lowest/lowest.txt \
+	  pytest pytest-xdist mpmath hatchling editables
+	.venv-lowest/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	.venv-lowest/bin/python -m pytest -q -n $(JOBS) $(QUICK)
+
+test-pythons:
+	for version in 3.12 3.13; do \
+	  python$$version --version || continue; \
+	  python$$version -m venv --clear .venv-$$version && \
+	  .venv-$$version/bin/python -m pip install --quiet --require-hashes -r requirements.lock && \
+	  .venv-$$version/bin/python -m pip install --quiet --no-deps --no-build-isolation -e . && \
+	  .venv-$$version/bin/python -m pytest -q -n $(JOBS) $(QUICK) || exit 1; \
+	done
+
+# Every result read again, and held against the record of what was written.
+verify: $(READY)
+	$(BIN)/biogrip verify
 
 check: $(READY)
 	$(BIN)/snakemake -j$(JOBS) check
@@ -54,12 +83,10 @@ lock:
 	$(LOCK) --extra slurm --constraints requirements.lock --output-file requirements-slurm.lock \
 	  $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock)
 
+# Of the results only what the study wrote.
 clean:
-	rm -rf .venv .venv-bench .snakemake results/targets results/measurements results/traces \
-	  results/identifications results/histories results/timings results/calibrations \
-	  results/identifiability results/coverage results/selection results/summaries \
-	  results/robustness results/linearisation.csv results/tables \
-	  results/figures results/logs report.html
+	test ! -x $(BIN)/biogrip || $(BIN)/biogrip clean
+	rm -rf .venv .venv-bench .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html
 
 $(READY): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv

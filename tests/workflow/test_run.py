@@ -1,0 +1,116 @@
+"""The command `biogrip run`: configs are checked before Snakemake sees them, and the end is a line."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+
+from tests.workflow.test_wholeness import TINY
+
+BAD = {
+    "missing": (None, r"my.yaml: cannot be read: No such file"),
+    "tab": ("seeds: 4\n\tx: 1\n", r"my.yaml, line 2: not valid YAML: found character '\\t'"),
+    "bracket": ("methods: [genetic\nseeds: 3\n", r"my.yaml, line \d: not valid YAML"),
+    "list": ("- seeds\n", r"my.yaml: found no keys"),
+    "not UTF-8": (b"seeds: 3 # \xff\n", r"my.yaml.*: is not UTF-8 text"),
+    "unknown key": ("seedz: 3\n", r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'"),
+    "program": (
+        '__use_yte__: true\nseeds: ?__import__("os").system("touch {folder}/ran")\n',
+        r"my.yaml, line 1: __use_yte__: makes Snakemake run what the file says",
+    ),
+}
+
+
+def biogrip(folder: Path, *arguments: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "biogrip", *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_a_config_that_cannot_be_used_is_named_before_anything_starts(
+    tmp_path: Path, kind: str
+) -> None:
+    content, message = BAD[kind]
+    if isinstance(content, str):
+        (tmp_path / "my.yaml").write_text(content.replace("{folder}", str(tmp_path)))
+    elif content is not None:
+        (tmp_path / "my.yaml").write_bytes(content)
+    with biogrip(tmp_path, "run", "my.yaml", "-n") as run:
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert re.search(message, output)
+    assert "Traceback" not in output
+    assert len(output.splitlines()) <= 2
+    assert {path.name for path in tmp_path.iterdir()} <= {"my.yaml"}
+
+
+def test_config_files_come_first(tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text(TINY)
+    with biogrip(tmp_path, "run", "-n", "--configfile", "my.yaml") as run:
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 1
+    assert output.startswith("biogrip: --configfile: config files come first")
+
+
+def test_a_run_ends_by_naming_what_to_open(tmp_path: Path) -> None:
+    (tmp_path / "my.yaml").write_text(TINY)
+    errors = "results/tables/errors.csv"
+    with biogrip(tmp_path, "run", "my.yaml", "-j2", errors) as run:
+        output, _ = run.communicate(timeout=300)
+    assert run.returncode == 0, output
+    assert output.splitlines()[-1] == "biogrip: done. Open results/tables/errors.md."
+    for name in ("errors.md", "errors.csv"):
+        assert (tmp_path / "results" / "tables" / name).is_file()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
+def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Signals) -> None:
+    (tmp_path / "my.yaml").write_text(TINY)
+    with biogrip(tmp_path, "run", "my.yaml", "-j2") as run:
+        give_up = time.monotonic() + 120
+        while not list((tmp_path / "results").glob("targets/*.csv")):
+            assert time.monotonic() < give_up
+            time.sleep(0.05)
+        os.kill(run.pid, number)
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 128 + number
+    assert output.splitlines()[-1] == (
+        f"biogrip: stopped by {number.name}. Nothing that is done is lost; "
+        "to go on: biogrip run my.yaml -j2"
+    )
+    assert "Traceback" not in output
+    assert not [p for p in psutil.process_iter(["cwd"]) if p.info["cwd"] == str(tmp_path)]
+    (target,) = (tmp_path / "results").glob("targets/*.csv")
+    done = target.stat().st_mtime_ns
+    with biogrip(tmp_path, "run", "my.yaml", "-j2", str(target.relative_to(tmp_path))) as run:
+        output, _ = run.communicate(timeout=120)
+    assert run.returncode == 0, output
+    assert target.stat().st_mtime_ns == done
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
+def test_a_stopped_command_says_so_in_a_line(tmp_path: Path, number: signal.Signals) -> None:
+    trace = Path(__file__).parents[2] / "data" / "example_trace.csv"
+    with biogrip(tmp_path, "identify", str(trace), "--output", "found.json") as run:
+        # Its own handlers are in place before the libraries are loaded.
+        give_up = time.monotonic() + 60
+        while not any("numpy" in m.path for m in psutil.Process(run.pid).memory_maps()):
+            assert time.monotonic() < give_up
+            time.sleep(0.01)
+        os.kill(run.pid, number)
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 128 + number
+    assert output.startswith("biogrip: ")
+    assert output.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
