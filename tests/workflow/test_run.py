@@ -79,7 +79,7 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
     (tmp_path / "my.yaml").write_text(TINY)
     with biogrip(tmp_path, "run", "my.yaml", "-j2") as run:
         give_up = time.monotonic() + 120
-        while not list((tmp_path / "results").glob("targets/*.csv")):
+        while not list((tmp_path / "results").glob("measurements/*/*.parquet")):
             assert time.monotonic() < give_up
             time.sleep(0.05)
         os.kill(run.pid, number)
