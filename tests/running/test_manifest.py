@@ -144,7 +144,7 @@ def test_cleaning_removes_what_was_written_and_nothing_else(results: Path) -> No
 def test_verifying_names_what_is_missing(results: Path) -> None:
     assert verify(results) == f"2 files of {results} are what was written."
     (results / "b.json").unlink()
-    with pytest.raises(BiogripError, match="b.json: is missing"):
+    with pytest.raises(BiogripError, match=r"b.json: is missing"):
         verify(results)
 
 

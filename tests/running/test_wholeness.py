@@ -82,9 +82,9 @@ def test_what_is_in_the_way_is_refused(results: Path, tmp_path: Path, kind: str)
         other.mkdir()
     else:
         other.symlink_to(tmp_path / "nowhere")
-    with pytest.raises(BiogripError, match="new.csv: (in the way|is a link)"):
+    with pytest.raises(BiogripError, match=r"new.csv: (in the way|is a link)"):
         check(results)
-    with pytest.raises(BiogripError, match="new.csv: (in the way|is a link)"):
+    with pytest.raises(BiogripError, match=r"new.csv: (in the way|is a link)"):
         claim(results, [other], [])
     assert not (tmp_path / "nowhere").exists()
 
@@ -112,7 +112,7 @@ def test_logs_are_claimed_once_and_for_all(results: Path) -> None:
     claim(results, [], [log])
     other = results / "logs" / "mine.log"
     other.write_text("mine")
-    with pytest.raises(BiogripError, match="mine.log: in the way"):
+    with pytest.raises(BiogripError, match=r"mine.log: in the way"):
         claim(results, [], [other])
 
 

@@ -1,4 +1,4 @@
-"""The command `biogrip run`: configs are checked before Snakemake sees them, and the end is a line."""
+"""`biogrip run`: configs are checked before Snakemake sees them, and the end is a line."""
 
 import os
 import re
