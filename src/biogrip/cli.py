@@ -334,8 +334,9 @@ def _summary(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.study.one_trace import Wanted, identify_trace, in_words
+    from biogrip.study.one_trace import Wanted, check_trace_file, identify_trace, in_words
 
+    check_trace_file(options.trace)
     output = options.output or options.trace.with_suffix(".identified.json")
     measurement = {
         "time": options.time,

@@ -152,7 +152,7 @@ def test_what_is_not_there_is_named_with_what_is(tmp_path: Path) -> None:
     (tmp_path / "trace.csv").write_text("time_s,rotation_rad\n")
     done = identify(tmp_path / "trcae.csv")
     assert done.returncode == 1
-    assert "trcae.csv: there is no such file. Did you mean" in done.stderr
+    assert "trcae.csv', allowed is a file that exists. Did you mean" in done.stderr
     done = identify(EXAMPLE, "--model", "maxwel", "--output", tmp_path / "x.json")
     assert done.returncode == 1
     assert "--model: found 'maxwel'. Did you mean 'maxwell'?" in done.stderr

@@ -1,6 +1,5 @@
 """The study as its config describes it."""
 
-import copy
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 from biogrip.errors import BiogripError
 from biogrip.sample import SampleModel
 from biogrip.study import build
-from biogrip.study.source import read_places
+from biogrip.study.source import overlaid, read_places
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
@@ -109,6 +108,8 @@ def load_study(
     config: Mapping[str, Any],
     files: Sequence[str | Path],
     command_line: Iterable[Hashable] = (),
+    *,
+    for_workflow: bool = True,
 ) -> Study:
     """Check and type a merged config.
 
@@ -120,6 +121,8 @@ def load_study(
         The files it came from, to name lines in messages.
     command_line
         Top-level keys that were set on the command line.
+    for_workflow
+        Whether it is to be run by the workflow, which names of files must suit.
 
     Raises
     ------
@@ -128,7 +131,7 @@ def load_study(
     """
     places = read_places(files, command_line)
     complete = _fill_in(with_numbers(config))
-    check(complete, places)
+    check(complete, places, for_workflow=for_workflow)
     cases = {name: _case(name, block) for name, block in complete["cases"].items()}
     points = {name: _case(name, block) for name, block in point_blocks(complete).items()}
     return Study(complete, cases, sweeps_of(complete), points)
@@ -150,16 +153,6 @@ def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
                     case[block] = overlaid(config[block], case.get(block, {}))
         filled[name] = case
     return {**config, "cases": filled}
-
-
-def overlaid(base: Any, over: Any) -> Any:
-    """Lay a config block over another: blocks key by key, everything else whole."""
-    if isinstance(base, dict) and isinstance(over, dict):
-        merged = copy.deepcopy(base)
-        for key, value in over.items():
-            merged[key] = overlaid(merged[key], value) if key in merged else value
-        return merged
-    return over
 
 
 def _case(name: str, block: dict[str, Any]) -> Case:

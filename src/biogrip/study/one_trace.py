@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
@@ -20,11 +18,24 @@ from biogrip.response.simulation import simulated_rotation
 from biogrip.sample import MODELS
 from biogrip.stages.recording import read_checked
 from biogrip.study.case_problem import CaseProblem, case_problem
-from biogrip.study.config import load_study, overlaid
+from biogrip.study.config import load_study
 from biogrip.study.defaults import default_config
 from biogrip.study.plan import Plan
-from biogrip.study.source import read_places
+from biogrip.study.source import overlaid, read_config
+from biogrip.study.trace_file import trace_file_problem
+from biogrip.study.validation import value_problem
 from biogrip.traces import Measurements
+
+_OPTIONS = {
+    "time": "--time",
+    "rotation": "--rotation",
+    "time_unit": "--time-unit",
+    "rotation_unit": "--rotation-unit",
+    "noise_rad": "--noise",
+    "offset": "--offset",
+    "drift": "--drift",
+}
+"""By key of the ``measurement`` block, what gives it on the command line."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +100,18 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     return data
 
 
+def check_trace_file(trace: Path) -> None:
+    """Refuse a path that leads to no file.
+
+    Raises
+    ------
+    BiogripError
+        With the file beside it that has the nearest name.
+    """
+    if problem := trace_file_problem(trace):
+        raise BiogripError(f"TRACE: {problem}")
+
+
 def in_words(found: dict[str, Any]) -> str:
     """Return what `identify_trace` found as text to read."""
     width = max(len(item["quantity"]) for item in found["quantities"])
@@ -112,28 +135,23 @@ def in_words(found: dict[str, Any]) -> str:
 
 
 def _plan(wanted: Wanted) -> Plan:
-    if not wanted.trace.is_file():
-        beside = [str(file) for file in wanted.trace.parent.glob("*") if file.is_file()]
-        raise BiogripError(
-            f"{wanted.trace}: there is no such file.{nearest(str(wanted.trace), beside)}"
-        )
+    check_trace_file(wanted.trace)
+    for key, value in wanted.measurement.items():
+        if problem := value_problem(("measurement", key), value):
+            raise BiogripError(f"{_OPTIONS[key]}: {problem}")
     if wanted.model not in MODELS:
         hint = nearest(wanted.model, MODELS)
         raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {', '.join(MODELS)}.")
     files = [default_config(), *([wanted.config] if wanted.config else [])]
-    # Places first: they name a file that is missing or no YAML.
-    read_places(files)
     merged: dict[str, Any] = {}
     for file in files:
-        loaded = yaml.safe_load(file.read_text(encoding="utf-8"))
-        if loaded is not None and not isinstance(loaded, dict):
-            raise BiogripError(f"{file}: found no keys, allowed is a config in YAML.")
-        merged = overlaid(merged, loaded or {})
+        merged = overlaid(merged, read_config(file))
     name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.measurement, "file": str(wanted.trace)}
     merged["cases"] = {case: {"sample": {"model": wanted.model}, "measurement": measurement}}
-    return Plan(load_study(merged, files, command_line=["cases"]), Path("results"))
+    study = load_study(merged, files, command_line=["cases"], for_workflow=False)
+    return Plan(study, Path("results"))
 
 
 def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Any) -> dict[str, Any]:
