@@ -34,20 +34,34 @@ _NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+")
 _PROSE = {"title", "error_percent", "label", "unit"}
 _SHOWN = 6
 _EXPLAINED = 1000
+_MOST_COUNTED = 2**53
 _UNITS = (("time_unit",), ("rotation_unit",))
 
 
-def _unique_items(
-    validator: Any, unique: bool, items: Any, leaf: Mapping[str, Any]
-) -> Iterator[ValidationError]:
-    """Compare only lists that are not too long anyway: it takes the square of their length."""
-    if len(items) <= leaf["maxItems"]:
-        yield from Draft202012Validator.VALIDATORS["uniqueItems"](validator, unique, items, leaf)
+def _unless_longer(keyword: str, most: str) -> Any:
+    """Return jsonschema's check of a keyword, left out where there is more than allowed anyway.
+
+    It takes seconds for tens of thousands of items, for unequal ones the square of them.
+    """
+    whole = Draft202012Validator.VALIDATORS[keyword]
+
+    def check(
+        validator: Any, value: Any, instance: Any, leaf: Mapping[str, Any]
+    ) -> Iterator[ValidationError]:
+        long = isinstance(instance, list | dict) and len(instance) > leaf.get(most, math.inf)
+        if not long:
+            yield from whole(validator, value, instance, leaf)
+
+    return check
 
 
 _Validator = extend(
     Draft202012Validator,
-    validators={"uniqueItems": _unique_items},
+    validators={
+        "items": _unless_longer("items", "maxItems"),
+        "uniqueItems": _unless_longer("uniqueItems", "maxItems"),
+        "additionalProperties": _unless_longer("additionalProperties", "maxProperties"),
+    },
     type_checker=Draft202012Validator.TYPE_CHECKER.redefine(
         "integer",
         lambda _, value: isinstance(value, int) and not isinstance(value, bool),
@@ -77,7 +91,9 @@ def with_numbers(value: Any) -> Any:
         return [with_numbers(item) for item in value]
     if isinstance(value, str) and len(value) <= LONGEST_NUMBER and _NUMBER.fullmatch(value.strip()):
         number = float(value)
-        return int(number) if number.is_integer() else number
+        # Beyond, a float does not hold every whole number, nor would anybody count them.
+        whole = number.is_integer() and abs(number) < _MOST_COUNTED
+        return int(number) if whole else number
     return value
 
 
@@ -146,8 +162,10 @@ def _schema_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
 def _explained(errors: Iterable[ValidationError], path: KeyPath = ()) -> Iterator[Problem]:
     """Explain errors in the order of their paths, which start at `path`."""
     ordered = sorted(errors, key=lambda error: [str(part) for part in error.absolute_path])
-    for error in ordered[:_EXPLAINED]:
-        yield from _explain((*path, *error.absolute_path), error)
+    explained = (
+        problem for error in ordered for problem in _explain((*path, *error.absolute_path), error)
+    )
+    yield from islice(explained, _EXPLAINED)
 
 
 def _assumed_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
