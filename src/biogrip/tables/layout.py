@@ -14,7 +14,7 @@ from biogrip.files import write_text
 Cell = str | float | int | None
 
 _FORMULA = re.compile(r"[=+@\t\r-]")
-_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf|nan)?")
+_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Table:
 def write(table: Table, output: Path) -> None:
     """Write a table as CSV with six significant digits, and beside it .md, .tex and .html."""
     names = [column.name for column in table.columns]
-    raw = pd.DataFrame([[_inert(_text(c, 6)) for c in row] for row in table.rows], columns=names)
+    raw = pd.DataFrame([[inert(_text(c, 6)) for c in row] for row in table.rows], columns=names)
     shown = pd.DataFrame(
         [
             [_text(cell, column.digits) for cell, column in zip(row, table.columns, strict=True)]
@@ -88,7 +88,7 @@ def _text(cell: Cell, digits: int) -> str:
     return str(cell)
 
 
-def _inert(text: str) -> str:
+def inert(text: str) -> str:
     """Return text that a spreadsheet takes for no formula, numbers with a sign as they are."""
     return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
 
