@@ -407,3 +407,87 @@ def test_a_file_with_too_many_rows_is_refused(
     assert len(read_recording(path, PLAIN).time_s) == 12
     monkeypatch.setattr(recordings, "MOST_ROWS", 11)
     assert refusal(path) == ": found over 11 rows, allowed are 11."
+
+
+@pytest.mark.parametrize(
+    "error", ["#REF!", "#VALUE!", "#DIV/0!", "#NAME?", "#NUM!", "#NULL!", "#SPILL!", "#BEZUG!"]
+)
+@pytest.mark.parametrize("separator", [",", ";", "\t", ", "])
+def test_a_spreadsheets_error_is_no_comment(tmp_path: Path, error: str, separator: str) -> None:
+    lines = [line.replace(",", separator) for line in with_row(4, f"{error},1e-6")]
+    said = refusal(written(tmp_path / "t.csv", lines))
+    assert said.startswith(
+        f", line 6, column 'time_s': found '{error}', allowed is a finite number"
+    )
+    lines = [line.replace(",", separator) for line in with_row(4, f"4,{error}")]
+    said = refusal(written(tmp_path / "t.csv", lines))
+    assert said.startswith(f", line 6, column 'rotation_rad': found '{error}', allowed is a finite")
+
+
+@pytest.mark.parametrize("gap", ["#N/A", "#n/a", "#NV"])
+def test_a_value_that_a_spreadsheet_lacks_is_a_gap(tmp_path: Path, gap: str) -> None:
+    for row in (f"{gap.upper()},1e-6", f"4,{gap}"):
+        recording = read_recording(written(tmp_path / "t.csv", with_row(4, row)), PLAIN)
+        assert recording.without_number == 1
+        assert 6 not in recording.lines
+
+
+def test_a_spreadsheets_error_in_another_column_does_no_harm(tmp_path: Path) -> None:
+    lines = ["note,time_s,rotation_rad", *(f"#REF!,{row}" for row in ROWS)]
+    assert len(read_recording(written(tmp_path / "t.csv", lines), PLAIN).time_s) == len(ROWS)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "# 1,2",
+        "#",
+        "#REF!",
+        "#comment, with comma",
+        "#WHY? because",
+        "#Note!, this",
+        " # x",
+        "##,1",
+    ],
+)
+def test_comments_are_passed_over(tmp_path: Path, comment: str) -> None:
+    lines = ["time_s,rotation_rad", *ROWS[:4], comment, *ROWS[4:]]
+    recording = read_recording(written(tmp_path / "t.csv", lines), PLAIN)
+    assert recording.without_number == 0
+    assert recording.lines.tolist() == [2, 3, 4, 5, *range(7, 15)]
+
+
+@pytest.mark.parametrize("letters", [131_072, 131_073, 1_000_000])
+def test_endless_names_and_cells_are_refused(tmp_path: Path, letters: int) -> None:
+    said = refusal(written(tmp_path / "t.csv", [f"time_s,rotation,{'x' * letters}", *ROWS]))
+    assert said.startswith(", line 1")
+    assert len(said) < 1000
+    said = refusal(written(tmp_path / "t.csv", with_row(4, f"4,{'1' * letters}")))
+    assert said.startswith(", line 6")
+    assert len(said) < 1000
+    said = refusal(written(tmp_path / "t.csv", [",".join(map(str, range(letters // 9))), *ROWS]))
+    assert len(said) < 1000
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        *(("hours", "h"), ("hour", "h"), ("HR", "h"), ("minutes", "min"), ("seconds", "s")),
+        *(("sec", "s"), ("milliseconds", "ms"), ("mn", "min")),
+    ],
+)
+def test_a_unit_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
+    with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
+        unit_of(Path("t.csv"), "t", given, TIME_UNITS)
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        *(("radians", "rad"), ("degrees", "deg"), ("°", "deg"), ("milliradians", "mrad")),
+        *(("microradians", "urad"), ("microrad", "urad"), ("Rad", "rad")),
+    ],
+)
+def test_an_angle_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
+    with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
+        unit_of(Path("t.csv"), "phi", given, ROTATION_UNITS)

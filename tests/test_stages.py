@@ -1,9 +1,11 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.stages import joined, target
 
@@ -46,3 +48,18 @@ def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:
     batches[1].write_text("case,method,seed\n")
     with pytest.raises(BiogripError, match=r"b.csv, line 1: found case,method,seed; wanted"):
         joined.run({"seeds": 3}, batches, tmp_path / "all.csv")
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_target_that_is_not_finite_is_refused_where_it_arises(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    def odd(*_: object, **__: object) -> Array:
+        return np.where(np.arange(101) < 7, 1e-5, value)[None]
+
+    monkeypatch.setattr(target, "simulated_rotation", odd)
+    with pytest.raises(BiogripError) as error:
+        target.run(settings(1e-9), tmp_path / "t.csv")
+    said = str(error.value)
+    assert f"the simulated rotation of Maxwell liquid with k = 1, c = 1 is {value} at 7 s" in said
+    assert not list(tmp_path.iterdir())

@@ -416,8 +416,15 @@ def _summary(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.study.one_trace import Wanted, check_output, identify_trace, in_words
+    from biogrip.study.one_trace import (
+        Wanted,
+        check_output,
+        check_trace_file,
+        identify_trace,
+        in_words,
+    )
 
+    check_trace_file(options.trace)
     output = options.output or options.trace.with_suffix(".identified.json")
     refuse_inputs([output], [options.trace, *([options.config] if options.config else [])])
     check_output(output, force=options.force)

@@ -11,11 +11,13 @@ themselves would be one of the noise, and means over blocks would lose a
 sinusoid.
 """
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.optimize import nnls
 from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
@@ -50,6 +52,10 @@ FALSE_ALARM = 1e-3
 # Times are written to some digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-6, 0.1, 10.0)
+# Twice the logarithm of how much likelier a trace must be with the other sign to be refused.
+_FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
+# Share of a constant that offset and drift leave over, from which on it is one.
+_NO_CONSTANT = 1e-6
 
 
 @dataclass(frozen=True)
@@ -58,6 +64,8 @@ class _Fit:
 
     Parameters
     ----------
+    lagged : (n_samples, n_lagged)
+        The lagged torques, those of the left arm before those of the difference.
     response_rad : (n_samples,)
         That part, without what the instrument may have added.
     unknowns
@@ -66,6 +74,7 @@ class _Fit:
         Largest rotation.
     """
 
+    lagged: Array
     response_rad: Array
     unknowns: int
     turn_rad: float
@@ -83,10 +92,10 @@ def check_recording(
     """Refuse a trace that the gripper cannot have shown under the protocol.
 
     In this order: times outside the protocol, or covering next to none of it;
-    no response to the torque; a rotation larger than the free gripper's, or so
-    small that the sample would have to be hundreds of times stiffer than the
-    gripper's hinges, whose rotation then tells nothing but the instrument's
-    errors. A trace in a wrong unit ends up in one of them.
+    no response to the torque; a response of the wrong sign; a rotation larger
+    than the free gripper's, or so small that the sample would have to be
+    hundreds of times stiffer than the gripper's hinges, whose rotation then
+    tells nothing but the instrument's errors. A trace in a wrong unit ends up in one of them.
 
     Parameters
     ----------
@@ -116,6 +125,13 @@ def check_recording(
             f"{_extent(recording, path)}, column '{columns.rotation}': found no response to the "
             f"torque, but {trace.mean():.3g} rad throughout, give or take {trace.std():.2g} rad; "
             "allowed is a rotation from zero that follows the torque and stands out of the noise."
+        )
+    if _mirrored(trace, fit.lagged, gripper, nuisance, noise_rad):
+        raise BiogripError(
+            f"{_extent(recording, path)}, column '{columns.rotation}': found a rotation that goes "
+            "against the torque, allowed is the closing rotation, positive where the arm closes. "
+            "It would fit if it were -1 times (is opening counted as positive?), or if an offset or "
+            "drift of the instrument, where it has one, were declared."
         )
     _check_turn(recording, fit.turn_rad, free_rotation(gripper, torque), path, columns)
 
@@ -167,7 +183,7 @@ def _fit(recording: Recording, torque: TorqueHistory, nuisance: Array) -> _Fit:
     lagged = rotation(lags, torque, recording.time_s).T
     seen = without(nuisance, lagged.T).T
     weights, _, rank, _ = np.linalg.lstsq(seen, without(nuisance, recording.rotation_rad))
-    return _Fit(seen @ weights, int(rank), float(np.abs(lagged @ weights).max()))
+    return _Fit(lagged, seen @ weights, int(rank), float(np.abs(lagged @ weights).max()))
 
 
 def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
@@ -186,6 +202,57 @@ def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
     freedom = len(trace) - fit.unknowns
     ratio = fdtri(fit.unknowns, freedom, 1 - FALSE_ALARM)
     return bool(explained / fit.unknowns > ratio * left_over / freedom)
+
+
+def _mirrored(
+    trace: Array, lagged: Array, gripper: Gripper, nuisance: Array, noise_rad: float | None
+) -> bool:
+    """Whether the trace is a response with the wrong sign: the mirrored one is far likelier.
+
+    It must be so with and without a constant that the instrument may have added: a constant
+    that was not declared is no wrong sign.
+    """
+    constant = np.full((1, len(trace)), len(trace) ** -0.5)
+    rest = without(nuisance, constant)
+    norm = np.linalg.norm(rest)
+    also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
+    responses = _extreme_responses(lagged, gripper)
+    declared, freed = (
+        [_left_over(without(basis, trace), sign * without(basis, responses)) for sign in (1, -1)]
+        for basis in (nuisance, also)
+    )
+    if noise_rad is not None:
+        likelier = declared[0] - declared[1] > _FAR_LIKELIER * noise_rad**2
+    else:
+        likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / len(trace))
+    return bool(likelier and freed[0] > freed[1])
+
+
+def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
+    """Responses of which all samples' are sums with weights that are not negative, (n, n_samples).
+
+    A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
+    where x tells how rigid it is and falls, as it relaxes, from at most 1 to at least 0. The
+    extremes are: no sample, rigid ones that relax within one of the lags, a rigid one for good.
+    """
+    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
+    lags = len(_LAG_SHARES)
+    alone = lagged[:, :lags].T / k_2
+    if lagged.shape[1] == lags:
+        return alone
+    pushed = lagged[:, lags:].T / (k_2 + k_4)
+    # The shortest lag is next to none.
+    return np.vstack((alone - pushed + pushed[0], pushed[0]))
+
+
+def _left_over(trace: Array, responses: Array) -> float:
+    """Sum of squares that no sum of the responses with weights of at least 0 explains."""
+    scale = np.linalg.norm(responses, axis=1)
+    used = responses[scale > 0] / scale[scale > 0, None]
+    along, triangle = np.linalg.qr(used.T)
+    seen = along.T @ trace
+    _, distance = nnls(triangle, seen)
+    return float(max(np.sum(trace**2) - np.sum(seen**2), 0.0) + distance**2)
 
 
 def _check_turn(

@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from io import StringIO
 from itertools import islice
@@ -20,9 +20,23 @@ ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
 FEWEST_SAMPLES = 10
 MOST_ROWS = 10_000_000
 
+_SPELLED_OUT = {
+    "s": ("sec", "secs", "second", "seconds"),
+    "ms": ("msec", "millisecond", "milliseconds"),
+    "min": ("mins", "minute", "minutes", "m"),
+    "h": ("hr", "hrs", "hour", "hours"),
+    "rad": ("radian", "radians"),
+    "mrad": ("milliradian", "milliradians"),
+    "urad": ("microrad", "microradian", "microradians"),
+    "deg": ("degree", "degrees", "°"),
+}
 _SEPARATORS = (",", ";", "\t")
-_GAPS = ("", "-", "na", "n/a", "nan")
+_GAPS = ("", "-", "na", "n/a", "nan", "#n/a", "#nv")
 _ROWS_AT_ONCE = 100_000
+_MOST_LISTED = 50
+# What a spreadsheet shows for a value that it cannot compute, as #REF!, #DIV/0! or #NAME?, is no
+# comment when a separator follows.
+_COMMENT = re.compile(r" *#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t])")
 _UNIT_AT_END = re.compile(r"(?:_(\w+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
 
 
@@ -97,8 +111,9 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     ``rotation_urad``, ``phi (mrad)`` or ``time [s]``; it is never guessed. The
     micro sign may stand for the u.
 
-    A cell that is empty or holds ``nan``, ``NA``, ``N/A`` (capital or not) or
-    ``-`` is a gap. Its row is left out and counted; nothing is interpolated.
+    A cell that is empty or holds ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (capital or
+    not) or ``-`` is a gap. Its row is left out and counted; nothing is
+    interpolated. Other errors of spreadsheets, as ``#REF!``, are no numbers.
 
     Parameters
     ----------
@@ -180,7 +195,7 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
     if stated not in allowed:
         raise BiogripError(
             f"{place(path, column=column)}: found the unit '{given}', allowed are {choices}."
-            + nearest(given, allowed)
+            + nearest_unit(given, allowed)
         )
     if named not in (None, stated):
         raise BiogripError(
@@ -188,6 +203,15 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
             f"'{named}', allowed is one unit."
         )
     return stated
+
+
+def nearest_unit(name: object, allowed: Collection[str]) -> str:
+    """Return ``" Did you mean 'h'?"`` for ``hours`` and the like, else as `nearest` does."""
+    plain = _plain(str(name)).lower()
+    for unit in allowed:
+        if plain in _SPELLED_OUT.get(unit, ()):
+            return f" Did you mean '{unit}'?"
+    return nearest(name, allowed)
 
 
 def _unit_at_end(column: str, allowed: Mapping[str, float]) -> str | None:
@@ -230,7 +254,7 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
     for number, line in enumerate(stream, 1):
         if "\0" in line:
             raise BiogripError(f"{place(path, number)}: found binary data, allowed is text.")
-        if line.strip(" \r\n") and not line.lstrip(" ").startswith("#"):
+        if line.strip(" \r\n") and not _COMMENT.match(line):
             at.append(number)
             yield line
 
@@ -239,7 +263,7 @@ def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> 
     if header is None:
         raise BiogripError(f"{path}: found no header, allowed is a line with column names.")
     wanted = (columns.time, columns.rotation)
-    separator, names = _header(header, wanted)
+    separator, names = _header(path, at[0], header, wanted)
     time, rotation = (_index(path, at[0], names, column) for column in wanted)
     if time == rotation:
         raise BiogripError(
@@ -249,11 +273,14 @@ def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> 
     return _Layout(separator, len(names), {columns.time: time, columns.rotation: rotation})
 
 
-def _header(line: str, wanted: tuple[str, str]) -> tuple[str, list[str]]:
+def _header(path: Path, at: int, line: str, wanted: tuple[str, str]) -> tuple[str, list[str]]:
     """Separator and names: those under which most wanted columns, then most columns, show up."""
     readings = {}
     for separator in _SEPARATORS:
-        cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        try:
+            cells = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+        except csv.Error as error:
+            raise BiogripError(f"{place(path, at)}: cannot be read as a row: {error}.") from error
         readings[separator] = [cell.strip() for cell in cells]
     plain = {_plain(name) for name in wanted}
 
@@ -269,7 +296,7 @@ def _index(path: Path, line: int, names: list[str], column: str) -> int:
     indices = [i for i, name in enumerate(names) if _plain(name) == _plain(column)]
     if not indices:
         raise BiogripError(
-            f"{place(path, line, column)}: found no such column, allowed are {', '.join(names)}."
+            f"{place(path, line, column)}: found no such column, allowed are {_listed(names)}."
             + nearest(column, names)
         )
     if len(indices) > 1:
@@ -365,6 +392,11 @@ def _number_or_inf(text: str) -> float:
 
 def _shortened(cell: str) -> str:
     return cell if len(cell) <= 40 else cell[:40] + "..."
+
+
+def _listed(names: list[str]) -> str:
+    listed = ", ".join(map(_shortened, names[:_MOST_LISTED]))
+    return listed if len(names) <= _MOST_LISTED else f"{listed} and {len(names)} in all"
 
 
 def _check_count(path: Path, columns: Columns, found: int, without_number: int) -> None:

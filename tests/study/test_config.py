@@ -87,7 +87,7 @@ BAD = {
     "seeds: 2.5": r"seeds: found 2.5, allowed is an integer",
     "seeds: true": r"seeds: found True, allowed is an integer",
     "gripper:\n  left: {stiffness_Nm_per_rad: -4e-7}": r"my.yaml, line 2: "
-    r"gripper.left.stiffness_Nm_per_rad: found -4e-07, allowed is greater than 0 N m/rad",
+    r"gripper.left.stiffness_Nm_per_rad: found -4e-07, allowed is at least 1e-12 and at most 1000",
     "gripper: {arm_length_m: .inf}": r"gripper.arm_length_m: found inf, allowed is a finite number",
     f"cases:\n  a/b: {{{DROP}}}": r"my.yaml, line 2: cases.a/b: not a usable case name",
     f"cases:\n  ../x: {{{DROP}}}": r"my.yaml, line 2: cases.../x: not a usable case name",
@@ -98,10 +98,10 @@ BAD = {
     r"liquid_drop needs k, k_p, c",
     f"cases: {{x: {{{DROP[:-1]}, c_p: 1}}}}}}": r"x.sample.c_p: is no parameter of liquid_drop",
     "cases: {x: {sample: {model: liquid_drop, k: -1, k_p: 1, c: 1}}}": r"x.sample.k: found -1, "
-    r"allowed is greater than 0 N/m",
+    r"allowed is at least 1e-18 N/m",
     "cases: {x: 3}": r"cases.x: found 3, allowed is a block of keys",
     "protocol:\n  phases:\n    - {duration_s: -5, torque_Nm: 1e-9}": r"my.yaml, line 3: "
-    r"protocol.phases\[0\].duration_s: found -5, allowed is greater than 0 s",
+    r"protocol.phases\[0\].duration_s: found -5, allowed is at least 1e-06 and at most 1e\+09 s",
     "protocol: {phases: []}": r"protocol.phases: found a list of 0, allowed are at least 1",
     "protocol: {phases: [{duration_s: 5, torque_Nm: 0}]}": r"phases: no phase has a torque",
     "measurement: {rate_Hz: 1e-6}": r"measurement.rate_Hz: found 1e-06, which gives 1.0004 samples",
@@ -166,7 +166,7 @@ def test_a_block_without_default_must_be_there() -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("seeds: 1\nseeds: 2\n", "line 2: seeds is given twice, first in line 1"),
+        ("seeds: 1\nseeds: 2\n", "line 2: seeds: is given twice, first in line 1"),
         ("seeds: [1\n", "line 2: not valid YAML"),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from biogrip.arrays import Array
+from biogrip.cli import main
 from tests.identify.test_methods import clean
 from tests.workflow.conftest import ROOT
 
@@ -152,10 +153,78 @@ def test_what_is_not_there_is_named_with_what_is(tmp_path: Path) -> None:
     (tmp_path / "trace.csv").write_text("time_s,rotation_rad\n")
     done = identify(tmp_path / "trcae.csv")
     assert done.returncode == 1
-    assert "trcae.csv: there is no such file. Did you mean" in done.stderr
+    assert "trcae.csv', allowed is a file that exists. Did you mean" in done.stderr
     done = identify(EXAMPLE, "--model", "maxwel", "--output", tmp_path / "x.json")
     assert done.returncode == 1
     assert "--model: found 'maxwel'. Did you mean 'maxwell'?" in done.stderr
     done = identify(EXAMPLE, "--rotation", "rotaton_rad", "--output", tmp_path / "x.json")
     assert "Did you mean 'rotation_rad'?" in done.stderr
     assert not (tmp_path / "x.json").exists()
+
+
+@pytest.mark.parametrize(
+    ("path", "found"),
+    [
+        ("", "found the folder '.', allowed is a file."),
+        (".", "found the folder '.', allowed is a file."),
+        ("/", "found the folder '/', allowed is a file."),
+        ("x" * 300, "allowed is a file that exists."),
+        ("x/" * 3000, "allowed is a file that exists."),
+    ],
+)
+def test_a_trace_that_is_no_file_is_refused(
+    capsys: pytest.CaptureFixture[str], path: str, found: str
+) -> None:
+    assert main(["identify", path]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("biogrip: TRACE: found ")
+    assert found in said
+    assert len(said) < 500
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--noise", "-1"), "--noise: found -1.0, allowed is at least 1e-15 and at most 10 rad."),
+        (("--noise", "0"), "--noise: found 0.0, allowed is at least 1e-15 and at most 10 rad."),
+        (("--noise", "nan"), "--noise: found nan, allowed is a finite number."),
+        (("--noise", "1e200"), "--noise: found 1e+200, allowed is at least 1e-15 and at most 10"),
+        (
+            ("--time-unit", "hours"),
+            "--time-unit: found 'hours'. Did you mean 'h'? Allowed: s, ms, min, h.",
+        ),
+        (
+            ("--rotation-unit", "microrad"),
+            "--rotation-unit: found 'microrad'. Did you mean 'urad'? Allowed: rad, mrad, urad",
+        ),
+        (("--time", ""), "--time: found '' of 0 characters, allowed are at least 1."),
+        (("--rotation", "x" * 5000), "of 5000 characters, allowed are at most 4000."),
+    ],
+)
+def test_an_option_that_cannot_be_used_is_named(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    output = tmp_path / "found.json"
+    assert main(["identify", str(EXAMPLE), "--output", str(output), *arguments]) == 1
+    assert said in capsys.readouterr().err
+    assert not output.exists()
+
+
+def test_a_mirrored_trace_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, trace: tuple[Array, Array]
+) -> None:
+    times, values = trace
+    file = written(tmp_path / "mirrored.csv", times, -values)
+    assert main(["identify", str(file)]) == 1
+    assert "column 'rotation_rad': found a rotation that goes against" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["a{b}.csv", "<results>.csv", "{}.csv", "=1+1.csv", "a\nb.csv"])
+def test_a_trace_of_any_name_is_read(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, trace: tuple[Array, Array], name: str
+) -> None:
+    """Without a workflow, no name is a pattern; the trace is refused for what is in it."""
+    times, values = trace
+    file = written(tmp_path / name, times, -values)
+    assert main(["identify", str(file)]) == 1
+    assert "found a rotation that goes against the torque" in capsys.readouterr().err

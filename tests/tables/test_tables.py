@@ -1,4 +1,5 @@
 import csv
+import re
 from pathlib import Path
 
 import pandas as pd
@@ -9,7 +10,8 @@ from biogrip.identify.records import columns
 from biogrip.sample import MODELS
 from biogrip.stages import table
 from biogrip.tables.errors import errors
-from biogrip.tables.layout import Column, Table, write
+from biogrip.tables.layout import Column, Table, inert, write
+from tests.workflow.conftest import ROOT
 
 SETTINGS = {
     "case": "drop",
@@ -83,3 +85,44 @@ def test_unknown_tables_and_files_are_explained(tmp_path: Path) -> None:
     with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
         table.run("errors", SETTINGS, [tmp_path / "other.csv"], tmp_path / "t.csv")
     assert not (tmp_path / "t.csv").exists()
+
+
+HOSTILE = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "=cmd|'/C calc'!A0", "\t=1+1")
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_no_cell_is_a_formula_to_a_spreadsheet(tmp_path: Path, text: str) -> None:
+    write(Table("A table.", (Column("a", "A"),), [(text,)]), tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(newline="") as stream:
+        assert list(csv.reader(stream)) == [["a"], [f"'{text}"]]
+
+
+@pytest.mark.parametrize(
+    "text", ["-0.8", "+2.6", ">100", "<1", "-", "-1e-05", "-12", "-inf", "a-b"]
+)
+def test_numbers_with_a_sign_stay_as_they_are(tmp_path: Path, text: str) -> None:
+    write(Table("A table.", (Column("a", "A"),), [(text,)]), tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text() == f"a\n{text}\n"
+
+
+def test_markup_in_a_cell_is_text_in_every_format(tmp_path: Path) -> None:
+    cells = ("a|b\nc", "<script>x</script>", "50 % & 3_4 $x$ #1 {y} ~^\\")
+    columns = tuple(Column(name, f"{name}|<b>") for name in "abc")
+    write(Table("A table.", columns, [cells, cells]), tmp_path / "t.csv")
+    rows = (tmp_path / "t.md").read_text().splitlines()[2:]
+    assert [len(re.findall(r"(?<!\\)\|", row)) for row in rows] == [4, 4, 4, 4]
+    assert r"a\|b c" in rows[2]
+    page = (tmp_path / "t.html").read_text()
+    assert "<script>" not in page
+    assert "<b>" not in page
+    latex = (tmp_path / "t.tex").read_text()
+    assert r"50 \% \& 3\_4 \$x\$ \#1 \{y\}" in latex
+
+
+def test_the_published_tables_hold_nothing_that_is_escaped() -> None:
+    files = sorted((ROOT / "results" / "published" / "tables").glob("*.csv"))
+    assert len(files) > 10
+    for file in files:
+        with file.open(newline="") as stream:
+            cells = [cell for row in csv.reader(stream) for cell in row]
+        assert [cell for cell in cells if inert(cell) != cell or "|" in cell] == []

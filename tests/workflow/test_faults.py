@@ -21,7 +21,7 @@ BAD = {
     ),
     "negative stiffness": (
         "gripper: {left: {stiffness_Nm_per_rad: -1}}",
-        "gripper.left.stiffness_Nm_per_rad: found -1, allowed is greater than 0 N m/rad",
+        "gripper.left.stiffness_Nm_per_rad: found -1, allowed is at least 1e-12 and at most 1000",
     ),
     "case with a slash": (
         "cases: {a/b: {sample: {model: liquid_drop, k: 1, k_p: 1, c: 1}}}",
@@ -34,7 +34,7 @@ BAD = {
     "zero seeds": ("seeds: 0", "seeds: found 0, allowed is at least 1"),
     "ends before it starts": (
         "protocol: {phases: [{duration_s: -200, torque_Nm: 1e-9}]}",
-        "protocol.phases[0].duration_s: found -200, allowed is greater than 0 s",
+        "protocol.phases[0].duration_s: found -200, allowed is at least 1e-06 and at most 1e+09 s",
     ),
 }
 

@@ -22,7 +22,7 @@ BAD = {
     "unknown key": ("seedz: 3\n", r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'"),
     "program": (
         '__use_yte__: true\nseeds: ?__import__("os").system("touch {folder}/ran")\n',
-        r"my.yaml, line 1: __use_yte__: makes Snakemake run what the file says",
+        r"my.yaml, line 1: __use_yte__ makes Snakemake run code",
     ),
 }
 

@@ -27,7 +27,7 @@ def run(settings: dict[str, Any], output: Path) -> None:
     Raises
     ------
     BiogripError
-        If the arms turn further than the comb drives can.
+        If the rotation is not finite, or the arms turn further than the comb drives can.
     """
     gripper, torque = build.gripper(settings["gripper"]), build.torque(settings)
     model = build.sample_model(settings)
@@ -37,6 +37,15 @@ def run(settings: dict[str, Any], output: Path) -> None:
     simulated = simulated_rotation(
         gripper, network, torque, time_s, nonlinear=settings["nonlinear"]
     )
+    for sample in np.flatnonzero(~np.isfinite(simulated[0]))[:1]:
+        with_values = ", ".join(
+            f"{name} = {settings['parameters'][name]:g}" for name in model.names
+        )
+        raise BiogripError(
+            f"the simulated rotation of {model.title} with {with_values} is {simulated[0, sample]} "
+            f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
+            "it is finite."
+        )
     largest = float(np.max(np.abs(simulated)))
     if largest > settings["stroke_rad"]:
         raise BiogripError(

@@ -1,22 +1,15 @@
 """The study as its config describes it."""
 
-import copy
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from biogrip.errors import BiogripError
 from biogrip.sample import SampleModel
 from biogrip.study import build
-from biogrip.study.source import read_places
+from biogrip.study.source import overlaid, read_config, read_places
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
-
-TEMPLATING = "__use_yte__"
-"""Key that makes Snakemake evaluate expressions in a config file, before we see it."""
 
 
 @dataclass(frozen=True)
@@ -101,26 +94,17 @@ class Study:
         return size
 
 
-def read_configs(files: Sequence[Path]) -> dict[str, Any]:
+def read_configs(files: Iterable[Path]) -> dict[str, Any]:
     """Read config files and lay each over the ones before.
 
     Raises
     ------
     BiogripError
-        If a file cannot be read, is no config, or would be taken for a program.
+        With file and line, if one cannot be used whatever its keys mean.
     """
-    places = read_places(files)
     merged: dict[str, Any] = {}
     for file in files:
-        loaded = yaml.safe_load(file.read_text(encoding="utf-8"))
-        if loaded is not None and not isinstance(loaded, dict):
-            raise BiogripError(f"{file}: found no keys, allowed is a config in YAML.")
-        merged = overlaid(merged, loaded or {})
-    if TEMPLATING in merged:
-        raise BiogripError(
-            f"{places.place((TEMPLATING,))}: {TEMPLATING}: makes Snakemake run what the file says; "
-            "allowed is a config of plain values."
-        )
+        merged = overlaid(merged, read_config(file))
     return merged
 
 
@@ -128,6 +112,8 @@ def load_study(
     config: Mapping[str, Any],
     files: Sequence[str | Path],
     command_line: Iterable[Hashable] = (),
+    *,
+    for_workflow: bool = True,
 ) -> Study:
     """Check and type a merged config.
 
@@ -139,6 +125,8 @@ def load_study(
         The files it came from, to name lines in messages.
     command_line
         Top-level keys that were set on the command line.
+    for_workflow
+        Whether it is to be run by the workflow, which names of files must suit.
 
     Raises
     ------
@@ -147,7 +135,7 @@ def load_study(
     """
     places = read_places(files, command_line)
     complete = _fill_in(with_numbers(config))
-    check(complete, places)
+    check(complete, places, for_workflow=for_workflow)
     cases = {name: _case(name, block) for name, block in complete["cases"].items()}
     points = {name: _case(name, block) for name, block in point_blocks(complete).items()}
     return Study(complete, cases, sweeps_of(complete), points)
@@ -169,16 +157,6 @@ def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
                     case[block] = overlaid(config[block], case.get(block, {}))
         filled[name] = case
     return {**config, "cases": filled}
-
-
-def overlaid(base: Any, over: Any) -> Any:
-    """Lay a config block over another: blocks key by key, everything else whole."""
-    if isinstance(base, dict) and isinstance(over, dict):
-        merged = copy.deepcopy(base)
-        for key, value in over.items():
-            merged[key] = overlaid(merged[key], value) if key in merged else value
-        return merged
-    return over
 
 
 def _case(name: str, block: dict[str, Any]) -> Case:

@@ -2,17 +2,19 @@
 
 from collections.abc import Iterator, Mapping
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.sample import SampleModel
+from biogrip.sample import Parameter, SampleModel
 from biogrip.study import build
 from biogrip.study.batches import smallest_batch
 from biogrip.study.source import KeyPath
+from biogrip.study.trace_file import trace_file_problem
 
 Problem = tuple[KeyPath, str]
 
+_LONGEST_S = 1e9
+_LEAST_PARAMETER = 1e-18
 _MOST_SAMPLES = 10_000_000
 _MOST_PERIODS = 10_000
 _DRIVING = (
@@ -61,6 +63,21 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
         yield ("batch_size",), f"{text}{least} with {config['seeds']} seeds, {methods} methods."
 
 
+def workflow_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
+    """Find names that Snakemake would read as patterns.
+
+    Yields
+    ------
+    tuple
+        The path of the key, and what was found and what is allowed.
+    """
+    for name, case in config["cases"].items():
+        file = case["measurement"].get("file", "")
+        if any(bracket in file for bracket in "{}<>"):
+            text = f"found '{file}', allowed is a name without {{ }} < >: Snakemake fills them in."
+            yield ("cases", name, "measurement", "file"), text
+
+
 def _model(case: Mapping[str, Any]) -> SampleModel:
     return build.sample_model(case["sample"])
 
@@ -75,11 +92,8 @@ def _recording_problems(path: KeyPath, measurement: Mapping[str, Any]) -> Iterat
     for key in ("time", "rotation"):
         if key not in measurement:
             yield (*path, key), f"is missing: a recorded trace needs the name of its {key} column."
-    file = Path(measurement["file"])
-    if not file.is_file():
-        names = [str(other) for other in file.parent.glob("*") if other.is_file()]
-        hint = nearest(str(file), names)
-        yield (*path, "file"), f"found '{file}', allowed is a file that exists.{hint}"
+    if problem := trace_file_problem(measurement["file"]):
+        yield (*path, "file"), problem
 
 
 def _sample_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
@@ -101,11 +115,14 @@ def _sample_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem
         if parameter.name not in sample:
             yield (*path, parameter.name), f"is missing: {model.name} needs {names}."
             continue
-        value = sample[parameter.name]
-        if value < 0 or (value == 0 and not parameter.may_vanish):
-            allowed = "at least" if parameter.may_vanish else "greater than"
-            text = f"found {value}, allowed is {allowed} 0 {parameter.unit}."
-            yield (*path, parameter.name), text
+        yield from _parameter_problems((*path, parameter.name), sample[parameter.name], parameter)
+
+
+def _parameter_problems(path: KeyPath, value: float, parameter: Parameter) -> Iterator[Problem]:
+    if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
+        zero = "0 or " if parameter.may_vanish else ""
+        text = f"found {value}, allowed is {zero}at least {_LEAST_PARAMETER:g} {parameter.unit}."
+        yield path, text
 
 
 def _fixed_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
@@ -115,13 +132,18 @@ def _fixed_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]
             text = f"is no parameter of the sample, which has {', '.join(names)}."
             yield (*path, name), text + nearest(name, names)
     for parameter in _model(case).parameters:
-        if fixed.get(parameter.name) == 0 and not parameter.may_vanish:
-            yield (*path, parameter.name), f"found 0, allowed is greater than 0 {parameter.unit}."
+        if parameter.name in fixed:
+            here = (*path, parameter.name)
+            yield from _parameter_problems(here, fixed[parameter.name], parameter)
     if set(names) <= set(fixed):
         yield path, "leaves nothing to identify; allowed are fewer parameters."
 
 
 def _phase_problems(path: KeyPath, phases: list[Mapping[str, Any]]) -> Iterator[Problem]:
+    whole = sum(phase["duration_s"] for phase in phases)
+    if whole > _LONGEST_S:
+        text = f"found {whole:g} s in all phases together, allowed is at most {_LONGEST_S:g} s."
+        yield path, text
     for index, phase in enumerate(phases):
         here = (*path, index)
         given = [key for key in ("torque_Nm", "voltage_V") if key in phase]
@@ -183,19 +205,10 @@ def _assumed_problems(
     path: KeyPath, assumed: Mapping[str, Any], true: Mapping[str, Any]
 ) -> Iterator[Problem]:
     allowed = [key for key in true if key not in ("jaw_gap_m", "uncertainty")]
-    for key, value in assumed.items():
+    for key in assumed:
         if key not in allowed:
             hint = nearest(key, allowed)
             yield (*path, key), f"unknown key.{hint} Allowed here: {', '.join(allowed)}."
-        elif isinstance(true[key], Mapping) != isinstance(value, Mapping):
-            wanted = "a block of keys" if isinstance(true[key], Mapping) else "a number"
-            yield (*path, key), f"found {value!r}, allowed is {wanted}."
-        elif isinstance(value, Mapping):
-            yield from _assumed_problems((*path, key), value, true[key])
-        elif key == "reference_angle_deg" and not 10 <= value <= 90:
-            yield (*path, key), f"found {value}, allowed is at least 10 and at most 90 deg."
-        elif not isinstance(value, int | float) or isinstance(value, bool) or value <= 0:
-            yield (*path, key), f"found {value!r}, allowed is a number greater than 0."
 
 
 def _genetic_problems(path: KeyPath, settings: Mapping[str, Any]) -> Iterator[Problem]:
@@ -228,6 +241,9 @@ def _range_problems(path: KeyPath, ranges: Mapping[str, Any]) -> Iterator[Proble
                     (*path, name, gene),
                     f"found [{low}, {high}], allowed is [lowest, highest].",
                 )
+        if all(low == high for low, high in genes.values()):
+            text = "leaves one value, and nothing to search for; allowed are more. What is known is"
+            yield (*path, name), f"{text} given under the case's key fixed."
 
 
 def _sampling_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:

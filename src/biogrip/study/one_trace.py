@@ -23,10 +23,23 @@ from biogrip.study.case_problem import CaseProblem, case_problem
 from biogrip.study.config import load_study, read_configs
 from biogrip.study.defaults import default_config
 from biogrip.study.plan import Plan
+from biogrip.study.trace_file import trace_file_problem
+from biogrip.study.validation import value_problem
 from biogrip.traces import Measurements
 
-# Tells our files from others, which are not replaced.
+_OPTIONS = {
+    "time": "--time",
+    "rotation": "--rotation",
+    "time_unit": "--time-unit",
+    "rotation_unit": "--rotation-unit",
+    "noise_rad": "--noise",
+    "offset": "--offset",
+    "drift": "--drift",
+}
+"""By key of the ``measurement`` block, what gives it on the command line."""
+
 _WRITTEN_BY = "written_by_biogrip"
+"""Tells our files from others, which are not replaced."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +139,18 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     return data
 
 
+def check_trace_file(trace: Path) -> None:
+    """Refuse a path that leads to no file.
+
+    Raises
+    ------
+    BiogripError
+        With the file beside it that has the nearest name.
+    """
+    if problem := trace_file_problem(trace):
+        raise BiogripError(f"TRACE: {problem}")
+
+
 def in_words(found: dict[str, Any]) -> str:
     """Return what `identify_trace` found as text to read."""
     width = max(len(item["quantity"]) for item in found["quantities"])
@@ -149,11 +174,10 @@ def in_words(found: dict[str, Any]) -> str:
 
 
 def _plan(wanted: Wanted) -> Plan:
-    if not wanted.trace.is_file():
-        beside = [str(file) for file in wanted.trace.parent.glob("*") if file.is_file()]
-        raise BiogripError(
-            f"{wanted.trace}: there is no such file.{nearest(str(wanted.trace), beside)}"
-        )
+    check_trace_file(wanted.trace)
+    for key, value in wanted.measurement.items():
+        if problem := value_problem(("measurement", key), value):
+            raise BiogripError(f"{_OPTIONS[key]}: {problem}")
     if wanted.model not in MODELS:
         hint = nearest(wanted.model, MODELS)
         raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {', '.join(MODELS)}.")
@@ -163,7 +187,8 @@ def _plan(wanted: Wanted) -> Plan:
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.measurement, "file": str(wanted.trace)}
     merged["cases"] = {case: {"sample": {"model": wanted.model}, "measurement": measurement}}
-    return Plan(load_study(merged, files, command_line=["cases"]), Path("results"))
+    study = load_study(merged, files, command_line=["cases"], for_workflow=False)
+    return Plan(study, Path("results"))
 
 
 def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Any) -> dict[str, Any]:

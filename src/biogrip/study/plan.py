@@ -10,7 +10,8 @@ from typing import Any
 from biogrip.identify.methods import METHODS
 from biogrip.study import build
 from biogrip.study.batches import Batch, existing_batches, plan_batches, seeds_a_batch
-from biogrip.study.config import Case, Study, overlaid
+from biogrip.study.config import Case, Study
+from biogrip.study.source import overlaid
 
 _OVERVIEWED = 3
 

@@ -7,7 +7,7 @@ from typing import Any
 import pandas as pd
 import yaml
 
-from biogrip.study.validation import OVERRIDABLE, schema
+from biogrip.study.validation import OVERRIDABLE, bound, schema
 
 _BOUNDS = {
     "exclusiveMinimum": "> {}",
@@ -80,7 +80,6 @@ def _row(path: str, leaf: Mapping[str, Any], default: str) -> tuple[str, ...]:
 def _allowed(leaf: Mapping[str, Any]) -> str:
     if "enum" in leaf:
         return ", ".join(f"`{value}`" for value in leaf["enum"])
-    bounds = ", ".join(text.format(leaf[key]) for key, text in _BOUNDS.items() if key in leaf)
     if leaf["type"] == "array":
         low, high = leaf.get("minItems"), leaf.get("maxItems")
         most = " or more" if high is None else "" if low == high else f" to {high}"
@@ -89,7 +88,7 @@ def _allowed(leaf: Mapping[str, Any]) -> str:
         if "enum" in inner:
             return f"list of {', '.join(f'`{value}`' for value in inner['enum'])}"
         return f"list of {count}{_kinds(inner['type'])} {_allowed_bounds(inner)}".strip()
-    return f"{_kinds(leaf['type'])} {bounds}".strip()
+    return f"{_kinds(leaf['type'])} {_allowed_bounds(leaf)}".strip()
 
 
 def _kinds(type_: str | list[str]) -> str:
@@ -99,7 +98,8 @@ def _kinds(type_: str | list[str]) -> str:
 
 
 def _allowed_bounds(leaf: Mapping[str, Any]) -> str:
-    return ", ".join(text.format(leaf[key]) for key, text in _BOUNDS.items() if key in leaf)
+    limits = {key: bound(leaf[key]) for key in _BOUNDS if key in leaf}
+    return ", ".join(_BOUNDS[key].format(limit) for key, limit in limits.items())
 
 
 def _shown(value: Any) -> str:

@@ -1,14 +1,20 @@
-"""Where in which file a config key stands."""
+"""What a config file holds, and where in which file a key stands."""
 
+import copy
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from biogrip.errors import BiogripError
+from biogrip.study.yaml_text import compose, no_yaml, scalar_problem, shown_path
 
 KeyPath = tuple[Hashable, ...]
+
+_RUNS_CODE: KeyPath = ("__use_yte__",)
+_LONGEST_NAME = 80
 
 
 @dataclass(frozen=True)
@@ -54,53 +60,92 @@ def read_places(files: Sequence[str | Path], command_line: Iterable[Hashable] = 
     Raises
     ------
     BiogripError
-        If a file is missing, is not YAML, or gives a key twice.
+        With file and line, if a file cannot be used whatever its keys mean: see `read_config`.
     """
-    lines = tuple((_relative(Path(file)), _lines(Path(file))) for file in files)
+    lines = tuple((shown_path(Path(file)), _read(Path(file))[0]) for file in files)
     return ConfigFiles(lines, frozenset(command_line))
 
 
-def _relative(file: Path) -> str:
-    """Name a file as the user would: relative to where they are, if it is below."""
-    here = Path.cwd()
-    return str(file.relative_to(here) if file.is_relative_to(here) else file)
+def read_config(file: Path) -> dict[str, Any]:
+    """Read the keys of one YAML file.
+
+    Raises
+    ------
+    BiogripError
+        With file and line, if it is missing, is no YAML of keys within the bounds of `compose`,
+        gives a key twice, or has values that YAML 1.1 reads otherwise than people do.
+    """
+    return _read(file)[1]
 
 
-def _lines(file: Path) -> dict[KeyPath, int]:
-    try:
-        root = yaml.compose(file.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise BiogripError(f"{_relative(file)}: cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise BiogripError(f"{_relative(file)}: is not UTF-8 text.") from error
-    except yaml.MarkedYAMLError as error:
-        line = error.problem_mark.line + 1 if error.problem_mark else 1
-        raise BiogripError(
-            f"{_relative(file)}, line {line}: not valid YAML: {error.problem}."
-        ) from error
+def overlaid(base: Any, over: Any) -> Any:
+    """Lay a config block over another: blocks key by key, everything else whole."""
+    if isinstance(base, dict) and isinstance(over, dict):
+        merged = copy.deepcopy(base)
+        for key, value in over.items():
+            merged[key] = overlaid(merged[key], value) if key in merged else value
+        return merged
+    return over
+
+
+def _read(file: Path) -> tuple[dict[KeyPath, int], dict[str, Any]]:
+    """Return the line of every key, and what the keys hold."""
+    root = compose(file)
     lines: dict[KeyPath, int] = {}
-    if root is not None:
-        try:
-            _walk(file, root, (), lines)
-        except RecursionError as error:
-            raise BiogripError(f"{_relative(file)}: an alias contains itself.") from error
-    return lines
+    if root is None:
+        return lines, {}
+    if not isinstance(root, yaml.MappingNode):
+        raise BiogripError(f"{shown_path(file)}, line 1: found no keys, allowed is a config.")
+    _walk(file, root, (), lines)
+    if _RUNS_CODE in lines:
+        raise BiogripError(
+            f"{shown_path(file)}, line {lines[_RUNS_CODE]}: {_RUNS_CODE[0]} makes Snakemake run "
+            "code that stands in the file; allowed is a config without it."
+        )
+    try:
+        return lines, yaml.SafeLoader("").construct_document(root)
+    except yaml.MarkedYAMLError as error:
+        raise no_yaml(file, error) from error
 
 
 def _walk(file: Path, node: yaml.Node, path: KeyPath, lines: dict[KeyPath, int]) -> None:
     if isinstance(node, yaml.MappingNode):
         for key, value in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                raise _wrong(file, key, path, "has a block or list as a key, allowed is text.")
             inner = (*path, key.value)
             if inner in lines:
-                name = ".".join(map(str, inner))
-                line = key.start_mark.line + 1
-                first = f"first in line {lines[inner]}"
-                raise BiogripError(
-                    f"{_relative(file)}, line {line}: {name} is given twice, {first}."
-                )
+                raise _wrong(file, key, inner, f"is given twice, first in line {lines[inner]}.")
+            _refuse_misread(file, key, inner)
             lines[inner] = key.start_mark.line + 1
             _walk(file, value, inner, lines)
     elif isinstance(node, yaml.SequenceNode):
         for index, value in enumerate(node.value):
             lines[(*path, index)] = value.start_mark.line + 1
             _walk(file, value, (*path, index), lines)
+    elif isinstance(node, yaml.ScalarNode):
+        _refuse_misread(file, node, path)
+
+
+def _refuse_misread(file: Path, node: yaml.ScalarNode, path: KeyPath) -> None:
+    if problem := scalar_problem(node):
+        raise _wrong(file, node, path, problem)
+
+
+def _wrong(file: Path, node: yaml.Node, path: KeyPath, text: str) -> BiogripError:
+    line = node.start_mark.line + 1
+    return BiogripError(f"{shown_path(file)}, line {line}: {dotted(path)}: {text}")
+
+
+def dotted(path: KeyPath) -> str:
+    """Return a key as messages name it, e.g. ``protocol.phases[0].duration_s``."""
+    text = ""
+    for part in path:
+        if isinstance(part, int):
+            text += f"[{part}]"
+        else:
+            name = str(part)
+            name = name if name.isprintable() else repr(name)
+            name = name if len(name) <= _LONGEST_NAME else f"{name[:_LONGEST_NAME]}..."
+            text += f".{name}" if text else name
+    return text or "the file"

@@ -11,6 +11,8 @@ from biogrip.study.meaning import Problem
 from biogrip.study.source import KeyPath
 
 _AXES = ("rows", "columns")
+_MOST_POINTS = 2000
+_LONGEST_NAME = 200
 
 
 @dataclass(frozen=True)
@@ -143,6 +145,12 @@ def sweep_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
         for name, block in config.get("sweeps", {}).items()
         for problem in _block_problems(("sweeps", name), block, config)
     ]
+    points = sum(
+        len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
+        for sweep in sweeps_of(config).values()
+    )
+    if not problems and points > _MOST_POINTS:
+        problems = [(("sweeps",), f"found {points} points, allowed are {_MOST_POINTS} together.")]
     yield from problems
     if not problems:
         yield from _name_problems(config)
@@ -280,3 +288,7 @@ def _name_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
             text = f"has the point {point.name} twice; allowed is every combination once."
             yield ("sweeps", sweep.name), text
         seen.add(point.name)
+        if len(point.name) > _LONGEST_NAME:
+            text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
+            yield ("sweeps", sweep.name), f"{text}allowed are {_LONGEST_NAME} (it names files)."
+            return

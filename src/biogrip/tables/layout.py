@@ -1,6 +1,7 @@
 """How a table looks: the same numbers as CSV to compute with and as text to read."""
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -11,6 +12,9 @@ import pandas as pd
 from biogrip.files import write_text
 
 Cell = str | float | int | None
+
+_FORMULA = re.compile(r"[=+@\t\r-]")
+_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 
 
 @dataclass(frozen=True)
@@ -50,7 +54,7 @@ class Table:
 def write(table: Table, output: Path) -> None:
     """Write a table as CSV with six significant digits, and beside it .md, .tex and .html."""
     names = [column.name for column in table.columns]
-    raw = pd.DataFrame([[_text(cell, 6) for cell in row] for row in table.rows], columns=names)
+    raw = pd.DataFrame([[inert(_text(c, 6)) for c in row] for row in table.rows], columns=names)
     shown = pd.DataFrame(
         [
             [_text(cell, column.digits) for cell, column in zip(row, table.columns, strict=True)]
@@ -58,7 +62,8 @@ def write(table: Table, output: Path) -> None:
         ],
         columns=[column.heading for column in table.columns],
     )
-    markdown = shown.to_markdown(index=False, disable_numparse=True)
+    barless = shown.map(_without_bars).rename(columns=_without_bars)
+    markdown = barless.to_markdown(index=False, disable_numparse=True)
     latex = shown.to_latex(
         index=False,
         escape=True,
@@ -81,6 +86,16 @@ def _text(cell: Cell, digits: int) -> str:
         shown = float(f"{cell:.6g}")
         return f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
     return str(cell)
+
+
+def inert(text: str) -> str:
+    """Return text that a spreadsheet takes for no formula, numbers with a sign as they are."""
+    return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
+
+
+def _without_bars(text: str) -> str:
+    """Return text that neither ends a cell of a Markdown table nor its row."""
+    return text.replace("|", r"\|").replace("\n", " ")
 
 
 def _page(caption: str, shown: pd.DataFrame) -> str:

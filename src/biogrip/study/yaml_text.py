@@ -1,0 +1,178 @@
+"""YAML of a config, refused where it would stall its reader or mean something else than it seems.
+
+A few lines of YAML can stand for billions of values, by aliases of aliases, or for a nesting that
+no reader survives. Both are counted on the stream of parsing events, before anything is expanded.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+
+from biogrip.errors import BiogripError
+
+LARGEST_BYTES = 1_000_000
+DEEPEST = 50
+MOST_VALUES = 100_000
+"""Keys, values and blocks of a file, those of an alias counted wherever it is used."""
+
+LONGEST_TEXT = 5000
+LONGEST_NUMBER = 100
+"""Characters of a number; Python refuses to read 4300 digits."""
+
+# libyaml is ten times faster, but not part of every PyYAML.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+_NO_TEXT = re.compile("[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+_TAG = "tag:yaml.org,2002:"
+_OCTAL = re.compile(r"[-+]?0[0-7_]+")
+_SHOWN = 40
+
+
+@dataclass
+class _Open:
+    """A block or list whose end the events have not reached.
+
+    Parameters
+    ----------
+    anchor
+        Its anchor, if it has one.
+    before
+        How many values stood before it.
+    levels
+        Levels of nesting in it, itself included.
+    """
+
+    anchor: str | None
+    before: int
+    levels: int = 1
+
+
+def shown_path(file: Path) -> str:
+    """Name a file as the user would: relative to where they are, if it is below."""
+    here = Path.cwd()
+    return str(file.relative_to(here) if file.is_relative_to(here) else file)
+
+
+def compose(file: Path) -> yaml.Node | None:
+    """Read the one document of a file as nodes, in which no alias is expanded.
+
+    Returns
+    -------
+    yaml.Node or None
+        Its root, none if it is empty.
+
+    Raises
+    ------
+    BiogripError
+        With file and line, if it cannot be read, is no text in UTF-8 or no YAML, has more bytes,
+        levels, values or longer text than allowed, or has tags.
+    """
+    text = _text(file)
+    try:
+        _check_size(file, text)
+        root: yaml.Node | None = yaml.compose(text, Loader=_Loader)
+    except yaml.MarkedYAMLError as error:
+        raise no_yaml(file, error) from error
+    return root
+
+
+def no_yaml(file: Path, error: yaml.MarkedYAMLError) -> BiogripError:
+    """Return an error that says where a file is not YAML."""
+    mark = error.problem_mark or error.context_mark
+    said = error.problem or error.context
+    return BiogripError(_at(file, mark.line if mark else 0, f"not valid YAML: {said}."))
+
+
+def scalar_problem(node: yaml.ScalarNode) -> str | None:
+    """Say what is wrong with a value that YAML 1.1 reads otherwise than people do, if it is one."""
+    kind, text = node.tag.removeprefix(_TAG), node.value
+    reading = None
+    if kind in ("int", "float"):
+        if len(text) > LONGEST_NUMBER:
+            return f"found a number of {len(text)} characters, allowed are {LONGEST_NUMBER}."
+        if ":" in text:
+            reading = "in base 60; allowed is a number without colons"
+        elif kind == "int" and _OCTAL.fullmatch(text):
+            reading = "in base 8; allowed is a number that does not begin with 0"
+    elif kind == "timestamp":
+        reading = "as a date; allowed is a number"
+    elif kind == "value":
+        reading = "as a default; allowed is a value"
+    return reading and f"found {text[:_SHOWN]}, which YAML reads {reading}, or text in quotes."
+
+
+def _text(file: Path) -> str:
+    try:
+        with file.open("rb") as stream:
+            content = stream.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise BiogripError(f"{shown_path(file)}: cannot be read: {error.strerror}.") from error
+    if len(content) > LARGEST_BYTES:
+        raise BiogripError(
+            f"{shown_path(file)}: found more than {LARGEST_BYTES} bytes, allowed are "
+            f"{LARGEST_BYTES}."
+        )
+    try:
+        text = content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        found = f"found the byte 0x{content[error.start]:02x}, allowed is text in UTF-8."
+        line = content.count(b"\n", 0, error.start)
+        raise BiogripError(_at(file, line, found)) from error
+    # A byte order mark is allowed at the start, and only there.
+    if odd := _NO_TEXT.search(text) or re.compile("\ufeff").search(text, 1):
+        found = f"found the character U+{ord(odd[0]):04X}, allowed is text."
+        raise BiogripError(_at(file, text.count("\n", 0, odd.start()), found))
+    return text
+
+
+def _check_size(file: Path, text: str) -> None:
+    """Count values and levels, those of an alias by looking up those of what it names."""
+    values = 0
+    open_: list[_Open] = []
+    sizes: dict[str, tuple[int, int]] = {}
+    for event in yaml.parse(text, Loader=_Loader):
+        wrong = None
+        levels = 0
+        if isinstance(event, yaml.CollectionEndEvent):
+            block = open_.pop()
+            levels = block.levels
+            if block.anchor is not None:
+                sizes[block.anchor] = values - block.before, levels
+        elif isinstance(event, yaml.AliasEvent):
+            if any(block.anchor == event.anchor for block in open_):
+                wrong = f"the alias *{event.anchor} contains itself."
+            more, levels = sizes.get(str(event.anchor), (1, 0))
+            values += more
+        elif isinstance(event, yaml.NodeEvent):
+            values += 1
+            wrong = _node_problem(event)
+            if isinstance(event, yaml.CollectionStartEvent):
+                open_.append(_Open(event.anchor, values - 1))
+        if open_:
+            open_[-1].levels = max(open_[-1].levels, 1 + levels)
+        if len(open_) + levels > DEEPEST:
+            wrong = f"found more than {DEEPEST} levels of nesting, allowed are {DEEPEST}."
+        elif values > MOST_VALUES:
+            wrong = (
+                f"found more than {MOST_VALUES} values, those of an alias counted wherever it is "
+                f"used; allowed are {MOST_VALUES}."
+            )
+        if wrong:
+            line = event.start_mark.line if event.start_mark else 0
+            raise BiogripError(_at(file, line, wrong))
+
+
+def _node_problem(event: yaml.NodeEvent) -> str | None:
+    tag = getattr(event, "tag", None)
+    if tag is not None:
+        return f"found the tag {tag.replace(_TAG, '!!')[:_SHOWN]}, allowed are values without tags."
+    if isinstance(event, yaml.ScalarEvent) and len(event.value) > LONGEST_TEXT:
+        return f"found text of {len(event.value)} characters, allowed are {LONGEST_TEXT}."
+    return None
+
+
+def _at(file: Path, line: int, text: str) -> str:
+    """Return a message with its place; lines count from 0 here, and from 1 in print."""
+    return f"{shown_path(file)}, line {line + 1}: {text}"
