@@ -14,6 +14,27 @@ _FEWEST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
+class CalibrationTest:
+    """The test of both arms without sample.
+
+    Parameters
+    ----------
+    step_torque_Nm, impulse_Nms
+        What is done to a free arm, once each.
+    duration_s, rate_Hz
+        Length and sampling rate of each record.
+    noise_level
+        Standard deviation of the noise as a share of each record's peak.
+    """
+
+    step_torque_Nm: float
+    impulse_Nms: float
+    duration_s: float
+    rate_Hz: float
+    noise_level: float
+
+
+@dataclass(frozen=True)
 class FreeMotion:
     """What a free arm does after a torque step and after a torque impulse.
 

@@ -1,7 +1,6 @@
-"""The ``biogrip`` command: one subcommand per stage, as the workflow calls them, and `identify`."""
+"""The ``biogrip`` command."""
 
 import argparse
-import json
 import os
 import signal
 import sys
@@ -17,9 +16,8 @@ from biogrip.files import refuse_inputs, watched
 from biogrip.running.journal import recorded_in
 
 RESULTS = Path("results")
-_OUTPUTS = {"output", "history", "timing", "traces"}
 
-# Imports of stages stay inside their command: a job pays only for what it uses.
+# Imports stay inside their command: a job pays only for what it uses.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,32 +35,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # What the workflow makes is recorded; what a person writes elsewhere is theirs.
         with ExitStack() as stack:
             if options.recorded:
-                _refuse_inputs(options)
                 stack.enter_context(watched(_refuse_others))
                 stack.enter_context(recorded_in(RESULTS))
             options.command(options)
     except BiogripError as error:
         print(f"biogrip: {error}", file=sys.stderr)
         return 1
-    except KeyError as error:
-        print(f"biogrip: --settings: the key {error} is missing.", file=sys.stderr)
-        return 1
     except KeyboardInterrupt:
         print("biogrip: stopped; nothing was written by halves.", file=sys.stderr)
         return 128 + signal.SIGINT
     return options.status
-
-
-def _refuse_inputs(options: argparse.Namespace) -> None:
-    """Refuse to write over what is read."""
-    paths = {
-        name: [value] if isinstance(value, Path) else value
-        for name, value in vars(options).items()
-        if isinstance(value, Path | list)
-    }
-    inputs = [path for name in paths if name not in _OUTPUTS for path in paths[name]]
-    for name in _OUTPUTS & set(paths):
-        refuse_inputs(paths[name], inputs)
 
 
 def _refuse_others(path: Path, scratch: Path) -> None:
@@ -84,104 +66,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="biogrip", description=__doc__)
     parser.set_defaults(recorded=False, status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
-    stages = parser.add_subparsers(required=True, metavar="STAGE")
-
-    target = _stage(stages, "target", _target, "simulate the noise-free response of a case")
-    _outputs(target, "output")
-
-    measurement = _stage(stages, "measurement", _measurement, "add noise to a target")
-    _seeds(measurement)
-    _inputs(measurement, "target")
-    _outputs(measurement, "output")
-
-    text = "write one noisy trace as CSV"
-    export = stages.add_parser("export", help=text, description=text)
-    export.set_defaults(command=_export, recorded=True)
-    export.add_argument("--seed", type=int, required=True, help="which trace")
-    _inputs(export, "measurements")
-    _outputs(export, "output")
-
-    calibration = _stage(
-        stages, "calibration", _calibration, "calibrate a gripper without a sample"
-    )
-    _outputs(calibration, "output", "traces")
-
-    linearisation = _stage(
-        stages, "linearisation", _linearisation, "compare the linear and the nonlinear model"
-    )
-    _outputs(linearisation, "output")
-
-    identification = _stage(
-        stages, "identification", _identification, "identify the sample in noisy traces"
-    )
-    _seeds(identification)
-    _inputs(identification, "measurements")
-    _inputs(identification, "calibrated", many=True)
-    _outputs(identification, "output", "history", "timing")
-
-    recording = _stage(stages, "recording", _recording, "read and check a recorded trace")
-    _inputs(recording, "recorded")
-    _outputs(recording, "output")
-
-    identifiability = _stage(
-        stages, "identifiability", _identifiability, "judge what a trace of a case tells"
-    )
-    _inputs(identifiability, "measurements")
-    _inputs(identifiability, "calibrated", many=True)
-    _outputs(identifiability, "output")
-
-    expected = _stage(stages, "expected", _expected, "judge what a case's traces should tell")
-    _inputs(expected, "target")
-    _inputs(expected, "calibrated", many=True)
-    _outputs(expected, "output")
-
-    coverage = _stage(stages, "coverage", _coverage, "estimates and intervals of many seeds")
-    _seeds(coverage)
-    _inputs(coverage, "target", "expected")
-    _inputs(coverage, "calibrated", many=True)
-    _outputs(coverage, "output")
-
-    selection = _stage(stages, "selection", _selection, "fit every sample model to noisy traces")
-    _seeds(selection)
-    _inputs(selection, "measurements")
-    _inputs(selection, "calibrated", many=True)
-    _outputs(selection, "output")
-
-    collection = _stage(stages, "collection", _collection, "join the batches of a case")
-    _inputs(collection, "batches", "histories", many=True)
-    _outputs(collection, "output", "history")
-
-    robustness = _stage(
-        stages, "robustness", _robustness, "judge the identifications of a sweep over a case"
-    )
-    _inputs(robustness, "identifications", many=True)
-    _outputs(robustness, "output")
-
-    text = "join the batches of a case in a stage whose files are tables"
-    joined = _stage(stages, "joined", _joined, text)
-    _inputs(joined, "batches", many=True)
-    _outputs(joined, "output")
-
-    table = _stage(stages, "table", _table, "write a table as CSV, Markdown, LaTeX and HTML")
-    table.add_argument("name", help="which table")
-    _inputs(table, "inputs", many=True)
-    _outputs(table, "output")
-
-    figure = _stage(stages, "figure", _figure, "draw a figure as PNG and PDF")
-    figure.add_argument("name", help="which figure")
-    _inputs(figure, "inputs", many=True)
-    _outputs(figure, "output")
-
-    summary = _stage(stages, "summary", _summary, "write what a trace tells on one page")
-    _inputs(summary, "verdicts")
-    _inputs(summary, "figures", many=True)
-    _outputs(summary, "output")
-
-    _identify_parser(stages)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     text = "run a study"
     more = "Config files (*.yaml) are laid over the default study; the rest goes to Snakemake."
-    run = stages.add_parser(
+    run = commands.add_parser(
         "run",
         help=text,
         description=f"{text.capitalize()}. {more}",
@@ -189,29 +78,40 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(command=_run)
 
+    _identify_parser(commands)
+
+    text = "make something of the study that was last run here, as its jobs do"
+    make = commands.add_parser("make", help=text, description=text)
+    make.set_defaults(command=_make, recorded=True)
+    make.add_argument("products", nargs="+", metavar="PRODUCT", help="what, e.g. errors")
+    for name, text in (
+        ("case", "of which case"),
+        ("method", "by which method"),
+        ("batch", "of which seeds, e.g. seeds_0-24"),
+        ("sweep", "of which sweep"),
+        ("seed", "of which seed"),
+    ):
+        make.add_argument(f"--{name}", help=text)
+
     for name, command, text in (
         ("verify", _verify, "read all results and hold them against their record"),
         ("clean", _clean, "remove the results of a study, and nothing else"),
     ):
-        parser_of = stages.add_parser(name, help=text, description=text)
+        parser_of = commands.add_parser(name, help=text, description=text)
         parser_of.set_defaults(command=command)
         parser_of.add_argument(
             "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
         )
 
-    publish = stages.add_parser("publish", help="renew published tables and figures")
+    publish = commands.add_parser("publish", help="renew published tables and figures")
     publish.set_defaults(command=_publish)
     publish.add_argument("results", type=Path, help="results of a finished study")
     publish.add_argument("published", type=Path, help="folder to publish in")
 
-    compare = stages.add_parser("compare", help="compare regenerated tables with published ones")
+    compare = commands.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
     compare.add_argument("published", type=Path, help="folder of published tables")
     compare.add_argument("now", type=Path, help="folder of regenerated tables")
-
-    reference = stages.add_parser("reference", help="print the description of every config key")
-    reference.set_defaults(command=_reference)
-    reference.add_argument("config", type=Path, help="YAML file that gives the defaults")
     return parser
 
 
@@ -241,178 +141,12 @@ def _identify_parser(stages: Any) -> None:
     )
 
 
-def _stage(stages: Any, name: str, command: Any, text: str) -> argparse.ArgumentParser:
-    parser: argparse.ArgumentParser = stages.add_parser(name, help=text, description=text)
-    parser.set_defaults(command=command, recorded=True)
-    parser.add_argument(
-        "--settings",
-        type=_settings,
-        required=True,
-        help="the config keys it uses, as JSON",
-    )
-    return parser
+def _make(options: argparse.Namespace) -> None:
+    from biogrip.running.make import make
 
-
-def _settings(text: str) -> dict[str, Any]:
-    settings = json.loads(text)
-    if not isinstance(settings, dict):
-        raise ValueError(text)
-    return settings
-
-
-def _seeds(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seeds", required=True, help="batch of seeds, e.g. seeds_0-24")
-
-
-def _inputs(parser: argparse.ArgumentParser, *names: str, many: bool = False) -> None:
-    for name in names:
-        if many:
-            parser.add_argument(f"--{name}", type=Path, nargs="*", default=[], help="input files")
-        else:
-            parser.add_argument(f"--{name}", type=Path, required=True, help="input file")
-
-
-def _outputs(parser: argparse.ArgumentParser, *names: str) -> None:
-    for name in names:
-        parser.add_argument(f"--{name}", type=Path, required=True, help="output file")
-
-
-def _batch(name: str) -> list[int]:
-    from biogrip.study.batches import parse_batch
-
-    batch = parse_batch(name)
-    if batch is None or batch.last < batch.first:
-        raise BiogripError(f"--seeds: found '{name}', allowed is seeds_FIRST-LAST.")
-    return batch.seeds
-
-
-def _target(options: argparse.Namespace) -> None:
-    from biogrip.stages import target
-
-    target.run(options.settings, options.output)
-
-
-def _measurement(options: argparse.Namespace) -> None:
-    from biogrip.stages import measurement
-
-    measurement.run(options.settings, _batch(options.seeds), options.target, options.output)
-
-
-def _export(options: argparse.Namespace) -> None:
-    from biogrip.stages import export
-
-    export.run(options.seed, options.measurements, options.output)
-
-
-def _calibration(options: argparse.Namespace) -> None:
-    from biogrip.stages import calibration
-
-    calibration.run(options.settings, options.output, options.traces)
-
-
-def _linearisation(options: argparse.Namespace) -> None:
-    from biogrip.stages import linearisation
-
-    linearisation.run(options.settings, options.output)
-
-
-def _identification(options: argparse.Namespace) -> None:
-    from biogrip.stages import identification
-
-    identification.run(
-        options.settings,
-        _batch(options.seeds),
-        options.measurements,
-        options.output,
-        options.history,
-        options.timing,
-        *options.calibrated,
-    )
-
-
-def _recording(options: argparse.Namespace) -> None:
-    from biogrip.stages import recording
-
-    recording.run(options.settings, options.recorded, options.output)
-
-
-def _identifiability(options: argparse.Namespace) -> None:
-    from biogrip.stages import identifiability
-
-    identifiability.run(options.settings, options.measurements, options.output, *options.calibrated)
-
-
-def _expected(options: argparse.Namespace) -> None:
-    from biogrip.stages import identifiability
-
-    identifiability.expected(options.settings, options.target, options.output, *options.calibrated)
-
-
-def _coverage(options: argparse.Namespace) -> None:
-    from biogrip.stages import coverage
-
-    coverage.run(
-        options.settings,
-        _batch(options.seeds),
-        options.target,
-        options.expected,
-        options.output,
-        *options.calibrated,
-    )
-
-
-def _selection(options: argparse.Namespace) -> None:
-    from biogrip.stages import selection
-
-    selection.run(
-        options.settings,
-        _batch(options.seeds),
-        options.measurements,
-        options.output,
-        *options.calibrated,
-    )
-
-
-def _collection(options: argparse.Namespace) -> None:
-    from biogrip.stages import collection
-
-    collection.run(
-        options.settings,
-        options.batches,
-        options.histories,
-        options.output,
-        options.history,
-    )
-
-
-def _robustness(options: argparse.Namespace) -> None:
-    from biogrip.stages import robustness
-
-    robustness.run(options.settings, options.identifications, options.output)
-
-
-def _joined(options: argparse.Namespace) -> None:
-    from biogrip.stages import joined
-
-    joined.run(options.settings, options.batches, options.output)
-
-
-def _table(options: argparse.Namespace) -> None:
-    from biogrip.stages import table
-
-    table.run(options.name, options.settings, options.inputs, options.output)
-
-
-def _figure(options: argparse.Namespace) -> None:
-    from biogrip.stages import figure
-
-    figure.run(options.name, options.settings, options.inputs, options.output)
-
-
-def _summary(options: argparse.Namespace) -> None:
-    from biogrip import summary
-
-    summary.run(options.settings, options.verdicts, options.figures, options.output)
+    names = ("case", "method", "batch", "sweep", "seed")
+    given = {name: getattr(options, name) for name in names}
+    make(options.products, {name: text for name, text in given.items() if text}, RESULTS)
 
 
 def _identify(options: argparse.Namespace) -> None:
@@ -468,12 +202,6 @@ def _publish(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
-    from biogrip.tables.comparison import compare
+    from biogrip.running.comparison import compare
 
     print(compare(options.published, options.now))
-
-
-def _reference(options: argparse.Namespace) -> None:
-    from biogrip.study.reference import reference
-
-    print(reference(options.config))

@@ -14,11 +14,8 @@ RUN_AFRESH = (
 rule check:
     input:
         published=PUBLISHED / "tables",
-        code=source_files("biogrip.tables.comparison"),
     log:
         "results/logs/check.log",
-    conda:
-        "../envs/biogrip.yaml"
     threads: workflow.cores
     params:
         snakefile=workflow.main_snakefile,
@@ -33,8 +30,6 @@ rule check:
 rule publish:
     log:
         "results/logs/publish.log",
-    conda:
-        "../envs/biogrip.yaml"
     threads: workflow.cores
     params:
         snakefile=workflow.main_snakefile,

@@ -1,21 +1,20 @@
 """The study that all rules work on."""
 
-import re
 import shlex
 import sys
 from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
-import biogrip
 from biogrip.errors import BiogripError
-from biogrip.identify.methods import METHODS
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
 from biogrip.running.locks import sign_locks
 from biogrip.running.manifest import Manifest
 from biogrip.running.wholeness import claim, held_against_record
-from biogrip.study.config import load_study
-from biogrip.study.modules import fingerprint, source_files
-from biogrip.study.plan import Plan
+from biogrip.running.resolved import write_study
+from biogrip.running.sheet import files_of, sheets_of
+from biogrip.study.load import load_study
 from biogrip.study.source import read_places
 
 DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
@@ -51,6 +50,7 @@ if workflow.exec_mode == ExecMode.DEFAULT:
         RESULTS,
         asked=lambda: ALL_FILES,
         may_make=lambda file: any(rule.is_producer(file) for rule in workflow.rules),
+        begin=lambda: write_study(STUDY, RESULTS),
     )
 
 
@@ -78,32 +78,8 @@ onerror:
     )
 
 
-# Matches no case.
-NONE = "(?!)"
-PLAN = Plan(STUDY, Path("results"))
-CASES = list(STUDY.cases)
-COMPARES_MODELS = bool(STUDY.config["model_selection"]["models"])
-# Asked for by themselves, or one that is lost would be missed only when it is needed.
-STAGES_IN_BATCHES = [
-    *("measurements", "identifications", "histories", "timings"),
-    *(["selection"] if COMPARES_MODELS else []),
-    *(["coverage"] if PLAN.covered else []),
-]
-PUBLISHED_CASES = [name for name, case in STUDY.cases.items() if case.published]
-
-
-def calibrations_of(case):
-    """The calibration that a case relies on, if it does."""
-    return [f"results/calibrations/{case}.yaml"] if PLAN.is_calibrated(case) else []
-
-
-def expectation_of(case):
-    """What the traces of a case should tell, where its truth is known."""
-    known = case in PLAN.simulated
-    return [f"results/identifiability/expected/{case}.json"] if known else []
-
-
-wildcard_constraints:
-    case="[A-Za-z][A-Za-z0-9_-]*",
-    batch=r"seeds_\d+-\d+",
-    method="[a-z_]+",
+PLAN = Plan(STUDY, RESULTS)
+SHEETS = sheets_of(products().values(), PLAN)
+ALL_FILES = files_of(SHEETS)
+# The report's captions are looked up by rule: among the parameters, they would make things again.
+config["captions"] = {sheet.name: sheet.caption for sheet in SHEETS}

@@ -2,29 +2,28 @@
 
 import math
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.measurement import Noise, standard_deviation
 from biogrip.response.sensitivity import rotation_and_sensitivity
-from biogrip.sample import with_fixed
-from biogrip.study import build
 
 
 def bounds_percent(
-    settings: Mapping[str, Any], parameters: Mapping[str, float], time_s: Array
+    problem: CaseProblem, noise: Noise, parameters: Mapping[str, float], time_s: Array
 ) -> list[tuple[Quantity, float]]:
     """Bound of everything that is identified of a case, with the noise that it has.
 
     Parameters
     ----------
-    settings
-        ``gripper``, ``protocol`` (and ``actuator``, if that is in volts), ``model``,
-        ``branches``, ``fixed``, ``nonlinear``, ``noise``.
+    problem
+        What the identification assumes.
+    noise
+        What is added to the rotation.
     parameters
         Where the bounds are taken, SI units. What is zero there comes out as
         undetermined, for the trace does not know its logarithm.
@@ -38,19 +37,13 @@ def bounds_percent(
         times the standard deviation of its logarithm; see
         `biogrip.identifiability.fisher`. Without noise there are none: NaN.
     """
-    model = with_fixed(build.sample_model(settings), settings["fixed"])
+    model = problem.searched
     quantities = parameters_and_sum(model)
-    noise = Noise(**settings["noise"])
     if noise.level == 0:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
     rotation, sensitivity = rotation_and_sensitivity(
-        build.gripper(settings["gripper"]),
-        model,
-        build.torque(settings),
-        time_s,
-        values,
-        nonlinear=settings["nonlinear"],
+        problem.gripper, model, problem.torque, time_s, values, nonlinear=problem.nonlinear
     )
     sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):

@@ -65,18 +65,22 @@ METHODS: dict[str, Method] = {
 }
 
 
-def identifier(name: str, blocks: Mapping[str, Any]) -> Identify:
+def method_settings(name: str, blocks: Mapping[str, Any]) -> object:
+    """Build a method's settings from config blocks, at least its own."""
+    return import_module(METHODS[name].module).settings_of(blocks)
+
+
+def identifier(name: str, settings: object) -> Identify:
     """Load a method with its settings.
 
     Parameters
     ----------
     name
         One of `METHODS`.
-    blocks
-        Config blocks, at least its own.
+    settings
+        What `method_settings` gives for it.
     """
     module = import_module(METHODS[name].module)
-    settings = module.settings_of(blocks)
 
     def identify(problem: Problem, rng: np.random.Generator, progress: Progress) -> Identification:
         answer: Identification = module.identify(problem, settings, rng, progress)

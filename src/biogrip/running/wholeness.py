@@ -22,6 +22,7 @@ def held_against_record(
     results: Path,
     asked: Callable[[], Iterable[str]],
     may_make: Callable[[str], bool],
+    begin: Callable[[], None],
 ) -> Callable[..., Any]:
     """Wrap what Snakemake calls once it is to run a study, and before it plans the jobs.
 
@@ -37,6 +38,8 @@ def held_against_record(
         Tells which files a run makes if nothing else is asked for.
     may_make
         Whether a rule of the study makes a file.
+    begin
+        What a run does then, before its jobs are planned.
     """
 
     @functools.wraps(execute)
@@ -47,6 +50,7 @@ def held_against_record(
                 check_results(results, asked(), may_make, changing=not kind.dryrun_exec)
                 if not kind.dryrun_exec:
                     release_dead_locks(Path(".snakemake"))
+                    begin()
             except BiogripError as error:
                 sys.exit(f"biogrip: {error}")
         return execute(*args, **kwargs)

@@ -1,7 +1,7 @@
 """From plain config blocks to the objects of the field."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,9 +11,8 @@ from biogrip.actuator import CombDrive, capacitance_slope
 from biogrip.arrays import Array
 from biogrip.contact import Contact, contact
 from biogrip.gripper import Arm, Gripper
-from biogrip.identify.genetic import GeneticSettings
 from biogrip.identify.genome import GeneRange
-from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, sample_times, torque_history
+from biogrip.protocol import Harmonic, Load, Phase, sample_times
 from biogrip.sample import SampleModel, model_named
 
 
@@ -45,29 +44,15 @@ def sample_model(settings: Mapping[str, Any]) -> SampleModel:
     return model_named(settings["model"], settings.get("branches", 1))
 
 
-def torque(settings: Mapping[str, Any]) -> TorqueHistory:
-    """Build the torque of a ``protocol`` block; with voltages, an ``actuator`` block is needed."""
-    return torque_history(phases(settings))
-
-
-def phases(settings: Mapping[str, Any]) -> tuple[Phase, ...]:
+def phases(protocol: Mapping[str, Any], actuator: Mapping[str, Any]) -> tuple[Phase, ...]:
     """Build the phases of a ``protocol`` block, voltages turned into torques (eq. 9)."""
-    per_square_volt = math.nan
-    if "actuator" in settings:
-        per_square_volt = 0.5 * capacitance_slope(comb_drive(settings["actuator"]))
-    return tuple(_phase(phase, per_square_volt) for phase in settings["protocol"]["phases"])
+    per_square_volt = 0.5 * capacitance_slope(comb_drive(actuator))
+    return tuple(_phase(phase, per_square_volt) for phase in protocol["phases"])
 
 
-def uses_voltage(protocol: Mapping[str, Any]) -> bool:
-    """Whether a ``protocol`` block gives any phase in volts."""
-    return any("voltage_V" in phase for phase in protocol["phases"])
-
-
-def sampling(measurement: Mapping[str, Any], end_s: float) -> Array:
-    """Sampling times in s of a ``measurement`` block."""
-    if "times_s" in measurement:
-        return np.array(measurement["times_s"], dtype=float)
-    return sample_times(end_s, measurement["rate_Hz"])
+def sampling(rate_Hz: float, times_s: Sequence[float], end_s: float) -> Array:
+    """Sampling times in s: those that are given, or at a rate until the end."""
+    return np.array(times_s, dtype=float) if times_s else sample_times(end_s, rate_Hz)
 
 
 def gene_ranges(block: Mapping[str, Any]) -> dict[str, GeneRange]:
@@ -76,11 +61,6 @@ def gene_ranges(block: Mapping[str, Any]) -> dict[str, GeneRange]:
         name: GeneRange(tuple(genes["exponent"]), tuple(genes["digit"]))
         for name, genes in block.items()
     }
-
-
-def genetic_settings(block: Mapping[str, Any]) -> GeneticSettings:
-    """Build the settings of a ``genetic_algorithm`` block."""
-    return GeneticSettings(**block)
 
 
 def _phase(phase: Mapping[str, Any], per_square_volt: float) -> Phase:

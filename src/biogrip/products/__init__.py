@@ -1,0 +1,1 @@
+"""What the study makes: stages, tables, figures and pages, each beside its declaration."""

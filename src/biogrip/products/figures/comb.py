@@ -1,0 +1,120 @@
+"""Figure 7: the comb drive to scale, and its torque against voltage."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Wedge
+
+from biogrip import actuator
+from biogrip.actuator import CombDrive
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
+from biogrip.products.figures.torque import Settings, settings
+from biogrip.protocol import torque_at, torque_history
+
+
+def draw(settings: Settings) -> Figure:
+    """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
+    comb, steps = settings.actuator, torque_history(settings.phases)
+    drawn = figure(PAGE_IN, 2.7)
+    whole, detail, curve = drawn.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
+
+    _fingers(whole, comb, comb.fingers)
+    panel(whole, "a", f"all {comb.fingers} fingers")
+    _scale_bar(whole, comb, 200)
+
+    shown = 3
+    _fingers(detail, comb, shown)
+    panel(detail, "b", "the innermost, enlarged")
+    _dimensions(detail, comb)
+    detail.set_ylim(1e6 * comb.first_radius_m - 9, 1e6 * comb.first_radius_m + 14 * shown + 4)
+
+    torques = np.unique(torque_at(steps, steps.time_s))
+    torques = torques[torques > 0]
+    volts = actuator.voltage(comb, torques)
+    grid = np.linspace(0, 1.25 * volts.max(), 200)
+    curve.plot(grid, 1e9 * actuator.torque(comb, grid), color=BLUE)
+    curve.plot(volts, 1e9 * torques, "o", color=ORANGE, markersize=4)
+    for v, t in zip(volts, torques, strict=True):
+        curve.annotate(
+            f"{v:.3g} V, {1e9 * t:.3g} nN m",
+            (v, 1e9 * t),
+            xytext=(-6, 4) if v > 0.5 * grid[-1] else (6, -6),
+            textcoords="offset points",
+            ha="right" if v > 0.5 * grid[-1] else "left",
+            fontsize=7,
+        )
+    curve.set_xlim(0, grid[-1])
+    curve.set_ylim(0)
+    curve.set_xlabel("voltage (V)")
+    curve.set_ylabel("torque (nN m)")
+    panel(curve, "c", "torque, eq. (9)")
+    return drawn
+
+
+def _fingers(axes: Axes, comb: CombDrive, count: int) -> None:
+    """Draw floating and fixed fingers as they overlap at rest, in micrometres."""
+    half = 0.5 * comb.initial_overlap_deg
+    fingers = []
+    for i in range(count):
+        radius = comb.first_radius_m + i * comb.pitch_m
+        fixed = radius + comb.finger_width_m + comb.finger_gap_m
+        fingers.append((radius, (90 - half, 90 - half + comb.finger_angle_deg), BLUE))
+        fingers.append((fixed, (90 + half - comb.finger_angle_deg, 90 + half), ORANGE))
+    for colour in (BLUE, ORANGE):
+        wedges = [
+            Wedge(
+                (0, 0),
+                1e6 * (r + comb.finger_width_m),
+                *angles,
+                width=1e6 * comb.finger_width_m,
+            )
+            for r, angles, c in fingers
+            if c == colour
+        ]
+        axes.add_collection(PatchCollection(wedges, facecolor=colour, edgecolor="none"))
+    axes.set_aspect("equal", anchor="N")
+    axes.autoscale_view()
+    axes.set_axis_off()
+
+
+def _scale_bar(axes: Axes, comb: CombDrive, length_um: float) -> None:
+    y = 1e6 * comb.first_radius_m - 60
+    axes.plot([-length_um / 2, length_um / 2], [y, y], color=BLACK, linewidth=1.5)
+    axes.annotate(f"{length_um:g} µm", (0, y - 15), ha="center", va="top", fontsize=7)
+    for text, x, colour in (("floating", -90, BLUE), ("fixed", 90, ORANGE)):
+        y_top = 1e6 * comb.outer_radius_m + 25
+        axes.annotate(text, (x, y_top), ha="center", color=colour, fontsize=7)
+
+
+def _dimensions(axes: Axes, comb: CombDrive) -> None:
+    """Mark finger width d, gap g, first radius r_0 and the overlap."""
+    r, d, g = (1e6 * v for v in (comb.first_radius_m, comb.finger_width_m, comb.finger_gap_m))
+    edge = r * math.sin(math.radians(0.5 * comb.initial_overlap_deg))
+    arrow = {"arrowstyle": "<->", "lw": 0.6, "shrinkA": 0, "shrinkB": 0}
+    axes.annotate("", (edge + 2, r), (edge + 2, r + d), arrowprops=arrow)
+    axes.annotate(f"$d$ = {d:g} µm", (edge + 4, r + d / 2), va="center", fontsize=7)
+    axes.annotate("", (-edge - 2, r + d), (-edge - 2, r + d + g), arrowprops=arrow)
+    axes.annotate(
+        f"$g$ = {g:g} µm",
+        (-edge - 4, r + d + g / 2),
+        va="center",
+        ha="right",
+        fontsize=7,
+    )
+    axes.annotate("", (-edge, r - 2.5), (edge, r - 2.5), arrowprops=arrow)
+    text = f"overlap {comb.initial_overlap_deg:g}°, $r_0$ = {r:g} µm"
+    axes.annotate(text, (0, r - 5), ha="center", va="top", fontsize=7)
+
+
+COMB = drawing(
+    draw,
+    name="comb",
+    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest; (c) its "
+    "torque against voltage, eq. (9), with the protocol's operating points.",
+    settings=settings,
+    sheet="input_figures",
+)

@@ -1,0 +1,111 @@
+"""Figure 8: how the best misfit falls from step to step."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from matplotlib.figure import Figure
+
+from biogrip.identify.methods import METHODS
+from biogrip.identify.success import at_noise_floor, lowest_misfit
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import read_history, seeds_in_words
+from biogrip.products.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
+from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
+from biogrip.products.product import the
+from biogrip.study.study import Case, Study
+
+_TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a case's convergence is drawn.
+
+    Parameters
+    ----------
+    title, method
+        The case in print, and whose histories.
+    mutation_start
+        First generation whose children mutate; None for a method without.
+    noise_floor_tolerance
+        By which share a misfit may exceed the noise, to be taken for as good.
+    """
+
+    title: str
+    method: str
+    mutation_start: int | None
+    noise_floor_tolerance: float
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the convergence of a case depends on."""
+    mutates = "genetic_algorithm" in METHODS[study.shown].blocks
+    start = case.mutation_start if mutates else None
+    return Settings(case.title, study.shown, start, study.noise_floor_tolerance)
+
+
+def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
+    """Draw by how much the seeds' misfits exceed their noise, and that of the best.
+
+    Parameters
+    ----------
+    settings
+        How.
+    identifications, histories
+        Of the case, CSV and Parquet.
+    """
+    found = read_identifications(identifications, settings.method)
+    noise = found.set_index("seed")["noise_rms_rad"]
+    noisy = bool((noise > 0).all())
+    unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
+    best = int(lowest_misfit(found)["seed"])
+    history = read_history(histories, settings.method, best)
+    reached = at_noise_floor(found, settings.noise_floor_tolerance)
+    drawn = figure(COLUMN_IN, 2.5)
+    axes = drawn.subplots()
+    for seed, rows in history.groupby("seed"):
+        excess = 100 * (rows["best_misfit_rad"] / unit[seed] - 1)
+        style: dict[str, Any] = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.7}
+        if seed == best:
+            style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+        axes.plot(rows["generation"], excess, **style)
+    axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
+    axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
+    label = "noise in the trace" if noisy else "lowest misfit"
+    axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
+    if settings.mutation_start is not None:
+        axes.axvline(settings.mutation_start, color=TARGET, linestyle=":", linewidth=0.8)
+        axes.annotate(
+            "mutation starts",
+            (settings.mutation_start, 0.62),
+            xycoords=("data", "axes fraction"),
+            xytext=(3, 0),
+            textcoords="offset points",
+            fontsize=7,
+        )
+    axes.set_yscale("symlog", linthresh=1, linscale=0.5)
+    axes.set_ylim(bottom=-0.8)
+    ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.minorticks_off()
+    axes.set_xlim(0, history["generation"].max())
+    axes.set_xlabel(METHODS[settings.method].step)
+    axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
+    share = f": {reached.sum()} of {len(found)} at the noise floor" if noisy else ""
+    axes.set_title(settings.title + share)
+    axes.legend(loc="upper right")
+    return drawn
+
+
+CONVERGENCE = drawing(
+    draw,
+    name="convergence",
+    caption="Figure 8 of the paper: the best misfit of every seed over the RMS of the noise in its "
+    "trace, step by step.",
+    settings=settings,
+    reads={"identifications": the(PATH), "histories": the(HISTORIES)},
+    cases=lambda study: study.cases,
+    sheet="case_figures",
+)

@@ -1,0 +1,93 @@
+"""How a figure declares itself."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from biogrip.products.figures.style import save, styled
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import (
+    EVALUATION,
+    FIGURE_KINDS,
+    Product,
+    Reads,
+    Weight,
+    wildcards_of,
+)
+from biogrip.study.study import Study
+
+
+def drawing(
+    draw: Callable[..., Figure],
+    *,
+    name: str,
+    caption: str,
+    settings: Callable[..., object],
+    reads: Mapping[str, Reads] | None = None,
+    cases: Callable[[Study], Iterable[str]] | None = None,
+    sweeps: bool = False,
+    sheet: str = "figures",
+    when: Callable[[Study], bool] = lambda _: True,
+    weight: Weight = EVALUATION,
+) -> Product:
+    """Declare a figure of the study, or of each of its cases.
+
+    Parameters
+    ----------
+    draw
+        Draws it from its settings and, by keyword, from the files of `reads`.
+    name
+        Its name; of a case's figure, the case follows in the file.
+    caption
+        What the report says of it.
+    settings
+        From the study; for a case's figure, from the study and the case (of a sweep, likewise).
+    reads
+        Files that it is made from.
+    cases
+        Which cases have one; if that is not given there is one for the study.
+    sweeps
+        Whether there is one for each sweep instead.
+    sheet
+        Figures of a sheet are drawn by one job.
+    when
+        Whether a study has it.
+    weight
+        How heavy its job is.
+    """
+    path = f"results/figures/{name}" + ("_{case}" if cases else "_{sweep}" if sweeps else "")
+
+    def jobs(plan: Plan) -> list[Wildcards]:
+        if not when(plan.study):
+            return []
+        if sweeps:
+            return [{"sweep": sweep} for sweep in plan.study.sweeps]
+        return wildcards_of(cases(plan.study)) if cases else [{}]
+
+    def chosen(study: Study, job: Wildcards) -> object:
+        if sweeps:
+            return settings(study, study.sweeps[job["sweep"]])
+        return settings(study, study.case(job["case"])) if cases else settings(study)
+
+    @wraps(draw)
+    def saved(given: object, *, png: Path, pdf: Path, **files: Any) -> None:
+        with styled():
+            save(draw(given, **files), png)
+
+    return Product(
+        name,
+        {kind[1:]: path + kind for kind in FIGURE_KINDS},
+        saved,
+        chosen,
+        jobs,
+        message=f"Drawing {name}" + (" of {case}" if cases else " of {sweep}" if sweeps else ""),
+        reads=reads or {},
+        weight=weight,
+        sheet=sheet,
+        category="Figures",
+        item=name,
+        caption=caption,
+    )

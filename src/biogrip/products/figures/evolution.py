@@ -1,0 +1,94 @@
+"""Figure 10: the best individual's parameters from step to step."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from biogrip.identify.methods import METHODS
+from biogrip.identify.success import lowest_misfit
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import read_history, seeds_in_words
+from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
+from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
+from biogrip.products.product import the
+from biogrip.study.study import Case, Study, Truth
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The sample, and whose histories are drawn."""
+
+    truth: Truth
+    method: str
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the evolution of a case depends on."""
+    return Settings(case.truth, study.shown)
+
+
+def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
+    """Draw every parameter's evolution for the seeds and for the best.
+
+    Parameters
+    ----------
+    settings
+        The sample, and whose histories.
+    identifications, histories
+        Of the case, CSV and Parquet.
+    """
+    truth, step = settings.truth, METHODS[settings.method].step
+    found = read_identifications(identifications, settings.method)
+    best = int(lowest_misfit(found)["seed"])
+    history = read_history(histories, settings.method, best)
+    parameters = truth.model.parameters
+    identified = truth.published.identified
+    drawn = figure(PAGE_IN, 3.9)
+    grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
+    for axes, parameter in zip(grid, parameters, strict=False):
+        for seed, rows in history.groupby("seed"):
+            style = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.6}
+            if seed == best:
+                style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
+            axes.step(rows["generation"], rows[parameter.column], where="post", **style)
+        if truth.parameters.get(parameter.name, 0) > 0:
+            axes.axhline(truth.parameters[parameter.name], color=TARGET, linestyle="--")
+        if parameter.name in identified:
+            axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
+        axes.set_yscale("log")
+        axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
+        axes.set_xlim(0, history["generation"].max())
+    for axes in grid[len(parameters) :]:
+        axes.set_axis_off()
+    columns = len(grid) // 2
+    for axes, below in zip(grid[:columns], grid[columns:], strict=True):
+        lowest = below if below.get_visible() and below.axison else axes
+        lowest.set_xlabel(step)
+        lowest.tick_params(labelbottom=True)
+    lines = [
+        grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
+        grid[0].plot([], [], color=FITTED)[0],
+    ]
+    labels = [seeds_in_words(len(found)), f"seed {best}, lowest misfit"]
+    if truth.parameters:
+        lines.append(grid[0].plot([], [], color=TARGET, linestyle="--")[0])
+        labels.append("target")
+    if identified:
+        lines.append(grid[0].plot([], [], color=PAPER, linestyle=":")[0])
+        labels.append("identified in the paper")
+    drawn.legend(lines, labels, loc="outside upper center", ncols=4)
+    drawn.suptitle(truth.title, x=0.01, ha="left", fontsize=8)
+    return drawn
+
+
+EVOLUTION = drawing(
+    draw,
+    name="evolution",
+    caption="As Figure 10 of the paper: the parameters of the best individual, step by step, for "
+    "every seed.",
+    settings=settings,
+    reads={"identifications": the(PATH), "histories": the(HISTORIES)},
+    cases=lambda study: study.cases,
+    sheet="case_figures",
+)

@@ -1,0 +1,94 @@
+"""Figures 9, 11 and 12: target, noisy measurement, best fit and residual."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import best_fit, scale_of
+from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
+from biogrip.products.files.identifications import PATH
+from biogrip.products.files.traces import MEASUREMENTS
+from biogrip.products.product import of_batches, the
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.study.study import Case, Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A case in print, what its identification assumes, and the method that is shown."""
+
+    title: str
+    problem: CaseProblem
+    method: str
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the best fit of a case depends on."""
+    return Settings(case.title, case.problem, study.shown)
+
+
+def draw(
+    settings: Settings, identifications: Path, measurements: list[Path], calibrated: list[Path]
+) -> Figure:
+    """Draw the best fit of a case.
+
+    Parameters
+    ----------
+    settings
+        The case.
+    identifications, measurements, calibrated
+        Of the case: CSV, Parquet, and YAML if its gripper was calibrated.
+    """
+    problem = settings.problem.calibrated(calibrated)
+    fit = best_fit(problem, settings.method, identifications, measurements)
+    factor, unit = scale_of(fit.fitted_rad, "rad")
+    drawn = figure(COLUMN_IN, 3.4)
+    traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
+    style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
+    traces.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **style)
+    traces.plot([], [], ".", color=MEASURED, markersize=4, label="noisy measurement")
+    if fit.target_rad is not None:
+        traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    step = METHODS[settings.method].step
+    label = f"best fit (seed {fit.seed}, {step} {fit.generations})"
+    traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
+    traces.set_ylabel(f"closing rotation ({unit})")
+    # Room for the legend above the data.
+    low, high = factor * fit.measured_rad.min(), factor * fit.measured_rad.max()
+    traces.set_ylim(low - 0.05 * (high - low), high + 0.38 * (high - low))
+    traces.legend(loc="upper right")
+    traces.set_title(settings.title)
+    residual = factor * (fit.measured_rad - fit.fitted_rad)
+    residuals.plot(fit.time_s, residual, color=MEASURED, **style)
+    if fit.target_rad is not None:
+        residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
+    residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
+    bound = 1.15 * float(np.max(np.abs(residual)))
+    residuals.set_ylim(-bound, bound)
+    residuals.set_ylabel(f"residual ({unit})")
+    residuals.set_xlabel("time (s)")
+    residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
+    drawn.align_ylabels()
+    return drawn
+
+
+FIT = drawing(
+    draw,
+    name="fit",
+    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and the best fit of "
+    "all seeds, and below what the fit leaves of the measurement (points) and of the target (line).",
+    settings=settings,
+    reads={
+        "identifications": the(PATH),
+        "measurements": of_batches(MEASUREMENTS),
+        "calibrated": calibration_of(),
+    },
+    cases=lambda study: study.cases,
+    sheet="case_figures",
+)

@@ -1,0 +1,181 @@
+"""Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Arc, Circle
+
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
+from biogrip.gripper import Gripper
+
+# Section 2: the largest sample the gripper is made for; the model itself needs no size.
+_SAMPLE_M = 120e-6
+
+
+def draw(gripper: Gripper) -> Figure:
+    """Draw linkage, tips and networks."""
+    drawn = figure(PAGE_IN, 2.6)
+    whole, tips, networks = drawn.subplots(1, 3, width_ratios=[1, 1, 1.3])
+    _linkage(whole, gripper)
+    panel(whole, "a", "linkage A-B-C-D, to scale")
+    _tips(tips, gripper)
+    panel(tips, "b", "tips B and C, to scale")
+    _networks(networks)
+    panel(networks, "c", "the sample BC")
+    return drawn
+
+
+def _joints(gripper: Gripper, closing_rad: float = 0.0) -> dict[str, tuple[float, float]]:
+    """Positions in millimetres of the four joints, both arms closed by an angle."""
+    length, angle = (
+        1e3 * gripper.arm_length_m,
+        math.radians(gripper.reference_angle_deg),
+    )
+    base = 0.5e3 * _SAMPLE_M + length * math.cos(angle)
+    tip_x = -base + length * math.cos(angle - closing_rad)
+    tip_y = length * math.sin(angle - closing_rad)
+    return {"A": (-base, 0), "B": (tip_x, tip_y), "C": (-tip_x, tip_y), "D": (base, 0)}
+
+
+def _linkage(axes: Axes, gripper: Gripper) -> None:
+    joints = _joints(gripper)
+    axes.plot(*zip(joints["A"], joints["B"], strict=True), color=BLUE, linewidth=2.5)
+    axes.plot(*zip(joints["D"], joints["C"], strict=True), color=BLUE, linewidth=2.5)
+    axes.plot(*zip(joints["A"], joints["D"], strict=True), color=GREY, linewidth=1)
+    middle = joints["B"][1]
+    axes.add_patch(Circle((0, middle), 0.5e3 * _SAMPLE_M, color=ORANGE))
+    for name, (x, y) in joints.items():
+        axes.plot(x, y, "o", color="white", markeredgecolor=BLACK, markersize=4)
+        side = -1 if x < 0 else 1
+        axes.annotate(name, (x, y), xytext=(8 * side, -2), textcoords="offset points", ha="center")
+    a, d = joints["A"], joints["D"]
+    angle = gripper.reference_angle_deg
+    axes.add_patch(Arc(a, 0.5, 0.5, theta1=0, theta2=angle, linewidth=0.8))
+    axes.add_patch(Arc(d, 0.5, 0.5, theta1=0, theta2=180 - angle, linewidth=0.8))
+    axes.annotate(r"$\hat\theta_2$", (a[0] + 0.27, 0.1), fontsize=8)
+    axes.annotate(r"$\hat\theta_4$", (d[0] + 0.27, 0.1), fontsize=8)
+    label = rf"$l$ = {1e3 * gripper.arm_length_m:g} mm"
+    axes.annotate(
+        label,
+        (0.5 * (a[0] + joints["B"][0]) - 0.08, 0.5 * middle),
+        ha="right",
+        fontsize=7,
+    )
+    axes.annotate(rf"$\hat\theta_2$ = {angle:g}°", (0, -0.18), ha="center", fontsize=7)
+    axes.set_xlim(a[0] - 0.75, d[0] + 0.75)
+    axes.set_ylim(-0.25, middle + 0.2)
+    axes.set_aspect("equal", anchor="N")
+    axes.set_axis_off()
+
+
+def _tips(axes: Axes, gripper: Gripper) -> None:
+    """Tips at the reference (soft lines) and closed by 10 mrad (hard lines), in micrometres."""
+    closing = 0.01
+    for rotation, colour, label in (
+        (0.0, GREY, "reference"),
+        (closing, BLUE, "closed by 10 mrad"),
+    ):
+        joints = {name: (1e3 * x, 1e3 * y) for name, (x, y) in _joints(gripper, rotation).items()}
+        for foot, tip in (("A", "B"), ("D", "C")):
+            axes.plot(*zip(joints[foot], joints[tip], strict=True), color=colour, linewidth=2)
+        axes.plot([], [], color=colour, linewidth=2, label=label)
+        if rotation:
+            moved = joints
+        else:
+            reference = joints
+    (b_x, b_y), (c_x, _) = moved["B"], moved["C"]
+    height = 1e6 * _SAMPLE_M
+    axes.add_patch(Circle((0, reference["B"][1]), height / 2, fill=False, color=GREY))
+    theta = np.linspace(0, 2 * np.pi, 200)
+    axes.fill(
+        c_x * np.cos(theta),
+        b_y + height**2 / 4 / c_x * np.sin(theta),
+        color=ORANGE,
+        alpha=0.6,
+    )
+    for side, name, wrist in ((-1, r"$\phi_2$", b_x), (1, r"$\phi_4$", c_x)):
+        axes.annotate(
+            "",
+            (wrist + side * 5, b_y - 95),
+            (wrist + side * 65, b_y - 80),
+            arrowprops={"arrowstyle": "->", "lw": 1, "color": BLACK},
+        )
+        axes.annotate(name, (wrist + side * 78, b_y - 80), ha="center", va="center")
+    axes.plot([-50, 50], [b_y - 150, b_y - 150], color=BLACK, linewidth=1.5)
+    axes.annotate("100 µm", (0, b_y - 158), ha="center", va="top", fontsize=7)
+    axes.set_xlim(-160, 160)
+    axes.set_ylim(b_y - 185, b_y + 150)
+    axes.set_aspect("equal", anchor="N")
+    axes.set_axis_off()
+    axes.legend(loc="upper center", ncols=1)
+
+
+def _networks(axes: Axes) -> None:
+    """Liquid drop with membrane (1) and generalized Maxwell model (2) of Figure 5."""
+    for top, rows, title in (
+        (4.3, ("kc", "k_p"), "(1) Maxwell liquid drop, membrane"),
+        (1.6, ("kc", "k_p", "c_p"), "(2) generalized Maxwell-Wiechert"),
+    ):
+        heights = [top - 0.75 * i for i in range(len(rows))]
+        axes.annotate(title, (2.5, top + 0.5), ha="center", fontsize=7)
+        for x, name, offset in ((0.2, "B", -0.18), (4.8, "C", 0.18)):
+            axes.plot([x, x], [heights[0], heights[-1]], color=BLACK, linewidth=1)
+            mid = 0.5 * (heights[0] + heights[-1])
+            axes.plot(
+                x,
+                mid,
+                "o",
+                color="white",
+                markeredgecolor=BLACK,
+                markersize=4,
+                zorder=3,
+            )
+            axes.annotate(name, (x + offset, mid), ha="center", va="center")
+        for y, row in zip(heights, rows, strict=True):
+            if row == "kc":
+                _spring(axes, 0.2, 2.5, y, "$k$")
+                _damper(axes, 2.5, 4.8, y, "$c$")
+            elif row == "k_p":
+                _spring(axes, 0.2, 4.8, y, "$k_p$")
+            else:
+                _damper(axes, 0.2, 4.8, y, "$c_p$")
+    axes.set_xlim(-0.2, 5.2)
+    axes.set_ylim(-0.5, 5.2)
+    axes.set_axis_off()
+
+
+def _spring(axes: Axes, x0: float, x1: float, y: float, label: str) -> None:
+    middle = 0.5 * (x0 + x1)
+    x = np.linspace(middle - 0.5, middle + 0.5, 9)
+    zigzag = y + 0.14 * np.array([0, 1, -1, 1, -1, 1, -1, 1, 0])
+    axes.plot([x0, *x, x1], [y, *zigzag, y], color=BLUE, linewidth=1)
+    axes.annotate(label, (middle, y + 0.18), ha="center", va="bottom", fontsize=7)
+
+
+def _damper(axes: Axes, x0: float, x1: float, y: float, label: str) -> None:
+    middle, half, height = 0.5 * (x0 + x1), 0.3, 0.15
+    axes.plot([x0, middle], [y, y], color=SKY, linewidth=1)
+    axes.plot([middle, middle], [y - 0.1, y + 0.1], color=SKY, linewidth=1.5)
+    axes.plot(
+        [middle - half, middle + half, middle + half, middle - half],
+        [y + height, y + height, y - height, y - height],
+        color=SKY,
+        linewidth=1,
+    )
+    axes.plot([middle + half, x1], [y, y], color=SKY, linewidth=1)
+    axes.annotate(label, (middle, y + 0.18), ha="center", va="bottom", fontsize=7)
+
+
+LINKAGE = drawing(
+    draw,
+    name="linkage",
+    caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample of "
+    "120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) the constitutive "
+    "models. Arm length and angle are those of the config; in the default study they are "
+    "reconstructed.",
+    settings=lambda study: study.gripper,
+    sheet="input_figures",
+)

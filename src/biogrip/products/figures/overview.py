@@ -1,0 +1,241 @@
+"""The study in one picture: one fit, and how all identifications scatter about the truth."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.success import at_noise_floor
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import SHOWN_SEEDS, Fit, best_fit, first_seeds, scale_of, seeds_in_words
+from biogrip.products.figures.style import (
+    ALL_SEEDS,
+    FITTED,
+    MEASURED,
+    PAGE_IN,
+    PAPER,
+    TARGET,
+    figure,
+    panel,
+)
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.files.traces import MEASUREMENTS
+from biogrip.products.product import Reads, Weight, of_cases
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.study.study import Study, Truth
+
+_WORST = 1e3
+_TITLE_LETTERS = 19
+
+
+_MOST_CASES = 3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the overview shows.
+
+    Parameters
+    ----------
+    cases
+        A few samples.
+    problem
+        What the identification of the first assumes.
+    method
+        Whose identifications.
+    noise_floor_tolerance
+        By which share a misfit may exceed the noise, to be taken for as good.
+    """
+
+    cases: tuple[Truth, ...]
+    problem: CaseProblem
+    method: str
+    noise_floor_tolerance: float
+
+
+def shown_cases(study: Study) -> list[str]:
+    """Cases that there is room for."""
+    return study.simulated[:_MOST_CASES]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what the overview shows."""
+    cases = [study.cases[name] for name in shown_cases(study)]
+    truths = tuple(case.truth for case in cases)
+    return Settings(truths, cases[0].problem, study.shown, study.noise_floor_tolerance)
+
+
+def draw(
+    settings: Settings,
+    identifications: list[Path],
+    measurements: list[Path],
+    calibrated: list[Path],
+) -> Figure:
+    """Draw the first case's best fit, and identified over target values of a few cases.
+
+    Parameters
+    ----------
+    settings
+        What is shown.
+    identifications
+        Of the cases, CSV, in their order.
+    measurements, calibrated
+        Of the first, Parquet, and YAML if its gripper was calibrated.
+    """
+    cases = settings.cases
+    drawn = figure(PAGE_IN, 3.0)
+    axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
+    problem = settings.problem.calibrated(calibrated)
+    fit = best_fit(problem, settings.method, identifications[0], measurements)
+    _fit(axes[0], cases[0], fit)
+    seeds = 0
+    for index, (case, path) in enumerate(zip(cases, identifications, strict=True)):
+        found = read_identifications(path, settings.method)
+        seeds = len(found)
+        tolerance = settings.noise_floor_tolerance
+        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index)
+    legend: dict[str, Any] = {}
+    for panel_axes in axes[1:]:
+        legend |= {
+            label: handle
+            for handle, label in zip(*panel_axes.get_legend_handles_labels(), strict=True)
+        }
+    drawn.legend(
+        legend.values(),
+        legend.keys(),
+        loc="outside lower right",
+        ncols=4,
+        markerscale=2.5,
+        title=seeds_in_words(seeds) if seeds > SHOWN_SEEDS else None,
+    )
+    return drawn
+
+
+def _fit(axes: Axes, case: Truth, fit: Fit) -> None:
+    factor, unit = scale_of(fit.fitted_rad, "rad")
+    axes.plot(
+        fit.time_s,
+        factor * fit.measured_rad,
+        ".",
+        color=MEASURED,
+        markersize=1.2,
+        rasterized=True,
+    )
+    axes.plot([], [], ".", color=MEASURED, label="noisy measurement", markersize=4)
+    if fit.target_rad is not None:
+        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label="best fit")
+    axes.set_ylim(top=1.55 * factor * fit.measured_rad.max())
+    axes.set_xlim(fit.time_s[0], fit.time_s[-1])
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"closing rotation ({unit})")
+    axes.legend(loc="upper right")
+    panel(axes, "a", case.title)
+
+
+def _scatter(
+    axes: Axes,
+    case: Truth,
+    found: pd.DataFrame,
+    tolerance: float,
+    index: int,
+) -> None:
+    reached = at_noise_floor(found, tolerance)
+    ticks = []
+    for x, (label, columns, target, paper) in enumerate(_quantities(case)):
+        ratio = _clipped(found[columns].sum(axis=1).to_numpy(float) / target)
+        # A fixed sideways scatter, by seed, keeps points apart.
+        place = x + 0.5 * ((found["seed"].to_numpy() * 0.618034) % 1 - 0.5)
+        style: dict[str, Any] = {
+            "linestyle": "",
+            "marker": "o",
+            "markersize": 2,
+            "alpha": 0.6,
+            "markeredgewidth": 0,
+        }
+        axes.plot(
+            place[~reached],
+            ratio[~reached],
+            color=ALL_SEEDS,
+            label="fit above it",
+            **style,
+        )
+        axes.plot(
+            place[reached],
+            ratio[reached],
+            color=FITTED,
+            label="fit at the noise floor",
+            **style,
+        )
+        if paper is not None:
+            axes.plot(
+                [x - 0.4, x + 0.4],
+                2 * [_clipped(np.array([paper / target]))[0]],
+                color=PAPER,
+                label="paper",
+            )
+        ticks.append(label)
+    axes.axhline(1, color=TARGET, linewidth=0.8, label="truth")
+    axes.set_yscale("log")
+    axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
+    axes.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3])
+    if index:
+        axes.set_yticklabels([])
+    else:
+        axes.set_ylabel("identified / target")
+    axes.set_xticks(range(len(ticks)), ticks)
+    panel(axes, "bcd"[index], case.title, most_letters=_TITLE_LETTERS)
+
+
+def _quantities(
+    case: Truth,
+) -> list[tuple[str, list[str], float, float | None]]:
+    """Label, columns, target and the paper's value of each parameter, and of c + c_p."""
+    identified = case.published.identified
+    found = []
+    for group in case.model.quantities:
+        target = sum(case.parameters[parameter.name] for parameter in group)
+        known = all(parameter.name in identified for parameter in group)
+        paper = sum(identified[parameter.name] for parameter in group) if known else None
+        label = "+".join(parameter.symbol for parameter in group)
+        if target > 0:
+            found.append((label, [p.column for p in group], target, paper))
+    return found
+
+
+def _clipped(ratio: Array) -> Array:
+    """Put what is off the axis on its edge."""
+    clipped: Array = np.clip(ratio, 1 / _WORST, _WORST)
+    return clipped
+
+
+def _first(study: Study) -> str:
+    return shown_cases(study)[0]
+
+
+OVERVIEW = drawing(
+    draw,
+    name="overview",
+    caption="(a) Target, noisy measurement and best fit of the first case. (b to d) Identified over "
+    "target value of every seed of the first three cases, for each parameter and for c + c_p; "
+    "values off the axis are drawn at its edge.",
+    settings=settings,
+    reads={
+        "identifications": of_cases(PATH, shown_cases),
+        "measurements": Reads(
+            lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))
+        ),
+        "calibrated": Reads(
+            lambda plan, _: calibration_of().files(plan, {"case": _first(plan.study)})
+        ),
+    },
+    when=lambda study: bool(study.simulated),
+    sheet="",
+    weight=Weight(10, 2000),
+)

@@ -1,0 +1,128 @@
+"""What the figures of results read: a case's best seed, its trace and its fit."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.success import lowest_misfit
+from biogrip.products.batches import parse_batch
+from biogrip.products.files.identifications import read_identifications
+from biogrip.products.files.traces import read_measurements
+from biogrip.response.nuisance import nuisance_basis, within
+from biogrip.response.simulation import simulated_rotation
+
+SHOWN_SEEDS = 100
+"""Figures that draw something for each seed draw no more than so many: the first."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The identification of lowest misfit and what it was made from.
+
+    Parameters
+    ----------
+    seed, generations
+        Which one it is and when it stopped.
+    time_s, measured_rad, fitted_rad : (n_samples,)
+        The traces.
+    target_rad : (n_samples,) or None
+        The trace without noise, unless it was recorded.
+    """
+
+    seed: int
+    generations: int
+    time_s: Array
+    target_rad: Array | None
+    measured_rad: Array
+    fitted_rad: Array
+
+
+def best_fit(
+    problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
+) -> Fit:
+    """Read the seed of lowest misfit and simulate its answer.
+
+    Parameters
+    ----------
+    problem
+        What the identification assumes.
+    method
+        Whose.
+    identifications
+        Identifications of the case, CSV.
+    measurements
+        Its noisy traces, Parquet, named after their batch of seeds.
+    """
+    found = read_identifications(identifications, method)
+    best = lowest_misfit(found)
+    seed = int(best["seed"])
+    recorded = read_measurements(_holding(seed, measurements), [seed])
+    model = problem.model
+    network = model.network(np.array([[float(best[p.column]) for p in model.parameters]]))
+    simulated = simulated_rotation(
+        problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
+    )[0]
+    measured = recorded.rotation_rad[seed]
+    nuisance = nuisance_basis(recorded.time_s, offset=problem.offset, drift=problem.drift)
+    fitted = simulated + within(nuisance, measured - simulated)
+    return Fit(
+        seed,
+        int(best["generations"]),
+        recorded.time_s,
+        recorded.target_rad,
+        measured,
+        fitted,
+    )
+
+
+def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
+    """Return the identifications of the seeds that are drawn one by one."""
+    return found[found["seed"] < SHOWN_SEEDS]
+
+
+def seeds_in_words(count: int) -> str:
+    """Say how many of a number of seeds are drawn one by one."""
+    return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
+def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
+    """Read the histories, by one method, of the seeds that are drawn and of the best.
+
+    Raises
+    ------
+    BiogripError
+        If the file cannot be read.
+    """
+    try:
+        by_method = ("method", "==", method)
+        return pd.read_parquet(
+            path,
+            filters=[
+                [by_method, ("seed", "<", SHOWN_SEEDS)],
+                [by_method, ("seed", "==", best)],
+            ],
+        )
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
+
+
+def scale_of(values: Array, unit: str) -> tuple[float, str]:
+    """Return factor and unit that put values between 1 and 1000, e.g. ``(1e6, "µrad")``."""
+    largest = float(np.max(np.abs(values)))
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
+        if largest * factor >= 1:
+            return factor, prefix + unit
+    return 1e9, f"n{unit}"
+
+
+def _holding(seed: int, measurements: list[Path]) -> Path:
+    for path in measurements:
+        batch = parse_batch(path.stem)
+        if batch and batch.first <= seed <= batch.last:
+            return path
+    raise BiogripError(f"no measurement file holds seed {seed}.")

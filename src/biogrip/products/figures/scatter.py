@@ -1,0 +1,175 @@
+"""Errors over seeds as distributions, beside the Cramer-Rao bound and the paper's value."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from biogrip.arrays import Array
+from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
+from biogrip.products.figures.style import (
+    METHOD_STYLES,
+    PAGE_IN,
+    PAPER,
+    SHADE,
+    TARGET,
+    figure,
+    panel,
+)
+from biogrip.identifiability.fisher import bound
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS
+from biogrip.measurement import Noise, standard_deviation
+from biogrip.products.figures.declared import drawing
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.files.traces import TARGETS, read_target
+from biogrip.products.product import the
+from biogrip.study.study import Case, Study, Truth
+
+# Beyond this bound (of a logarithm) an axis covers decades, not percents.
+_LOOSE = 0.25
+_WIDTHS = 8.0
+_DECADES = 1e4
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The sample, what its identification assumes, and the noise that it meets."""
+
+    truth: Truth
+    problem: CaseProblem
+    noise: Noise
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the scatter of a case depends on."""
+    return Settings(case.truth, case.problem, case.noise)
+
+
+def draw(settings: Settings, identifications: Path, target: Path) -> Figure:
+    """Draw identified over target for every quantity and method.
+
+    Parameters
+    ----------
+    settings
+        The sample.
+    identifications, target
+        Of the case, CSV.
+    """
+    found = read_identifications(identifications)
+    truth, posed = settings.truth, settings.problem
+    time_s, _, rotation = read_target(target)
+    log_truth = posed.logs(truth.parameters)
+    _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
+    noise_rad = standard_deviation(rotation, settings.noise)
+    quantities = parameters_and_sum(posed.searched)
+    drawn = figure(PAGE_IN, 3.1)
+    grid = drawn.subplots(1, len(quantities), squeeze=False)[0]
+    for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
+        names = [posed.searched.parameters[i] for i in quantity.members]
+        value = sum(truth.parameters[p.name] for p in names)
+        if value == 0:
+            axes.axis("off")
+            continue
+        ratios = found[[p.column for p in names]].sum(axis=1) / value
+        limit = bound(sensitivity, noise_rad, log_truth, quantity)
+        _quantity(axes, found["method"], ratios.to_numpy(float), limit)
+        _paper(axes, truth.published.identified, [p.name for p in names], value)
+        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, limit), 60)
+        if index == 0:
+            axes.set_ylabel("identified / target")
+    _legend(drawn, truth, list(found["method"].unique()), found["seed"].nunique())
+    return drawn
+
+
+def _quantity(axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float) -> None:
+    """One column of points a method; what lies beyond the axis stands on its edge."""
+    loose = limit > _LOOSE
+    top = _DECADES if loose else 1 + _WIDTHS * limit
+    bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
+    names = list(methods.unique())
+    for place, name in enumerate(names):
+        mine = ratios[(methods == name).to_numpy()]
+        shown = mine[:SHOWN_SEEDS]
+        # A fixed sideways scatter keeps points apart.
+        x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
+        style = METHOD_STYLES[name]
+        inside = (shown > bottom) & (shown < top)
+        dots: dict[str, Any] = {
+            "color": style["color"],
+            "linestyle": "",
+            "markeredgewidth": 0,
+            "alpha": 0.55,
+        }
+        axes.plot(x[inside], shown[inside], marker="o", markersize=2, **dots)
+        for outside, marker, edge in ((shown >= top, "^", top), (shown <= bottom, "v", bottom)):
+            height = np.full(int(outside.sum()), edge)
+            (line,) = axes.plot(
+                x[outside], height, marker=marker, markersize=3, clip_on=False, **dots
+            )
+            line.set_in_layout(False)
+        low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
+        axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
+        axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
+    if not loose:
+        axes.axhspan(1 - 1.96 * limit, 1 + 1.96 * limit, color=SHADE, zorder=0, linewidth=0)
+    axes.axhline(1, color=TARGET, linewidth=0.6)
+    if loose:
+        axes.set_yscale("log")
+        axes.set_yticks([1e-4, 1e-2, 1, 1e2, 1e4])
+        axes.minorticks_off()
+    else:
+        axes.yaxis.set_major_locator(MaxNLocator(5))
+    axes.set_ylim(bottom, top)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_xticks([])
+
+
+def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target: float) -> None:
+    if all(name in identified for name in names):
+        low, high = axes.get_ylim()
+        value = float(np.clip(sum(identified[name] for name in names) / target, low, high))
+        axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
+
+
+def _title(quantity: Quantity, limit: float) -> str:
+    known = f"{100 * limit:.2g} %" if limit < 1 else "none"
+    return f"{quantity.symbol}: {known}"
+
+
+def _legend(drawn: Figure, truth: Truth, methods: list[str], seeds: int) -> None:
+    handles: list[Any] = []
+    axes = drawn.axes[0]
+    for name in methods:
+        color = METHOD_STYLES[name]["color"]
+        handles += axes.plot(
+            [], [], "o", color=color, markersize=4, label=METHODS[name].title, markeredgewidth=0
+        )
+    handles.append(
+        axes.fill([], [], color=SHADE, label="95 % by the Cramér-Rao bound, named above")[0]
+    )
+    if truth.published.identified:
+        handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
+    drawn.legend(handles=handles, loc="outside lower left", ncols=3)
+    few = "" if seeds <= SHOWN_SEEDS else f": {seeds_in_words(seeds)}, quartiles of all"
+    drawn.suptitle(truth.title + few, x=0.01, ha="left", fontsize=8)
+
+
+SCATTER = drawing(
+    draw,
+    name="scatter",
+    caption="Identified over target values for every method and seed; shaded: 95 % by the "
+    "Cramér-Rao bound; dashed: the paper. Bars are quartiles, triangles stand for values beyond "
+    "the axis.",
+    settings=settings,
+    reads={"identifications": the(PATH), "target": the(TARGETS)},
+    cases=lambda study: study.simulated,
+    sheet="simulated_figures",
+)

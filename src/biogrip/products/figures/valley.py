@@ -1,0 +1,130 @@
+"""The valley of c against c_p, and the line along which they trade."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.figure import Figure
+
+from biogrip.identify.methods import METHODS
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import first_seeds, seeds_in_words
+from biogrip.products.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
+from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
+from biogrip.products.files.identifications import read_identifications
+from biogrip.products.files.verdicts import PATH as VERDICTS
+from biogrip.products.files.verdicts import read_verdicts
+from biogrip.products.product import JUDGEMENT, the
+from biogrip.study.study import Case, Study
+
+_LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
+# Axes end at this multiple of the sum.
+_SHOWN = 1.15
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a case's valley is drawn.
+
+    Parameters
+    ----------
+    title
+        The case in print.
+    method
+        Whose fits are shown in it.
+    parameters, identified
+        True values, and the paper's, by name; none if they are unknown.
+    """
+
+    title: str
+    method: str
+    parameters: Mapping[str, float]
+    identified: Mapping[str, float]
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the valley of a case depends on."""
+    method = "least_squares" if "least_squares" in study.methods else study.shown
+    return Settings(case.title, method, case.parameters, case.published.identified)
+
+
+def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
+    """Draw the rise of chi-squared over two exchangeable dampers of a case.
+
+    Parameters
+    ----------
+    settings
+        How.
+    measured, identifications
+        Verdicts with a valley, JSON, and identifications, CSV, of the case.
+    """
+    found = read_verdicts(measured)
+    valley = found["valley"]
+    x, y = valley["x"], valley["y"]
+    identified = read_identifications(identifications, settings.method)
+    drawn = figure(COLUMN_IN, 3.1)
+    axes = drawn.subplots()
+    rises = np.maximum(np.array(valley["rises"]), 0.0)
+    colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
+    filled = axes.contourf(
+        valley["x_values"], valley["y_values"], rises, _LEVELS, colors=colours, extend="max"
+    )
+    total = sum(valley["best"])
+    label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
+    axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
+    drawn_seeds = seeds_in_words(len(identified))
+    columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
+    axes.plot(
+        *np.clip(first_seeds(identified)[columns].to_numpy(float), 0, _SHOWN * total).T,
+        "o",
+        color=FITTED,
+        markersize=2.5,
+        markeredgewidth=0,
+        alpha=0.8,
+        clip_on=False,
+        label=f"{METHODS[settings.method].title}, {drawn_seeds}",
+    )
+    for place, color, marker, name in (
+        (settings.parameters, TARGET, "*", "truth"),
+        (settings.identified, PAPER, "D", "paper"),
+    ):
+        if {x["name"], y["name"]} <= set(place):
+            axes.plot(
+                place[x["name"]],
+                place[y["name"]],
+                marker,
+                color=color,
+                markersize=7 if marker == "*" else 4.5,
+                markeredgecolor="white",
+                markeredgewidth=0.6,
+                linestyle="",
+                clip_on=False,
+                zorder=4,
+                label=name,
+            )
+    axes.set_xlim(0, _SHOWN * total)
+    axes.set_ylim(0, _SHOWN * total)
+    axes.set_xlabel(f"{x['symbol']} ({x['unit']})")
+    axes.set_ylabel(f"{y['symbol']} ({y['unit']})")
+    axes.set_title(settings.title)
+    axes.set_aspect("equal")
+    drawn.legend(loc="outside lower center", ncols=2)
+    bar = drawn.colorbar(filled, ax=axes, ticks=_LEVELS)
+    bar.ax.set_yticklabels([f"{level:g}" for level in _LEVELS])
+    bar.set_label("rise of χ²")
+    return drawn
+
+
+VALLEY = drawing(
+    draw,
+    name="valley",
+    caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade, and "
+    "where the fits of all seeds lie in it.",
+    settings=settings,
+    reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
+    cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],
+    sheet="",
+    weight=JUDGEMENT,
+)

@@ -1,0 +1,100 @@
+"""Waterfall: how far above the global optimum each method ends, seed by seed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from biogrip.identify.methods import METHODS
+from biogrip.identify.success import chi_square_rise
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.style import COLUMN_IN, GREY, METHOD_STYLES, TARGET, figure
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.product import the
+from biogrip.study.study import Case, Study
+
+_LOWEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a case's waterfall is drawn.
+
+    Parameters
+    ----------
+    title
+        The case in print.
+    samples
+        Samples in a trace.
+    optimum_tolerance, noise_floor_tolerance
+        What counts as the optimum, and as the noise floor.
+    """
+
+    title: str
+    samples: int
+    optimum_tolerance: float
+    noise_floor_tolerance: float
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the waterfall of a case depends on."""
+    tolerances = study.optimum_tolerance, study.noise_floor_tolerance
+    return Settings(case.title, case.samples, *tolerances)
+
+
+def draw(settings: Settings, identifications: Path) -> Figure:
+    """Draw every method's rises of chi-squared over the lowest known, sorted.
+
+    Parameters
+    ----------
+    settings
+        How.
+    identifications
+        Of the case, CSV.
+    """
+    found = read_identifications(identifications)
+    rise = np.maximum(chi_square_rise(found, settings.samples), _LOWEST)
+    tolerance = settings.optimum_tolerance
+    drawn = figure(COLUMN_IN, 3.0)
+    axes = drawn.subplots()
+    for method in found["method"].unique():
+        mine = np.sort(rise[found["method"] == method])
+        share = 100 * np.mean(mine <= tolerance)
+        place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
+        label = f"{METHODS[method].title}: {share:.0f} %"
+        axes.plot(place, mine, label=label, **METHOD_STYLES[method])
+    axes.axhline(tolerance, color=TARGET, linewidth=0.8, linestyle="--")
+    floor = settings.samples * ((1 + settings.noise_floor_tolerance) ** 2 - 1)
+    axes.axhline(floor, color=GREY, linewidth=0.8, linestyle=":")
+    for height, text in ((tolerance, "global optimum"), (floor, "noise floor")):
+        axes.annotate(
+            text,
+            (99.0, height),
+            xytext=(0, 2),
+            textcoords="offset points",
+            fontsize=6.5,
+            ha="right",
+        )
+    axes.set_yscale("log")
+    axes.set_ylim(_LOWEST / 2, 5 * max(floor, float(rise.max())))
+    ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
+    axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
+    axes.minorticks_off()
+    axes.set_xlim(0, 100)
+    axes.set_xlabel("seeds, sorted (%)")
+    axes.set_ylabel("Δχ² over the lowest known")
+    axes.set_title(f"{settings.title}: share at the global optimum")
+    drawn.legend(loc="outside lower center", ncols=2)
+    return drawn
+
+
+WATERFALL = drawing(
+    draw,
+    name="waterfall",
+    caption="How far above the global optimum each method ends, seed by seed, sorted.",
+    settings=settings,
+    reads={"identifications": the(PATH)},
+    cases=lambda study: study.simulated,
+    sheet="simulated_figures",
+)

@@ -1,0 +1,110 @@
+"""Targets and measurements as files."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.parquet import column_names, read_columns, table_of, write_tables
+from biogrip.products.files.rows import write_rows
+
+TARGETS = "results/targets/{case}.csv"
+MEASUREMENTS = "results/measurements/{case}/{batch}.parquet"
+SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
+
+TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad")
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Noisy traces of one case.
+
+    Parameters
+    ----------
+    time_s : (n_samples,)
+        Sampling instants, ascending.
+    target_rad : (n_samples,) or None
+        The trace without noise; nobody knows it of a recording.
+    rotation_rad
+        The noisy trace of each seed, (n_samples,) each.
+    """
+
+    time_s: Array
+    target_rad: Array | None
+    rotation_rad: dict[int, Array]
+
+
+def write_target(path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array) -> None:
+    """Write a noise-free trace as CSV.
+
+    The rotation is written to nine significant digits: fewer than those in which
+    two processors differ, more than any instrument gives.
+    """
+    samples = zip(time_s, torque_Nm, rotation_rad, strict=True)
+    rows = ((f"{t:.10g}", f"{torque:.10g}", f"{phi:.8e}") for t, torque, phi in samples)
+    write_rows(path, TARGET_COLUMNS, rows)
+
+
+def read_target(path: Path) -> tuple[Array, Array, Array]:
+    """Read time, torque and rotation of a target written by `write_target`.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing, is no target, or holds what is no finite number.
+    """
+    try:
+        with path.open() as stream:
+            header = tuple(stream.readline().strip().split(","))
+            if header != TARGET_COLUMNS:
+                raise BiogripError(
+                    f"{path}, line 1: found the columns {', '.join(header)}; "
+                    f"a target has {', '.join(TARGET_COLUMNS)}."
+                )
+            values = np.loadtxt(stream, delimiter=",", ndmin=2)
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
+    if values.shape[1] != len(TARGET_COLUMNS):
+        raise BiogripError(f"{path}: found {values.shape[1]} columns in the rows, allowed are 3.")
+    for row, column in np.argwhere(~np.isfinite(values))[:1]:
+        raise BiogripError(
+            f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "
+            "allowed is a finite number."
+        )
+    time_s, torque, rotation = values.T
+    return time_s, torque, rotation
+
+
+def write_measurements(path: Path, measurements: Measurements) -> None:
+    """Write noisy traces as Parquet: time_s, target_rad if known, then seed_0, seed_1, ..."""
+    columns = {"time_s": measurements.time_s}
+    if measurements.target_rad is not None:
+        columns["target_rad"] = measurements.target_rad
+    columns |= {f"seed_{seed}": trace for seed, trace in measurements.rotation_rad.items()}
+    table = table_of(columns, len(measurements.time_s))
+    write_tables(path, [table], dictionary=False)
+
+
+def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
+    """Read noisy traces, of all seeds or of some.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing, damaged, or lacks a seed.
+    """
+    present = column_names(path)
+    kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
+    wanted = present if seeds is None else [*kept, *(f"seed_{seed}" for seed in seeds)]
+    columns = read_columns(path, wanted)
+    time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
+    traces = {int(name.removeprefix("seed_")): trace for name, trace in columns.items()}
+    return Measurements(time_s, target, traces)
+
+
+def write_single_trace(path: Path, time_s: Array, rotation_rad: Array) -> None:
+    """Write one noisy trace as CSV, in the form in which recorded traces are read."""
+    samples = zip(time_s, rotation_rad, strict=True)
+    write_rows(path, ("time_s", "rotation_rad"), ((f"{t:.10g}", f"{x:.6e}") for t, x in samples))

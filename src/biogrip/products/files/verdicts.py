@@ -1,0 +1,81 @@
+"""A diagnosis as plain data, for JSON files and whatever reads them."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biogrip.errors import BiogripError
+
+if TYPE_CHECKING:
+    from biogrip.identifiability.diagnosis import Diagnosis
+    from biogrip.identifiability.verdicts import Finding
+
+PATH = "results/identifiability/{case}.json"
+EXPECTED = "results/identifiability/expected/{case}.json"
+
+# Far more than is determined, far fewer than those in which processors differ.
+_DIGITS = 5
+
+
+def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
+    """Return a diagnosis as dictionaries, lists, text and numbers in SI units."""
+    likelihood = diagnosis.likelihood
+    return {
+        "samples": likelihood.problem.residuals.samples,
+        "misfit_rad": rounded(likelihood.misfit_rad),
+        "noise_rad": rounded(likelihood.noise_rad),
+        "threshold": rounded(likelihood.threshold),
+        "quantities": [_finding(finding) for finding in diagnosis.findings],
+        "trades": [
+            {
+                "members": list(trade.members),
+                "words": trade.words(),
+                **_finding(trade.finding),
+            }
+            for trade in diagnosis.trades
+        ],
+        "notes": diagnosis.notes,
+    }
+
+
+def read_verdicts(path: Path) -> dict[str, Any]:
+    """Read a file of verdicts.
+
+    Raises
+    ------
+    BiogripError
+        If it is missing or is not one.
+    """
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as verdicts: {error}.") from error
+    if not {"quantities", "trades", "notes"} <= set(found):
+        raise BiogripError(f"{path}: holds no verdicts.")
+    return found
+
+
+def rounded(value: float | None) -> float | None:
+    """Return a number to five significant digits."""
+    return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def _finding(finding: "Finding") -> dict[str, Any]:
+    profile = finding.profile
+    return {
+        "quantity": finding.quantity.label,
+        "symbol": finding.quantity.symbol,
+        "unit": finding.quantity.unit,
+        "verdict": finding.verdict,
+        "value": rounded(finding.value),
+        "low": rounded(finding.low),
+        "high": rounded(finding.high),
+        "deviation": rounded(finding.deviation),
+        "in_words": finding.words(),
+        "profile": {
+            "values": [rounded(float(value)) for value in np.exp(profile.log_values)],
+            "rises": [rounded(float(rise)) for rise in profile.rises],
+        },
+    }

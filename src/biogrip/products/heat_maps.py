@@ -1,0 +1,133 @@
+"""What the table and the heat maps of a sweep are made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import pandas as pd
+
+from biogrip.errors import BiogripError
+from biogrip.products.product import Reads
+from biogrip.products.stages.sweep_points import POINTS
+from biogrip.study.study import Study
+from biogrip.study.sweeps import Axis, Sweep
+
+_DETERMINED_PERCENT = 100.0
+
+
+@dataclass(frozen=True)
+class ShownAxis:
+    """An axis in print.
+
+    Parameters
+    ----------
+    label
+        Its name, with the unit.
+    values
+        As shown, by what files have.
+    reconstructed
+        Whether the paper does not give its values.
+    """
+
+    label: str
+    values: Mapping[str, str]
+    reconstructed: bool
+
+    @property
+    def title(self) -> str:
+        """Its name, marked where the paper does not give its values."""
+        return f"{self.label}, reconstructed" if self.reconstructed else self.label
+
+
+@dataclass(frozen=True)
+class HeatMaps:
+    """A sweep in print.
+
+    Parameters
+    ----------
+    title
+        Its name.
+    cases
+        Names in print by name.
+    methods
+        Identifiers.
+    rows, columns
+        What changes.
+    """
+
+    title: str
+    cases: Mapping[str, str]
+    methods: tuple[str, ...]
+    rows: ShownAxis
+    columns: ShownAxis
+
+
+def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
+    """Choose what the table and the heat maps of a sweep depend on."""
+    titles = {name: study.cases[name].title for name in sweep.cases}
+    return HeatMaps(
+        sweep.title,
+        titles,
+        tuple(study.methods),
+        _shown(study, sweep.rows),
+        _shown(study, sweep.columns),
+    )
+
+
+def _shown(study: Study, axis: Axis) -> ShownAxis:
+    keys = {key for value in axis.values for key in value.overrides}
+    return ShownAxis(
+        axis.label,
+        {value.text: value.shown for value in axis.values},
+        any(study.is_reconstructed(key) for key in keys),
+    )
+
+
+def points_of_cases() -> Reads:
+    """Read the judged points of every case that the job's sweep is laid over."""
+    return Reads(
+        lambda plan, job: [
+            POINTS.path.format(sweep=job["sweep"], case=case)
+            for case in plan.study.sweeps[job["sweep"]].cases
+        ]
+    )
+
+
+def read_points(paths: list[Path], case: str) -> pd.DataFrame:
+    """Read the judged points of a case.
+
+    Raises
+    ------
+    BiogripError
+        If there are none among the files, or they are damaged.
+    """
+    for path in paths:
+        if path.stem == case:
+            return POINTS.read(path)
+    raise BiogripError(f"{case}: no file of its points is given.")
+
+
+def headlines(points: pd.DataFrame) -> list[str]:
+    """Return the best and the worst determined quantity of a case.
+
+    Only those count whose bound is below 100 % at half of the points or more. A sum
+    stands for its parts: that they trade against each other, far from where they
+    are, no bound of first order shows.
+    """
+    bounds = points.groupby("quantity")["bound_percent"].median().sort_values(kind="stable")
+    parts = {part for label in bounds.index if " + " in label for part in label.split(" + ")}
+    determined = [
+        label
+        for label, percent in bounds.items()
+        if percent < _DETERMINED_PERCENT and label not in parts
+    ]
+    return determined[:1] + determined[1:][-1:]
+
+
+CAPTION = (
+    "How well every case is identified from point to point of the sweep. First the share of seeds "
+    "whose misfit reaches the noise in their trace; then, for the best and for the worst determined "
+    "quantity, the median absolute error, beside the standard deviation that noise leaves at least "
+    "(the Cramer-Rao bound, to first order). The gripper's values are reconstructed: the paper's are "
+    "not available to us."
+)

@@ -1,0 +1,79 @@
+"""Stage 0: the gripper's arms from a test without sample, for identifications that rely on it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.calibrated_gripper import CALIBRATIONS, calibration_yaml
+from biogrip.calibration import CalibrationTest, FreeMotion, calibrate, free_motion
+from biogrip.files import write_text
+from biogrip.gripper import Gripper
+from biogrip.measurement import Noise, add_noise
+from biogrip.parquet import table_of, write_tables
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Weight
+from biogrip.protocol import sample_times
+from biogrip.random_streams import stream
+from biogrip.study.study import Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a calibration is made of: the true gripper, and the test."""
+
+    study_seed: int
+    case: str
+    gripper: Gripper
+    test: CalibrationTest
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what a case's calibration depends on."""
+    case = study.case(job["case"])
+    return Settings(study.study_seed, case.name, case.gripper, case.calibration)
+
+
+def run(settings: Settings, gripper: Path, records: Path) -> None:
+    """Record both arms' free motion with noise, and identify them from it.
+
+    Parameters
+    ----------
+    settings
+        The gripper and the test.
+    gripper
+        The calibrated gripper, YAML.
+    records
+        The records, Parquet.
+    """
+    test = settings.test
+    time_s = sample_times(test.duration_s, test.rate_Hz)
+    noise = Noise("gaussian", test.noise_level, "peak")
+    causes = test.step_torque_Nm, test.impulse_Nms
+    columns, found = {"time_s": time_s}, {}
+    for name in ("left", "right"):
+        motion = free_motion(getattr(settings.gripper, name), time_s, *causes)
+        rng = stream(settings.study_seed, settings.case, 0, f"calibration {name}")
+        record = FreeMotion(
+            time_s,
+            add_noise(motion.step_rad, noise, rng),
+            add_noise(motion.impulse_rad, noise, rng),
+        )
+        columns |= {f"{name}_step_rad": record.step_rad, f"{name}_impulse_rad": record.impulse_rad}
+        found[name] = calibrate(record, *causes)
+    write_tables(records, [table_of(columns, len(time_s))], dictionary=False)
+    write_text(gripper, calibration_yaml(found["left"], found["right"]))
+
+
+def _jobs(plan: Plan) -> list[Wildcards]:
+    cases = [*plan.study.cases.values(), *plan.study.points.values()]
+    return [{"case": case.name} for case in cases if case.is_calibrated]
+
+
+CALIBRATION = Product(
+    "calibration",
+    {"gripper": CALIBRATIONS, "records": CALIBRATIONS.replace(".yaml", ".parquet")},
+    run,
+    settings,
+    _jobs,
+    message="Calibrating the gripper of {case} without a sample",
+    weight=Weight(30, 1000),
+)

@@ -1,0 +1,116 @@
+"""Stage 3: the sample's parameters from each noisy trace."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS, identifier
+from biogrip.measurement import rms
+from biogrip.products.files.identifications import (
+    BATCHES,
+    HISTORY_BATCHES,
+    TIMINGS,
+    Record,
+    write_histories,
+    write_identifications,
+    write_timings,
+)
+from biogrip.products.files.traces import MEASUREMENTS, read_measurements
+from biogrip.products.plan import Wildcards
+from biogrip.products.product import Product, Weight, the
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.progress import Progress
+from biogrip.random_streams import stream
+from biogrip.study.study import Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a case is identified.
+
+    Parameters
+    ----------
+    study_seed, case
+        Whose random streams.
+    problem
+        What the identification assumes.
+    method, of_method
+        The identifier and its settings.
+    """
+
+    study_seed: int
+    case: str
+    problem: CaseProblem
+    method: str
+    of_method: object
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what the identification of a case by a method depends on."""
+    case, method = study.case(job["case"]), job["method"]
+    return Settings(study.study_seed, case.name, case.problem, method, case.method(method))
+
+
+def identify(
+    settings: Settings,
+    seeds: Sequence[int],
+    measurements: Path,
+    calibrated: list[Path],
+    parameters: Path,
+    history: Path,
+    timing: Path,
+) -> None:
+    """Identify a batch of seeds with one method.
+
+    Parameters
+    ----------
+    settings
+        How.
+    seeds
+        The batch.
+    measurements
+        Noisy traces, Parquet.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
+    parameters, history
+        Identified parameters, CSV, and the way to them, Parquet.
+    timing
+        Processor times, CSV.
+    """
+    case, method = settings.case, settings.method
+    posed = settings.problem.calibrated(calibrated)
+    identified = identifier(method, settings.of_method)
+    recorded = read_measurements(measurements, list(seeds))
+    progress = Progress(f"{case}, {method}", len(seeds))
+    records = []
+    for seed in seeds:
+        trace = recorded.rotation_rad[seed]
+        start = time.process_time()
+        rng = stream(settings.study_seed, case, seed, method)
+        answer = identified(posed.of(recorded.time_s, trace), rng, progress.within)
+        cpu_s = time.process_time() - start
+        noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
+        records.append(
+            Record(
+                case, method, seed, posed.model, posed.searched, posed.fixed, answer, noise, cpu_s
+            )
+        )
+        progress.done()
+    write_identifications(parameters, records)
+    write_histories(history, records)
+    write_timings(timing, records)
+
+
+IDENTIFICATION = Product(
+    "identification",
+    {"parameters": BATCHES, "history": HISTORY_BATCHES, "timing": TIMINGS.batch_path},
+    identify,
+    settings,
+    lambda plan: plan.method_jobs([*plan.study.cases, *plan.study.points]),
+    message="Identifying {case} by {method}, {batch}",
+    reads={"measurements": the(MEASUREMENTS), "calibrated": calibration_of()},
+    weight=Weight(120, 1000, group="batch"),
+    modules=lambda job: (METHODS[job["method"]].module,),
+)

@@ -1,0 +1,100 @@
+"""Stage 4: the batches of a case put together, a row per method and seed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from biogrip.errors import BiogripError
+from biogrip.files import written_whole
+from biogrip.identify.case_problem import Sample
+from biogrip.products.files.identifications import (
+    BATCHES,
+    HISTORIES,
+    HISTORY_BATCHES,
+    PATH,
+    columns,
+)
+from biogrip.products.files.rows import read_rows, write_rows
+from biogrip.products.plan import Wildcards
+from biogrip.products.product import Product, Weight, of_batches, wildcards_of
+from biogrip.study.study import Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What belongs together.
+
+    Parameters
+    ----------
+    seeds, methods
+        How many seeds there are, and the methods in their order; batches may hold
+        more seeds, left from a larger study.
+    sample
+        Decides what the columns are.
+    """
+
+    seeds: int
+    methods: tuple[str, ...]
+    sample: Sample
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what belongs to a case."""
+    case = study.case(job["case"])
+    return Settings(case.seeds, tuple(study.methods), case.sample)
+
+
+def join(
+    settings: Settings,
+    batches: list[Path],
+    history_batches: list[Path],
+    parameters: Path,
+    history: Path,
+) -> None:
+    """Join batches in the order of their methods and seeds.
+
+    Parameters
+    ----------
+    settings
+        What belongs together.
+    batches, history_batches
+        Files of the identification stage, in the order of methods and seeds.
+    parameters, history
+        The same for the whole case.
+
+    Raises
+    ------
+    BiogripError
+        If a seed is missing or comes twice.
+    """
+    header = columns(settings.sample.model)
+    rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
+    rows = [row for row in rows if int(row[2]) < settings.seeds]
+    seeds = range(settings.seeds)
+    if [(row[1], int(row[2])) for row in rows] != [(m, s) for m in settings.methods for s in seeds]:
+        names = ", ".join(str(batch) for batch in batches)
+        raise BiogripError(
+            f"{names}: do not hold each of the seeds 0 to {seeds[-1]} once for each of "
+            f"{', '.join(settings.methods)}. Delete them and run again."
+        )
+    write_rows(parameters, header, rows)
+    with written_whole(history) as scratch:
+        schema = pq.read_schema(history_batches[0])
+        with pq.ParquetWriter(scratch, schema) as joined:
+            for batch in history_batches:
+                table = pq.read_table(batch)
+                joined.write_table(table.filter(pc.less(table["seed"], settings.seeds)))
+
+
+IDENTIFICATIONS = Product(
+    "identifications",
+    {"parameters": PATH, "history": HISTORIES},
+    join,
+    settings,
+    lambda plan: wildcards_of([*plan.study.cases, *plan.study.points]),
+    message="Putting together the identifications of {case}",
+    reads={"batches": of_batches(BATCHES), "history_batches": of_batches(HISTORY_BATCHES)},
+    weight=Weight(10, 2000, group="case"),
+)

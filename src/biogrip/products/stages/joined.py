@@ -1,0 +1,67 @@
+"""Stage 4: the rows of a case's batches in one file, for what needs no sorting out."""
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from biogrip.products.files.identifications import TIMINGS
+from biogrip.products.files.rows import RowFile, read_rows, write_rows
+from biogrip.products.plan import Plan
+from biogrip.products.product import Product, of_batches, wildcards_of
+from biogrip.products.stages.intervals import INTERVALS
+from biogrip.products.stages.model_fits import MODEL_FITS
+from biogrip.study.study import Case
+
+
+def join(seeds: int, batches: list[Path], rows: Path) -> None:
+    """Join CSV files that have the same columns.
+
+    Parameters
+    ----------
+    seeds
+        How many there are; batches may hold more, left from a larger study.
+    batches
+        The files, in the order of their seeds.
+    rows
+        The rows of these seeds under one header.
+
+    Raises
+    ------
+    BiogripError
+        If a file cannot be read, or has other columns than the first.
+    """
+    header = read_rows(batches[0])[0]
+    found = (row for batch in batches for row in read_rows(batch, header)[1:])
+    seed = header.index("seed")
+    write_rows(rows, header, (row for row in found if int(row[seed]) < seeds))
+
+
+def joined(
+    name: str,
+    kind: RowFile,
+    cases: Callable[[Plan], Iterable[str]],
+    seeds: Callable[[Case], int],
+) -> Product:
+    """Declare the joining of a stage's batches."""
+    return Product(
+        name,
+        {"rows": kind.path},
+        join,
+        lambda study, job: seeds(study.case(job["case"])),
+        lambda plan: wildcards_of(cases(plan)),
+        message=f"Putting together the {name.replace('_', ' ')} of {{case}}",
+        reads={"batches": of_batches(kind.batch_path)},
+    )
+
+
+JOINED = (
+    joined("all_times", TIMINGS, lambda plan: plan.study.cases, lambda case: case.seeds),
+    joined(
+        "all_intervals", INTERVALS, lambda plan: plan.study.covered, lambda case: case.coverage_seeds
+    ),
+    joined(
+        "all_model_fits",
+        MODEL_FITS,
+        lambda plan: plan.study.cases if plan.study.models else (),
+        lambda case: case.seeds,
+    ),
+)

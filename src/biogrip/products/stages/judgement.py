@@ -1,0 +1,190 @@
+"""Stage 4: what one trace of a case tells about its sample, and what it does not."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.files import write_text
+from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identifiability.valley import valley_data
+from biogrip.identify.answer import silent
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.multi_start import fitted_from
+from biogrip.measurement import Noise, rms, standard_deviation
+from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
+from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
+from biogrip.products.plan import Wildcards
+from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.random_streams import stream
+from biogrip.study.study import Case, Study
+
+TRACE = 0
+"""The seed whose trace is judged."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a trace is judged.
+
+    Parameters
+    ----------
+    study_seed, case
+        Whose random streams.
+    problem, least_squares
+        What is identified, and by how many fits.
+    confidence
+        Of the limits.
+    """
+
+    study_seed: int
+    case: str
+    problem: CaseProblem
+    least_squares: object
+    confidence: float
+
+
+@dataclass(frozen=True)
+class ExpectedSettings(Settings):
+    """How a target is judged as if it had noise.
+
+    Parameters
+    ----------
+    parameters
+        True values by name, SI units.
+    noise
+        The noise.
+    """
+
+    parameters: Mapping[str, float]
+    noise: Noise
+
+
+def settings_of(study: Study, case: Case) -> Settings:
+    """Choose what the judgement of a case depends on."""
+    fits = case.method("least_squares")
+    return Settings(study.study_seed, case.name, case.problem, fits, case.confidence)
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what the judgement of a case depends on."""
+    return settings_of(study, study.case(job["case"]))
+
+
+def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
+    """Choose what the judgement of a target depends on."""
+    case = study.case(job["case"])
+    judged = settings_of(study, case)
+    return ExpectedSettings(**vars(judged), parameters=case.parameters, noise=case.noise)
+
+
+def judge(
+    settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path
+) -> None:
+    """Judge the trace of the first seed, identified by least squares.
+
+    Parameters
+    ----------
+    settings
+        How.
+    measurements
+        Noisy traces, Parquet.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
+    verdicts
+        Verdicts, profiles and valley, JSON.
+    """
+    posed = settings.problem.calibrated(calibrated)
+    recorded = read_measurements(measurements, [TRACE])
+    problem = posed.of(recorded.time_s, recorded.rotation_rad[TRACE])
+    identify = identifier("least_squares", settings.least_squares)
+    rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
+    found = identify(problem, rng, silent)
+    told = diagnose(
+        problem,
+        posed.searched,
+        found,
+        confidence=settings.confidence,
+        noise_rad=posed.noise_rad,
+    )
+    data = {
+        "case": settings.case,
+        "model": posed.model.name,
+        "confidence": settings.confidence,
+        **diagnosis_data(told),
+        "valley": valley_data(told.likelihood, posed.searched),
+    }
+    write_text(verdicts, json.dumps(data, indent=1) + "\n")
+
+
+def expect(
+    settings: ExpectedSettings, target: Path, calibrated: list[Path], verdicts: Path
+) -> None:
+    """Judge the trace without noise as if it had the noise of the measurement.
+
+    What such a trace determines, any trace of the case does but for its luck.
+
+    Parameters
+    ----------
+    settings
+        How.
+    target
+        A target, CSV.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
+    verdicts
+        Verdicts and profiles, JSON.
+    """
+    posed = settings.problem.calibrated(calibrated)
+    time_s, _, rotation = read_target(target)
+    noise_rad = rms(standard_deviation(rotation, settings.noise))
+    problem = posed.of(time_s, rotation, noise_rad=noise_rad)
+    found = fitted_from(problem, posed.logs(settings.parameters))
+    told = diagnose(
+        problem, posed.searched, found, confidence=settings.confidence, noise_rad=noise_rad
+    )
+    data = {
+        "case": settings.case,
+        "model": posed.model.name,
+        "confidence": settings.confidence,
+        **diagnosis_data(told),
+    }
+    write_text(verdicts, json.dumps(data, indent=1) + "\n")
+
+
+def verdicts_expected() -> Reads:
+    """Read what the traces of the job's case should tell, where its truth is known."""
+    return Reads(
+        lambda plan, job: [] if plan.study.case(job["case"]).recorded else [EXPECTED.format(**job)]
+    )
+
+
+JUDGED = Product(
+    "judgement",
+    {"verdicts": PATH},
+    judge,
+    settings,
+    lambda plan: wildcards_of(plan.study.cases),
+    message="Judging what the first trace of {case} tells",
+    reads={
+        "measurements": Reads(
+            lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
+        ),
+        "calibrated": calibration_of(),
+    },
+    weight=JUDGEMENT,
+    modules=lambda _: (METHODS["least_squares"].module,),
+)
+
+EXPECTATION = Product(
+    "expectation",
+    {"verdicts": EXPECTED},
+    expect,
+    expected_settings,
+    lambda plan: wildcards_of(plan.study.simulated),
+    message="Judging what traces of {case} should tell",
+    reads={"target": the(TARGETS), "calibrated": calibration_of()},
+    weight=JUDGEMENT,
+)

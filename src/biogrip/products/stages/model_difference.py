@@ -1,0 +1,113 @@
+"""How far the linear model is from the nonlinear one, over angle and torque."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.gripper import Gripper
+from biogrip.products.files.rows import RowFile
+from biogrip.products.product import Product, Weight
+from biogrip.protocol import Phase, TorqueHistory, torque_history
+from biogrip.response.linear import rotation, step_response
+from biogrip.response.nonlinear import FINE, correction
+from biogrip.sample import Network
+from biogrip.study.study import Study, Truth
+
+DIFFERENCES = RowFile(
+    "a comparison",
+    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    "results/linearisation.csv",
+)
+ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
+FACTORS = np.geomspace(0.25, 32.0, 15)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is compared.
+
+    Parameters
+    ----------
+    phases
+        The study's protocol.
+    cases
+        Sample and gripper of each case, by name.
+    """
+
+    phases: tuple[Phase, ...]
+    cases: Mapping[str, tuple[Truth, Gripper]]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what is compared."""
+    cases = {name: study.cases[name] for name in study.simulated}
+    return Settings(
+        study.phases, {name: (case.truth, case.gripper) for name, case in cases.items()}
+    )
+
+
+def compare(settings: Settings, differences: Path) -> None:
+    """Compare the models on a grid; a row per case, angle and multiple of the torque, CSV."""
+    DIFFERENCES.write(differences, _rows(settings))
+
+
+def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
+    torque = torque_history(settings.phases)
+    for name, (truth, gripper) in settings.cases.items():
+        model = truth.model
+        network = model.network(np.array([[truth.parameters[p] for p in model.names]]))
+        for angle in ANGLES_DEG:
+            turned = replace(gripper, reference_angle_deg=float(angle))
+            for factor in FACTORS:
+                share = difference_over_peak(turned, network, scaled(torque, factor))
+                yield name, f"{angle:g}", f"{factor:.4g}", f"{share:.4g}"
+
+
+def difference_over_peak(gripper: Gripper, network: Network, torque: TorqueHistory) -> float:
+    """Largest difference of the models over the protocol, as a share of the nonlinear peak.
+
+    NaN where the torque closes the arms beyond what the model describes.
+    """
+    time_s = _times(torque)
+    found = correction(gripper, network, torque, FINE)
+    if not found.converged[0]:
+        return float("nan")
+    response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+    difference = found.at(time_s)[0]
+    nonlinear = rotation(response, torque, time_s)[0] + difference
+    return float(np.max(np.abs(difference)) / np.max(np.abs(nonlinear)))
+
+
+def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
+    """Return the same protocol with every torque multiplied."""
+    return replace(
+        torque,
+        left=factor * torque.left,
+        right=factor * torque.right,
+        harmonic_left=factor * torque.harmonic_left,
+        harmonic_right=factor * torque.harmonic_right,
+    )
+
+
+def _times(torque: TorqueHistory) -> Array:
+    """Times dense after every jump, and at its far end."""
+    ends = np.append(torque.time_s[1:], torque.end_s)
+    pieces = [
+        start + np.geomspace(min(0.1, (end - start) / 2), end - start, 60)
+        for start, end in zip(torque.time_s, ends, strict=True)
+    ]
+    return np.concatenate(pieces)
+
+
+MODEL_DIFFERENCE = Product(
+    "model_difference",
+    {"differences": DIFFERENCES.path},
+    compare,
+    lambda study, _: settings(study),
+    lambda plan: [{}] if plan.study.simulated else [],
+    message="Comparing the linear and the nonlinear model",
+    weight=Weight(30, 1000),
+)

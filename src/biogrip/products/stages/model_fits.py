@@ -1,0 +1,113 @@
+"""Stage 4: every trace fitted with every sample model, for the choice of the simplest adequate."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.identify.answer import silent
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS, identifier
+from biogrip.products.files.rows import RowFile
+from biogrip.products.files.traces import MEASUREMENTS, Measurements, read_measurements
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Weight, the
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.progress import Progress
+from biogrip.random_streams import stream
+from biogrip.sample import MODELS
+from biogrip.study.study import Study
+
+MODEL_FITS = RowFile(
+    "fits of models",
+    ("case", "model", "seed", "parameters", "samples", "misfit_rad"),
+    "results/selection/{case}.csv",
+    "results/selection/{case}/{batch}.csv",
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the fits of models depend on.
+
+    Parameters
+    ----------
+    study_seed, case
+        Whose random streams.
+    problem, least_squares
+        What is identified, but for the model, and by how many fits.
+    models
+        Names of the models.
+    """
+
+    study_seed: int
+    case: str
+    problem: CaseProblem
+    least_squares: object
+    models: tuple[str, ...]
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what the fits of a case depend on."""
+    case = study.case(job["case"])
+    fits = case.method("least_squares")
+    return Settings(study.study_seed, case.name, case.problem, fits, study.models)
+
+
+def fit(
+    settings: Settings,
+    seeds: Sequence[int],
+    measurements: Path,
+    calibrated: list[Path],
+    fits: Path,
+) -> None:
+    """Fit a batch of seeds by least squares with each model.
+
+    Parameters
+    ----------
+    settings
+        How.
+    seeds
+        The batch.
+    measurements
+        Noisy traces, Parquet.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
+    fits
+        A row per model and seed, CSV.
+    """
+    posed = settings.problem.calibrated(calibrated)
+    recorded = read_measurements(measurements, list(seeds))
+    MODEL_FITS.write(fits, _rows(settings, posed, seeds, recorded))
+
+
+def _rows(
+    settings: Settings, posed: CaseProblem, seeds: Sequence[int], recorded: Measurements
+) -> Iterator[tuple[str | int, ...]]:
+    case, samples = settings.case, len(recorded.time_s)
+    identify = identifier("least_squares", settings.least_squares)
+    progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
+    for name in settings.models:
+        model = MODELS[name]
+        for seed in seeds:
+            problem = posed.of(recorded.time_s, recorded.rotation_rad[seed], model)
+            rng = stream(settings.study_seed, case, seed, f"model {name}")
+            found = identify(problem, rng, silent)
+            yield case, name, seed, len(model.names), samples, f"{found.misfit_rad:.8e}"
+            progress.done()
+
+
+def _jobs(plan: Plan) -> list[Wildcards]:
+    return plan.batch_jobs("selection", plan.study.cases) if plan.study.models else []
+
+
+MODEL_FIT = Product(
+    "model_fits",
+    {"fits": MODEL_FITS.batch_path},
+    fit,
+    settings,
+    _jobs,
+    message="Fitting every sample model to {case}, {batch}",
+    reads={"measurements": the(MEASUREMENTS), "calibrated": calibration_of()},
+    weight=Weight(240, 1000, group="batch"),
+    modules=lambda _: (METHODS["least_squares"].module,),
+)

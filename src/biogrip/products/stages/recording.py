@@ -1,0 +1,81 @@
+"""Stage 2 for recorded traces: from the user's file to a measurement like the simulated ones."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.gripper import Gripper
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.plausibility import check_recording
+from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
+from biogrip.products.plan import Wildcards
+from biogrip.products.product import Product, Reads
+from biogrip.recordings import Columns, read_recording
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.study.study import Case, Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a recorded trace is held against.
+
+    Parameters
+    ----------
+    gripper
+        With what it was recorded.
+    problem
+        Under what, and what the instrument may have added.
+    columns
+        Where in its file it stands.
+    """
+
+    gripper: Gripper
+    problem: CaseProblem
+    columns: Columns
+
+
+def settings_of(case: Case) -> Settings:
+    """Choose what a recorded case's trace is held against."""
+    return Settings(case.gripper, case.problem, case.columns)
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what a recorded case's trace is held against."""
+    return settings_of(study.case(job["case"]))
+
+
+def record(settings: Settings, recorded: Path, measurements: Path) -> None:
+    """Read, check and convert the user's file, and write it as Parquet.
+
+    Raises
+    ------
+    BiogripError
+        With file, line and column, if the trace cannot be used.
+    """
+    write_measurements(measurements, read_checked(settings, recorded))
+
+
+def read_checked(settings: Settings, recorded: Path) -> Measurements:
+    """Read a recorded trace, and refuse what its gripper and protocol cannot have given."""
+    trace, problem = read_recording(recorded, settings.columns), settings.problem
+    nuisance = nuisance_basis(trace.time_s, offset=problem.offset, drift=problem.drift)
+    check_recording(
+        trace,
+        settings.gripper,
+        problem.torque,
+        recorded,
+        settings.columns,
+        nuisance,
+        problem.noise_rad,
+    )
+    return Measurements(trace.time_s, None, {0: trace.rotation_rad})
+
+
+RECORDING = Product(
+    "recording",
+    {"measurements": MEASUREMENTS.replace("{batch}", "seeds_0-0")},
+    record,
+    settings,
+    lambda plan: [{"case": case} for case in plan.study.recorded],
+    message="Reading the recorded trace of {case}",
+    reads={"recorded": Reads(lambda plan, job: [plan.study.case(job["case"]).file], one=True)},
+)

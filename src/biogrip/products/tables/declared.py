@@ -1,0 +1,89 @@
+"""How a table declares itself."""
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import LIGHT, TABLE_KINDS, Product, Reads, Weight, wildcards_of
+from biogrip.products.tables.layout import Table, write
+from biogrip.study.study import Study
+
+
+def table(
+    make: Callable[..., Table],
+    *,
+    name: str,
+    caption: str,
+    item: str,
+    settings: Callable[..., object],
+    reads: Mapping[str, Reads] | None = None,
+    cases: Callable[[Study], Iterable[str]] | None = None,
+    sweeps: bool = False,
+    sheet: str = "tables",
+    when: Callable[[Study], bool] = lambda _: True,
+    weight: Weight = LIGHT,
+    stem: str = "results/tables/{name}",
+) -> Product:
+    """Declare a table of the study, or of each of its cases.
+
+    Parameters
+    ----------
+    make
+        Makes it from its settings and, by keyword, from the files of `reads`.
+    name
+        Its name; of a case's table, the case follows in the file.
+    caption, item
+        What the report says of it.
+    settings
+        From the study; for a case's table, from the study and the case (of a sweep, likewise).
+    reads
+        Files that it is made from.
+    cases
+        Which cases have one; if that is not given there is one for the study.
+    sweeps
+        Whether there is one for each sweep instead.
+    sheet
+        Tables of a sheet are made by one job.
+    when
+        Whether a study has it.
+    weight
+        How heavy its job is.
+    stem
+        Path but for the ending.
+    """
+    path = stem.format(name=name) + ("_{case}" if cases else "_{sweep}" if sweeps else "")
+
+    def jobs(plan: Plan) -> list[Wildcards]:
+        if not when(plan.study):
+            return []
+        if sweeps:
+            return [{"sweep": sweep} for sweep in plan.study.sweeps]
+        return wildcards_of(cases(plan.study)) if cases else [{}]
+
+    def chosen(study: Study, job: Wildcards) -> object:
+        if sweeps:
+            return settings(study, study.sweeps[job["sweep"]])
+        return settings(study, study.case(job["case"])) if cases else settings(study)
+
+    @wraps(make)
+    def written(given: object, *, csv: Path, **files: Any) -> None:
+        for other in ("md", "tex", "html"):
+            del files[other]
+        write(make(given, **files), csv)
+
+    return Product(
+        name,
+        {kind[1:]: path + kind for kind in TABLE_KINDS},
+        written,
+        chosen,
+        jobs,
+        message=f"Writing the table {name}" + (" of {case}" if cases else " of {sweep}" if sweeps else ""),
+        reads=reads or {},
+        weight=weight,
+        sheet=sheet,
+        category="Tables",
+        item=item,
+        caption=caption,
+    )

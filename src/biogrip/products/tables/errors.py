@@ -1,0 +1,142 @@
+"""Tables 5 to 7: target, the paper's identification and ours."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identify.success import at_noise_floor, lowest_misfit
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.product import EVALUATION, the
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Column, Table
+from biogrip.sample import Parameter
+from biogrip.study.study import Case, Study, Truth
+
+TABLE_COLUMNS = (
+    Column("case", "Case"),
+    Column("parameter", "Parameter"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("paper_identified", "Paper", 4),
+    Column("paper_error_percent", "Paper error %", 2),
+    Column("best_seed", "Best seed"),
+    Column("best_identified", "Best", 3),
+    Column("best_error_percent", "Best error %", 2),
+    Column("median_identified", "Median", 3),
+    Column("p05_identified", "5 %", 3),
+    Column("p95_identified", "95 %", 3),
+    Column("median_absolute_error_percent", "Median abs. error %", 2),
+    Column("seeds", "Seeds"),
+    Column("noise_floor_share", "Share at noise floor", 2),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What errors are told by.
+
+    Parameters
+    ----------
+    case, truth
+        The sample.
+    method
+        Whose identifications.
+    noise_floor_tolerance
+        By which share a misfit may exceed the noise, to be taken for as good.
+    """
+
+    case: str
+    truth: Truth
+    method: str
+    noise_floor_tolerance: float
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the error table of a case depends on."""
+    return Settings(case.name, case.truth, study.shown, study.noise_floor_tolerance)
+
+
+def errors(settings: Settings, identifications: Path) -> Table:
+    """Compare target and identified values of one case, given its identifications, CSV."""
+    truth = settings.truth
+    found = read_identifications(identifications, settings.method)
+    best = found.index.get_loc(lowest_misfit(found).name)
+    known = bool(found["noise_rms_rad"].notna().all())
+    reached = at_noise_floor(found, settings.noise_floor_tolerance)
+    share = float(np.mean(reached)) if known else None
+    rows = []
+    for names in truth.model.quantities:
+        label = " + ".join(parameter.name for parameter in names)
+        target = truth.target(names)
+        values = found[[parameter.column for parameter in names]].sum(axis=1).to_numpy(float)
+        error = error_percent(target, values)
+        low, median, high = np.percentile(values, [5, 50, 95])
+        rows.append(
+            (
+                settings.case,
+                label,
+                names[0].unit,
+                target,
+                *_paper(truth, names, target),
+                int(found["seed"].iloc[best]),
+                float(values[best]),
+                float(error[best]),
+                float(median),
+                float(low),
+                float(high),
+                float(np.median(np.abs(error))),
+                len(found),
+                share,
+            )
+        )
+    number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
+    caption = (
+        f"{number}{truth.title}: target and identified parameters over {len(found)} seeds. "
+        "Best is the seed of lowest misfit. Error = (target - identified) / target."
+        if truth.parameters
+        else f"{truth.title}: parameters identified in the recorded trace."
+    )
+    return Table(caption, TABLE_COLUMNS, rows)
+
+
+def error_percent(target: float | None, identified: Array) -> Array:
+    """Signed error (target - identified) / target in percent; NaN for a target of zero or none."""
+    if not target:
+        return np.full_like(identified, np.nan)
+    return 100 * (target - identified) / target
+
+
+def _paper(
+    truth: Truth, quantity: list[Parameter], target: float | None
+) -> tuple[float | None, str | float | None]:
+    """Return the paper's value and error; the error of a sum is computed from its values."""
+    identified, names = truth.published.identified, [p.name for p in quantity]
+    if not all(name in identified for name in names):
+        return None, None
+    value = float(sum(identified[name] for name in names))
+    if len(names) == 1:
+        return value, truth.published.error_percent.get(names[0])
+    return value, float(error_percent(target, np.array([value]))[0])
+
+
+CAPTION = (
+    "Target values, the values and errors that the paper prints, and those of this study: the seed "
+    "of lowest misfit, median and 5 to 95 % over seeds, the median absolute error, and the share "
+    "of seeds whose misfit reaches the noise in their trace. Errors are "
+    "(target - identified) / target. Where c and c_p trade against each other, only the row "
+    "c + c_p is determined."
+)
+
+ERRORS = table(
+    errors,
+    name="errors",
+    item="errors",
+    caption=CAPTION,
+    settings=settings,
+    reads={"identifications": the(PATH)},
+    cases=lambda study: study.cases,
+    sheet="case_tables",
+    weight=EVALUATION,
+)

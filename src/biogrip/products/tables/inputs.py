@@ -1,0 +1,217 @@
+"""Tables 1 to 4: what goes into the study, as the config has it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from biogrip.actuator import CombDrive
+from biogrip.gripper import Gripper
+from biogrip.identify.genome import GeneRange
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Column, Table
+from biogrip.sample import SINGLE_BRANCH
+
+_SOURCE = Column("source", "Source")
+_LEGEND = (
+    " Stated: by the paper, or by whoever changed the config. "
+    "Reconstructed: the paper's value is not available to us."
+)
+
+
+@dataclass(frozen=True)
+class GripperSettings:
+    """The gripper in its neutral configuration, and which of its keys are reconstructed."""
+
+    gripper: Gripper
+    reconstructed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class ActuatorSettings:
+    """The comb drive, and which of its keys are reconstructed."""
+
+    actuator: CombDrive
+    reconstructed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class RangeSettings:
+    """The range that is searched, and which of its keys are reconstructed."""
+
+    ranges: Mapping[str, GeneRange]
+    reconstructed: tuple[str, ...] = ()
+
+
+def gripper(settings: GripperSettings) -> Table:
+    """Table 1: parameters of the gripper."""
+    block, marked = settings.gripper, settings.reconstructed
+    rows = [
+        _row(
+            marked,
+            "gripper.arm_length_m",
+            "l",
+            "arm length",
+            block.arm_length_m,
+            "m",
+        ),
+        _row(
+            marked,
+            "gripper.reference_angle_deg",
+            "hat-theta_2",
+            "reference angle, left",
+            block.reference_angle_deg,
+            "deg",
+        ),
+        _row(
+            marked,
+            "gripper.reference_angle_deg",
+            "hat-theta_4",
+            "reference angle, right",
+            180 - block.reference_angle_deg,
+            "deg",
+        ),
+    ]
+    for key, symbol, meaning, unit in (
+        ("inertia_kgm2", "I", "moment of inertia", "kg m2"),
+        ("damping_Nms_per_rad", "c", "damping", "N m s/rad"),
+        ("stiffness_Nm_per_rad", "k", "stiffness", "N m/rad"),
+    ):
+        for arm, index in (("left", 2), ("right", 4)):
+            path, value = f"gripper.{arm}.{key}", getattr(getattr(block, arm), key)
+            rows.append(
+                _row(
+                    marked,
+                    path,
+                    f"{symbol}_{index}",
+                    f"{meaning}, {arm}",
+                    value,
+                    unit,
+                )
+            )
+    return _quantities("Table 1. Parameters of the gripper.", rows)
+
+
+def actuator(settings: ActuatorSettings) -> Table:
+    """Table 2: geometry of the comb drive."""
+    block, marked = settings.actuator, settings.reconstructed
+    rows = [
+        _row(marked, f"actuator.{key}", symbol, meaning, getattr(block, key), unit)
+        for key, symbol, meaning, unit in (
+            ("thickness_m", "h", "thickness of the device layer", "m"),
+            ("finger_width_m", "d", "finger width", "m"),
+            ("finger_gap_m", "g", "finger gap", "m"),
+            ("fingers", "n", "number of floating fingers", ""),
+            ("finger_angle_deg", "alpha", "finger angle", "deg"),
+            ("stroke_deg", "beta", "finger stroke", "deg"),
+            ("initial_overlap_deg", "theta", "initial overlap", "deg"),
+            ("first_radius_m", "r_0", "radius of the first finger", "m"),
+        )
+    ]
+    return _quantities("Table 2. Geometric parameters of the comb-drive actuator.", rows)
+
+
+def gene_ranges(settings: RangeSettings) -> Table:
+    """Table 3: values that the genes may take."""
+    rows = []
+    for parameter in SINGLE_BRANCH:
+        genes = settings.ranges[parameter.name]
+        for index, gene in enumerate(("exponent", "digit", "digit"), start=1):
+            low, high = getattr(genes, gene)
+            source = _source(settings.reconstructed, f"search_range.{parameter.name}.{gene}")
+            name = f"g_{parameter.name}{index}"
+            rows.append((name, parameter.name, gene, low, high, high - low + 1, source))
+    columns = (
+        Column("gene", "Gene"),
+        Column("parameter", "Parameter"),
+        Column("role", "Role"),
+        Column("min", "Min"),
+        Column("max", "Max"),
+        Column("values", "Values"),
+        _SOURCE,
+    )
+    caption = "Table 3. Values that the genes of the chromosome may take."
+    return Table(caption + _LEGEND, columns, rows)
+
+
+def parameter_ranges(settings: RangeSettings) -> Table:
+    """Table 4: ranges of the parameters, as they follow from the genes."""
+    ranges = settings.ranges
+    rows = [
+        (p.name, p.meaning, p.unit, ranges[p.name].low, ranges[p.name].high) for p in SINGLE_BRANCH
+    ]
+    columns = (
+        Column("parameter", "Parameter"),
+        Column("meaning", "Meaning"),
+        Column("unit", "Unit"),
+        Column("min", "Min", 2),
+        Column("max", "Max", 2),
+    )
+    caption = "Table 4. Ranges of the sample's parameters, computed from the genes of Table 3."
+    return Table(caption, columns, rows)
+
+
+def _row(
+    marked: tuple[str, ...],
+    key: str,
+    symbol: str,
+    meaning: str,
+    value: float,
+    unit: str,
+) -> tuple[str, str, float, str, str]:
+    return symbol, meaning, value, unit, _source(marked, key)
+
+
+def _source(marked: tuple[str, ...], key: str) -> str:
+    found = any(key == name or key.startswith(f"{name}.") for name in marked)
+    return "reconstructed" if found else "stated"
+
+
+def _quantities(caption: str, rows: list[tuple[str, str, float, str, str]]) -> Table:
+    columns = (
+        Column("symbol", "Symbol"),
+        Column("meaning", "Meaning"),
+        Column("value", "Value"),
+        Column("unit", "Unit"),
+        _SOURCE,
+    )
+    caption += _LEGEND
+    return Table(caption, columns, rows)
+
+
+_CAPTION = (
+    "From the study's configuration. Values marked as reconstructed are not given by the paper."
+)
+
+INPUTS = (
+    table(
+        gripper,
+        name="gripper",
+        item="input: gripper",
+        caption=f"Table 1 of the paper. {_CAPTION}",
+        settings=lambda study: GripperSettings(study.gripper, study.reconstructed("gripper")),
+        sheet="input_tables",
+    ),
+    table(
+        actuator,
+        name="actuator",
+        item="input: actuator",
+        caption=f"Table 2 of the paper. {_CAPTION}",
+        settings=lambda study: ActuatorSettings(study.actuator, study.reconstructed("actuator")),
+        sheet="input_tables",
+    ),
+    table(
+        gene_ranges,
+        name="gene_ranges",
+        item="input: gene ranges",
+        caption=f"Table 3 of the paper. {_CAPTION}",
+        settings=lambda study: RangeSettings(study.ranges, study.reconstructed("search_range")),
+        sheet="input_tables",
+    ),
+    table(
+        parameter_ranges,
+        name="parameter_ranges",
+        item="input: parameter ranges",
+        caption=f"Table 4 of the paper. {_CAPTION}",
+        settings=lambda study: RangeSettings(study.ranges),
+        sheet="input_tables",
+    ),
+)

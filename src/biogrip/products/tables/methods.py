@@ -1,0 +1,128 @@
+"""The identifiers compared on the same traces."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from biogrip.identify.methods import METHODS
+from biogrip.identify.success import at_noise_floor, chi_square_rise
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.product import of_cases
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.errors import error_percent
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.sample import Parameter
+from biogrip.study.study import Study, Truth
+
+_LEADING = (
+    Column("case", "Case"),
+    Column("method", "Method"),
+    Column("seeds", "Seeds"),
+    Column("optimum_share", "Share at global optimum", 3),
+    Column("noise_floor_share", "Share at noise floor", 2),
+    Column("median_rise", "Median Δχ²", 2),
+    Column("median_evaluations", "Median responses", 3),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What methods are compared by.
+
+    Parameters
+    ----------
+    cases
+        The samples, and how many samples their traces have, by name.
+    optimum_tolerance, noise_floor_tolerance
+        What counts as the optimum, and as the noise floor.
+    """
+
+    cases: Mapping[str, tuple[Truth, int]]
+    optimum_tolerance: float
+    noise_floor_tolerance: float
+
+
+def settings(study: Study) -> Settings:
+    """Choose what methods are compared by."""
+    cases = {name: study.cases[name] for name in study.simulated}
+    return Settings(
+        {name: (case.truth, case.samples) for name, case in cases.items()},
+        study.optimum_tolerance,
+        study.noise_floor_tolerance,
+    )
+
+
+def methods(settings: Settings, identifications: list[Path]) -> Table:
+    """Compare how often each method reaches the global optimum, how exactly, and at what cost.
+
+    Parameters
+    ----------
+    settings
+        By what.
+    identifications
+        Those of the cases, CSV, in the order of the cases.
+    """
+    labels = dict.fromkeys(
+        _label(quantity)
+        for truth, _ in settings.cases.values()
+        for quantity in truth.model.quantities
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for (name, (truth, samples)), path in zip(
+        settings.cases.items(), identifications, strict=True
+    ):
+        found = read_identifications(path)
+        rise = chi_square_rise(found, samples)
+        for method in found["method"].unique():
+            mine = found["method"] == method
+            reached = at_noise_floor(found[mine], settings.noise_floor_tolerance)
+            rows.append(
+                (
+                    name,
+                    METHODS[method].title,
+                    int(mine.sum()),
+                    float(np.mean(rise[mine] <= settings.optimum_tolerance)),
+                    float(np.mean(reached)),
+                    float(np.median(rise[mine])),
+                    float(found.loc[mine, "evaluations"].median()),
+                    *_errors(found[mine], truth, list(labels)),
+                )
+            )
+    columns = (
+        *_LEADING,
+        *(Column(f"error_percent {label}", f"Error {label} %", 2) for label in labels),
+    )
+    caption = (
+        "Methods on the same traces. At the global optimum: chi-squared at most "
+        f"{settings.optimum_tolerance:g} above the lowest that any method, or the truth, has on "
+        "that trace. Errors are medians of the absolute error."
+    )
+    return Table(caption, columns, rows)
+
+
+def _errors(found: pd.DataFrame, truth: Truth, labels: list[str]) -> list[Cell]:
+    errors: dict[str, float] = {}
+    for quantity in truth.model.quantities:
+        target = truth.target(quantity)
+        values = found[[p.column for p in quantity]].sum(axis=1).to_numpy(float)
+        errors[_label(quantity)] = float(np.median(np.abs(error_percent(target, values))))
+    return [errors.get(label) for label in labels]
+
+
+def _label(quantity: list[Parameter]) -> str:
+    return " + ".join(parameter.name for parameter in quantity)
+
+
+METHODS_COMPARED = table(
+    methods,
+    name="methods",
+    item="methods",
+    caption="The identifiers on the same traces: share of seeds at the global optimum and at the "
+    "noise floor, responses simulated, errors.",
+    settings=settings,
+    reads={"identifications": of_cases(PATH, lambda study: study.simulated)},
+    when=lambda study: bool(study.simulated),
+)

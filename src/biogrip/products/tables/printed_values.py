@@ -1,0 +1,75 @@
+"""The numbers printed in Tables 5 to 7, held against the paper's own encoding and formula."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from biogrip.identify.genome import GeneRange, nearest_encodable
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.study.study import Study, Truth
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("parameter", "Parameter"),
+    Column("quantity", "Quantity"),
+    Column("printed", "Printed", 4),
+    Column("nearest_encodable", "Nearest encodable", 2),
+    Column("distance_percent", "Distance %", 2),
+    Column("within_range", "Within range"),
+    Column("printed_error_percent", "Printed error %"),
+    Column("recomputed_error_percent", "Recomputed error %", 3),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the paper prints, by case, and the range that it searches."""
+
+    cases: Mapping[str, Truth]
+    ranges: Mapping[str, GeneRange]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what is checked."""
+    return Settings({name: study.cases[name].truth for name in study.published}, study.ranges)
+
+
+def printed_values(settings: Settings) -> Table:
+    """Check what the paper prints."""
+    ranges = settings.ranges
+    rows: list[tuple[Cell, ...]] = []
+    for case, truth in settings.cases.items():
+        published = truth.published
+        for name in truth.model.names:
+            target = truth.parameters[name]
+            identified = published.identified.get(name)
+            for quantity, value in (("target", target), ("identified", identified)):
+                if value is None or value <= 0:
+                    continue
+                genes = ranges[name]
+                nearest = nearest_encodable(value, genes)
+                errors: tuple[Cell, Cell] = (None, None)
+                if quantity == "identified" and target:
+                    printed = published.error_percent.get(name)
+                    errors = (printed, 100 * (target - value) / target)
+                distance = 100 * (value - nearest) / value
+                within = "yes" if genes.low <= value <= genes.high else "no"
+                rows.append(
+                    (case, name, quantity, value, nearest, distance, within, *errors),
+                )
+    caption = (
+        "Printed values of Tables 5 to 7 against the two-digit encoding of eq. (10), the ranges "
+        "of Table 4, and the printed errors against (target - identified) / target."
+    )
+    return Table(caption, _COLUMNS, rows)
+
+
+PRINTED_VALUES = table(
+    printed_values,
+    name="printed_values",
+    item="printed values",
+    caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
+    "encoding, ranges and error formula.",
+    settings=settings,
+    when=lambda study: bool(study.published),
+)

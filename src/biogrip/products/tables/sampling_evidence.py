@@ -1,0 +1,110 @@
+"""At which sampling rate the paper's errors are of the size that noise allows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.measurement import Noise
+from biogrip.protocol import sample_times
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.errors import error_percent
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.study.study import Study, Truth
+
+_RATES_HZ = (0.1, 1.0, 10.0, 100.0)
+_DETERMINED_PERCENT = 100.0
+# Where c and c_p trade, each alone is far less certain than their sum.
+_TRADING = 2.0
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("parameter", "Parameter"),
+    Column("paper_error_percent", "Paper's error %", 2),
+    *(Column(f"bound_percent_{rate:g}_Hz", f"Bound % at {rate:g} Hz", 2) for rate in _RATES_HZ),
+)
+_CAPTION = (
+    "The paper's errors beside the standard deviations that the study's noise leaves at least "
+    "(Cramer-Rao bounds at the true parameters), at several sampling rates. Of c and c_p the sum "
+    "stands where they trade against each other at the paper's answer. Last row: the paper's "
+    "error over the bound, root mean square over the rows above; about 1 is to be expected of an "
+    "identification that is as good as noise allows."
+)
+
+
+@dataclass(frozen=True)
+class CaseSettings:
+    """A sample that the paper reports on, and what its bounds depend on."""
+
+    truth: Truth
+    problem: CaseProblem
+    noise: Noise
+
+
+def settings(study: Study) -> dict[str, CaseSettings]:
+    """Choose the cases, by name."""
+    cases = {name: study.cases[name] for name in study.published}
+    return {n: CaseSettings(c.truth, c.problem, c.noise) for n, c in cases.items()}
+
+
+def sampling_evidence(settings: Mapping[str, CaseSettings]) -> Table:
+    """Compare what the paper identifies with bounds."""
+    rows: list[tuple[Cell, ...]] = []
+    for name, case in settings.items():
+        rows += _case_rows(name, case)
+    if rows:
+        table = np.array([row[2:] for row in rows], dtype=float)
+        ratios = np.sqrt(np.mean((table[:, :1] / table[:, 1:]) ** 2, axis=0))
+        rows.append(("all", "error / bound", None, *(float(ratio) for ratio in ratios)))
+    return Table(_CAPTION, _COLUMNS, rows)
+
+
+def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
+    """Rows of what the trace determines at some of the rates and the paper has a value of."""
+    truth, identified = case.truth.parameters, case.truth.published.identified
+    problem, noise = case.problem, case.noise
+    names = list(problem.searched.names)
+    end_s = problem.torque.end_s
+    times = [sample_times(end_s, rate) for rate in _RATES_HZ]
+    at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]
+    shown = [q for q, _ in at_truth[0]]
+    if set(names) <= set(identified):
+        shown = _told_apart(bounds_percent(problem, noise, identified, times[-1]))
+    rows: list[tuple[Cell, ...]] = []
+    for index, (q, _) in enumerate(at_truth[0]):
+        bounds = [found[index][1] for found in at_truth]
+        members = [names[member] for member in q.members]
+        known = all(member in identified for member in members)
+        if q in shown and known and min(bounds) < _DETERMINED_PERCENT:
+            target, found = (sum(of[m] for m in members) for of in (truth, identified))
+            error = float(error_percent(target, np.array([found]))[0])
+            rows.append((name, q.label, error, *bounds))
+    return rows
+
+
+def _told_apart(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
+    """Leave out the sum of what is told apart, and else what it is made of."""
+    sums = [(q, percent) for q, percent in bounds if q.form == "sum"]
+    left_out = []
+    for total, percent in sums:
+        members = [(q, alone) for q, alone in bounds if set(q.members) < set(total.members)]
+        if min(alone for _, alone in members) > _TRADING * percent:
+            left_out += [q for q, _ in members]
+        else:
+            left_out.append(total)
+    return [q for q, _ in bounds if q not in left_out]
+
+
+SAMPLING_EVIDENCE = table(
+    sampling_evidence,
+    name="sampling_evidence",
+    item="evidence: sampling",
+    caption="The errors that the paper prints, beside the standard deviations that 10 % noise "
+    "leaves at least at several sampling rates. Only near the rate at which the two are alike, on "
+    "average over the rows, can the paper's traces have been sampled; that rate is reconstructed.",
+    settings=settings,
+    when=lambda study: bool(study.published),
+)

@@ -1,0 +1,47 @@
+"""What the identifiers cost on the machine that ran them."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from biogrip.identify.methods import METHODS
+from biogrip.products.files.identifications import TIMINGS
+from biogrip.products.product import of_cases
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("method", "Method"),
+    Column("seeds", "Seeds"),
+    Column("median_cpu_s", "Median CPU time (s)", 2),
+    Column("total_cpu_s", "Total CPU time (s)", 3),
+)
+
+
+def timings(settings: None, times: list[Path]) -> Table:
+    """Processor time per identification, by case and method, from those of the seeds, CSV."""
+    spent = pd.concat([TIMINGS.read(path) for path in times])
+    rows: list[tuple[Cell, ...]] = [
+        (
+            case,
+            METHODS[method].title,
+            len(mine),
+            float(mine["cpu_s"].median()),
+            float(mine["cpu_s"].sum()),
+        )
+        for (case, method), mine in spent.groupby(["case", "method"], sort=False)
+    ]
+    return Table("Processor time of the identifications on this machine.", _COLUMNS, rows)
+
+
+# Outside tables/, for times are not the same on every machine.
+TIMES = table(
+    timings,
+    name="timings",
+    stem="results/timings",
+    item="processor times",
+    caption="Processor time of the identifications on the machine that made this report.",
+    settings=lambda study: None,
+    reads={"times": of_cases(TIMINGS.path, lambda study: study.cases)},
+)

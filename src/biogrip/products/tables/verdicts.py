@@ -1,0 +1,105 @@
+"""What one trace of a case tells, quantity by quantity."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from biogrip.products.files.verdicts import PATH, read_verdicts
+from biogrip.products.product import JUDGEMENT, the
+from biogrip.products.stages.judgement import verdicts_expected
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.study.study import Case, Study
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("verdict", "Verdict"),
+    Column("value", "Estimate", 3),
+    Column("low", "95 % from", 3),
+    Column("high", "95 % to", 3),
+    Column("expected_verdict", "Expected verdict"),
+    Column("expected_low", "Expected from", 3),
+    Column("expected_high", "Expected to", 3),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A case, its name in print, and its true parameters, none if they are unknown."""
+
+    case: str
+    title: str
+    parameters: Mapping[str, float]
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the table of a case depends on."""
+    return Settings(case.name, case.title, case.parameters)
+
+
+def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
+    """List the verdicts on all quantities of a case.
+
+    Parameters
+    ----------
+    settings
+        The case.
+    measured
+        Verdicts on its trace, JSON.
+    expected
+        What its traces should tell, JSON, if the truth is known.
+    """
+    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
+    rows: list[tuple[Cell, ...]] = []
+    for item in found["quantities"]:
+        name = item["quantity"]
+        foreseen = foreseen_of.get(name, {})
+        rows.append(
+            (
+                settings.case,
+                name,
+                item["unit"],
+                _target(name, settings.parameters),
+                item["verdict"],
+                item["value"] if item["verdict"] == "determined" else None,
+                item["low"],
+                item["high"],
+                foreseen.get("verdict"),
+                foreseen.get("low"),
+                foreseen.get("high"),
+            )
+        )
+    trades = "".join(
+        f" {' and '.join(trade['members'])} trade against each other: determined is "
+        f"{trade['quantity']}."
+        for trade in found["trades"]
+    )
+    caption = (
+        f"{settings.title}: what the trace of one seed tells, from profile likelihoods.{trades}"
+    )
+    if others:
+        caption += " Expected: the same of the trace without noise, held against its noise."
+    return Table(caption, _COLUMNS, rows)
+
+
+def _target(quantity: str, parameters: Mapping[str, float]) -> float | None:
+    names = quantity.split(" + ")
+    return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
+
+
+VERDICTS = table(
+    verdicts,
+    name="verdicts",
+    item="verdicts",
+    caption="What the trace of one seed of this case tells: a verdict on every quantity from its "
+    "profile likelihood (95 % limits), beside what the trace without noise leads to expect.",
+    settings=settings,
+    reads={"measured": the(PATH), "expected": verdicts_expected()},
+    cases=lambda study: study.cases,
+    sheet="judgement_tables",
+    weight=JUDGEMENT,
+)

@@ -1,0 +1,56 @@
+"""The study as it is run: what its configs come to, in a file that jobs find their settings in."""
+
+import json
+import os
+from pathlib import Path
+
+from biogrip.errors import BiogripError
+from biogrip.files import write_text
+from biogrip.running.journal import recorded_in
+from biogrip.running.manifest import Manifest, set_aside
+from biogrip.study.study import Study
+
+NAME = "study.json"
+
+
+def write_study(study: Study, results: Path) -> None:
+    """Write a study down among its results, unless it stands there already.
+
+    Raises
+    ------
+    BiogripError
+        If a file is in the way that no study wrote.
+    """
+    file = results / NAME
+    text = json.dumps(study.config, indent=1) + "\n"
+    if os.path.lexists(file):
+        manifest = Manifest(results)
+        if file.is_symlink() or not file.is_file() or not manifest.knows(NAME):
+            raise BiogripError(
+                f"{file}: in the way, and not written by a study. Move it away and run again."
+            )
+        if file.read_text(encoding="utf-8", errors="replace") == text:
+            return
+        if not manifest.was_written(NAME):
+            set_aside(file)
+    with recorded_in(results):
+        write_text(file, text)
+
+
+def read_study(results: Path) -> Study:
+    """Read the study whose results a folder holds.
+
+    Raises
+    ------
+    BiogripError
+        If none has been run there.
+    """
+    file = results / NAME
+    try:
+        return Study(json.loads(file.read_text(encoding="utf-8")))
+    except FileNotFoundError as error:
+        raise BiogripError(
+            f"{file}: there is none, for no study was run here; allowed is what a run has begun."
+        ) from error
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{file}: cannot be read as a study: {error}.") from error

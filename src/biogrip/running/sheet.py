@@ -1,0 +1,159 @@
+"""Jobs as the workflow sees them: products that are made by one command."""
+
+import re
+import shlex
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from biogrip.products.digest import digest
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Weight
+from biogrip.running.source_files import fingerprint
+
+_CONSTRAINTS = {
+    "case": "[A-Za-z][A-Za-z0-9_-]*",
+    "batch": r"seeds_\d+-\d+",
+    "method": "[a-z_]+",
+    "sweep": "[A-Za-z][A-Za-z0-9_]*",
+    "seed": r"\d+",
+}
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """Products that one job makes: a sheet of figures, or a single thing.
+
+    Parameters
+    ----------
+    name
+        Name of the rule.
+    products
+        What is made.
+    plan
+        The study's jobs.
+    """
+
+    name: str
+    products: tuple[Product, ...]
+    plan: Plan
+
+    @property
+    def wildcards(self) -> list[str]:
+        """Names of the wildcards of its jobs."""
+        patterns = "".join(self.products[0].writes.values())
+        return sorted(set(re.findall(r"{(\w+)}", patterns)))
+
+    @property
+    def jobs(self) -> list[Wildcards]:
+        """Jobs that the study has of it."""
+        return list(self.products[0].jobs(self.plan))
+
+    @property
+    def constraints(self) -> dict[str, str]:
+        """What its wildcards may be: those of the study's own jobs, if it has any."""
+        jobs, found = self.jobs, {}
+        for name in self.wildcards:
+            values = {job[name] for job in jobs} if name in ("case", "sweep") else set()
+            found[name] = "|".join(map(re.escape, sorted(values))) or _CONSTRAINTS[name]
+        return found
+
+    @property
+    def outputs(self) -> dict[str, str]:
+        """Patterns of the files, by product and kind."""
+        return {
+            f"{product.name}_{kind}": pattern
+            for product in self.products
+            for kind, pattern in product.writes.items()
+        }
+
+    def inputs(self, job: Wildcards) -> dict[str, list[str]]:
+        """Files that a job needs and no other product of the sheet makes."""
+        made = {file for product in self.products for file in product.outputs(job).values()}
+        needed: dict[str, list[str]] = {}
+        for product in self.products:
+            for name, files in product.inputs(self.plan, job).items():
+                others = [file for file in files if file not in made]
+                needed[name] = list(dict.fromkeys([*needed.get(name, []), *others]))
+        return needed
+
+    def digest(self, job: Wildcards) -> str:
+        """Letters that change with the settings that a job uses, and with its code."""
+        settings = [product.settings(self.plan.study, job) for product in self.products]
+        modules = {
+            module
+            for product in self.products
+            for module in (product.module, *product.modules(job))
+        }
+        return f"{digest(settings)}-{fingerprint(*sorted(modules))}"
+
+    def command(self, job: Wildcards) -> str:
+        """Return what is to be made, as `biogrip make` reads it."""
+        names = [product.name for product in self.products]
+        options = [f"--{name} {shlex.quote(str(job[name]))}" for name in self.wildcards]
+        return " ".join([*names, *options])
+
+    @property
+    def log(self) -> str:
+        """Pattern of the log."""
+        inner = "".join(f"/{{{name}}}" for name in self.wildcards)
+        return f"results/logs/{self.name}{inner}.log"
+
+    @property
+    def message(self) -> str:
+        """What a job says that it does."""
+        if len(self.products) == 1:
+            return re.sub(r"{(\w+)}", r"{wildcards.\1}", self.products[0].message)
+        whose = "".join(f" of {{wildcards.{name}}}" for name in self.wildcards)
+        return f"Making {', '.join(product.name for product in self.products)}{whose}"
+
+    @property
+    def weight(self) -> Weight:
+        """How heavy a job is: as the heaviest of its products."""
+        weights = [product.weight for product in self.products]
+        return Weight(
+            max(weight.minutes for weight in weights),
+            max(weight.megabytes for weight in weights),
+            next((weight.group for weight in weights if weight.group), None),
+            all(weight.local for weight in weights),
+        )
+
+    def runtime(self, job: Wildcards, attempt: int) -> int:
+        """Minutes that a job takes at most, more at every retry."""
+        return self.weight.minutes * attempt
+
+    def megabytes(self, job: Wildcards, attempt: int) -> int:
+        """Memory that a job takes at most, more at every retry."""
+        return self.weight.megabytes * attempt
+
+    @property
+    def caption(self) -> str:
+        """What the report says."""
+        if len(self.products) == 1:
+            return self.products[0].caption
+        return "\n\n".join(f"{p.item}: {p.caption}" for p in self.products if p.caption)
+
+
+def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
+    """Put products together that are made by one job."""
+    together: dict[str, list[Product]] = defaultdict(list)
+    for product in products:
+        together[product.sheet or product.name].append(product)
+    found = []
+    for name, members in together.items():
+        # Only what the study has: a rule's outputs are all made.
+        there = [product for product in members if not product.asked or product.jobs(plan)]
+        if there:
+            found.append(Sheet(name, tuple(there), plan))
+    return found
+
+
+def files_of(sheets: Iterable[Sheet]) -> list[str]:
+    """Every file that a study makes: what is lost is made again, so each is asked for."""
+    return [
+        file
+        for sheet in sheets
+        for product in sheet.products
+        for job in product.jobs(sheet.plan)
+        for file in product.outputs(job).values()
+    ]

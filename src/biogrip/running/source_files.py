@@ -1,0 +1,89 @@
+"""Which source files a stage is made of, so that the workflow can track them.
+
+Snakemake does not follow imports. Here every ``import`` statement inside the
+package is followed, without running anything; but not to what only says what there
+is to do, for that is in the digest of the settings.
+"""
+
+import ast
+import hashlib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import biogrip
+
+_PACKAGE = Path(biogrip.__file__).parent
+_SAYING = (
+    "biogrip.study",
+    *(f"biogrip.products.{name}" for name in ("product", "plan", "batches", "digest")),
+    *(f"biogrip.products.{folder}.declared" for folder in ("tables", "figures")),
+)
+
+
+@cache
+def fingerprint(*modules: str) -> str:
+    """Hash of what `source_files` names: one value where a list of files would be long.
+
+    Parameters
+    ----------
+    modules
+        For example ``"biogrip.stages.target"``.
+    """
+    digest = hashlib.sha256()
+    for file in source_files(*modules):
+        digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+def source_files(*modules: str) -> list[str]:
+    """Files of modules and of all package modules that they import, sorted.
+
+    Parameters
+    ----------
+    modules
+        For example ``"biogrip.stages.target"``.
+    """
+    seen: set[str] = set()
+    waiting = list(modules)
+    while waiting:
+        name = waiting.pop()
+        if name not in seen:
+            seen.add(name)
+            waiting += _imports(name)
+    return sorted(str(_file(name)) for name in seen)
+
+
+def _file(module: str) -> Path | None:
+    path = _PACKAGE.joinpath(*module.split(".")[1:])
+    for file in (path.with_suffix(".py"), path / "__init__.py"):
+        if file.is_file():
+            return file
+    return None
+
+
+@cache
+def _imports(module: str) -> list[str]:
+    file = _file(module)
+    assert file is not None
+    found: set[str] = set()
+    for node in _executed(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            found.add(node.module)
+            found.update(f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            found.update(alias.name for alias in node.names)
+    return [name for name in sorted(found) if _is_ours(name)]
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """Walk over a tree but for what only a type checker sees."""
+    yield node
+    for child in ast.iter_child_nodes(node):
+        if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
+            yield from _executed(child)
+
+
+def _is_ours(name: str) -> bool:
+    says_only = any(name == said or name.startswith(f"{said}.") for said in _SAYING)
+    return name.startswith("biogrip.") and not says_only and _file(name) is not None

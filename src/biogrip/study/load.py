@@ -1,0 +1,75 @@
+"""From config files to a checked study."""
+
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from biogrip.sample import SampleModel
+from biogrip.study import build
+from biogrip.study.source import overlaid, read_config, read_places
+from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
+from biogrip.study.validation import OVERRIDABLE, check, with_numbers
+
+
+def read_configs(files: Iterable[Path]) -> dict[str, Any]:
+    """Read config files and lay each over the ones before.
+
+    Raises
+    ------
+    BiogripError
+        With file and line, if one cannot be used whatever its keys mean.
+    """
+    merged: dict[str, Any] = {}
+    for file in files:
+        merged = overlaid(merged, read_config(file))
+    return merged
+
+
+def load_study(
+    config: Mapping[str, Any],
+    files: Sequence[str | Path],
+    command_line: Iterable[Hashable] = (),
+    *,
+    for_workflow: bool = True,
+) -> Study:
+    """Check and type a merged config.
+
+    Parameters
+    ----------
+    config
+        The config in force: all files, the later laid over the earlier.
+    files
+        The files it came from, to name lines in messages.
+    command_line
+        Top-level keys that were set on the command line.
+    for_workflow
+        Whether it is to be run by the workflow, which names of files must suit.
+
+    Raises
+    ------
+    BiogripError
+        If anything in the config cannot be used.
+    """
+    places = read_places(files, command_line)
+    complete = _fill_in(with_numbers(config))
+    check(complete, places, for_workflow=for_workflow)
+    return Study(complete)
+
+
+def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
+    """Give every case the study's blocks under its own; drop cases set to nothing."""
+    cases = config.get("cases")
+    if not isinstance(cases, dict):
+        return config
+    filled = {}
+    for name, case in cases.items():
+        if case is None:
+            continue
+        if isinstance(case, dict):
+            case = dict(case)
+            for block in OVERRIDABLE:
+                if isinstance(config.get(block), dict):
+                    case[block] = overlaid(config[block], case.get(block, {}))
+        filled[name] = case
+    return {**config, "cases": filled}

@@ -1,0 +1,421 @@
+"""The study as its config describes it: cases, and what each of them assumes."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from biogrip.actuator import CombDrive
+from biogrip.arrays import Array
+from biogrip.calibration import CalibrationTest
+from biogrip.gripper import Gripper
+from biogrip.identify.case_problem import CaseProblem, Sample
+from biogrip.identify.genome import GeneRange
+from biogrip.identify.methods import method_settings
+from biogrip.measurement import Noise
+from biogrip.protocol import Phase, torque_history
+from biogrip.recordings import Columns
+from biogrip.sample import Parameter, SampleModel
+from biogrip.study import build
+from biogrip.study.source import overlaid
+from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
+
+
+@dataclass(frozen=True)
+class Published:
+    """What the paper reports of a sample; data to compare with.
+
+    Parameters
+    ----------
+    table, figure, generation
+        Numbers of the table and of the figure; generation at which the figure
+        shows the fit. None where the paper has none.
+    axis_rad
+        Ends of the figure's rotation axis.
+    identified, error_percent
+        Identified parameters in SI units, and their errors as printed, by name.
+    """
+
+    table: int | None = None
+    figure: int | None = None
+    generation: int | None = None
+    axis_rad: tuple[float, ...] = ()
+    identified: Mapping[str, float] = field(default_factory=dict)
+    error_percent: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """When the rotation is sampled.
+
+    Parameters
+    ----------
+    rate_Hz
+        Uniform rate, from 0 to the end of the protocol.
+    times_s
+        Instants, instead.
+    """
+
+    rate_Hz: float
+    times_s: tuple[float, ...] = ()
+
+    def over(self, end_s: float) -> Array:
+        """Sampling instants in s, (n_samples,), of a protocol that ends then."""
+        return build.sampling(self.rate_Hz, self.times_s, end_s)
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is known of a sample that was simulated, and what the paper says of it.
+
+    Parameters
+    ----------
+    title
+        Name in print.
+    sample
+        Its constitutive model.
+    parameters
+        True values by name, SI units; empty if the trace was recorded.
+    published
+        What the paper reports.
+    """
+
+    title: str
+    sample: Sample
+    parameters: Mapping[str, float]
+    published: Published
+
+    @property
+    def model(self) -> SampleModel:
+        """Constitutive model."""
+        return self.sample.model
+
+    def target(self, quantity: list[Parameter]) -> float | None:
+        """Return the true value of a parameter or a sum, unless the trace was recorded."""
+        return sum(self.parameters[p.name] for p in quantity) if self.parameters else None
+
+
+@dataclass(frozen=True)
+class Case:
+    """One sample of the study.
+
+    Parameters
+    ----------
+    name
+        Name in files.
+    block
+        Its config, with the study's blocks filled in.
+    actuator
+        The study's comb drive, as the config has it.
+    study_seeds
+        How many seeds a simulated case of the study has.
+    """
+
+    name: str
+    block: Mapping[str, Any]
+    actuator: Mapping[str, Any]
+    study_seeds: int
+
+    @property
+    def title(self) -> str:
+        """Name in print."""
+        return str(self.block.get("title", self.name))
+
+    @property
+    def recorded(self) -> bool:
+        """Whether its trace was recorded, not simulated."""
+        return "file" in self.block["measurement"]
+
+    @property
+    def seeds(self) -> int:
+        """Number of traces; of a recorded one there is one."""
+        return 1 if self.recorded else self.study_seeds
+
+    @cached_property
+    def sample(self) -> Sample:
+        """Constitutive model."""
+        block = self.block["sample"]
+        return Sample(block["model"], block.get("branches", 1))
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """True values by name, SI units; nobody knows them of a recorded trace."""
+        block = self.block["sample"]
+        return {name: float(block[name]) for name in self.sample.model.names if name in block}
+
+    @property
+    def size_m(self) -> float | None:
+        """Diameter of the sample, if it is given."""
+        size: float | None = self.block["sample"].get("size_m")
+        return size
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Parameters that are not identified, by name."""
+        return {name: float(value) for name, value in self.block.get("fixed", {}).items()}
+
+    @property
+    def published(self) -> Published:
+        """What the paper reports of it."""
+        block = dict(self.block.get("published", {}))
+        if "axis_rad" in block:
+            block["axis_rad"] = tuple(block["axis_rad"])
+        return Published(**block)
+
+    @property
+    def truth(self) -> Truth:
+        """What is known of it."""
+        return Truth(self.title, self.sample, self.parameters, self.published)
+
+    @cached_property
+    def phases(self) -> tuple[Phase, ...]:
+        """The protocol."""
+        return build.phases(self.block["protocol"], self.actuator)
+
+    @cached_property
+    def gripper(self) -> Gripper:
+        """The true gripper where its jaws touch the sample."""
+        return build.gripper(self._gripper_block)
+
+    @property
+    def _gripper_block(self) -> dict[str, Any]:
+        block = dict(self.block["gripper"])
+        if self.size_m is not None:
+            touching = build.contact_of(block, self.actuator, self.size_m)
+            block["reference_angle_deg"] = touching.reference_angle_deg
+        return block
+
+    @property
+    def stroke_rad(self) -> float:
+        """What the comb drive's stroke leaves for gripping, after closing onto the sample."""
+        stroke = math.radians(self.actuator["stroke_deg"])
+        if self.size_m is None:
+            return stroke
+        closed = build.contact_of(self.block["gripper"], self.actuator, self.size_m)
+        return stroke - closed.closing_rad
+
+    @property
+    def noise(self) -> Noise:
+        """Noise added to the rotation."""
+        return Noise(**self.block["measurement"]["noise"])
+
+    @property
+    def sampling(self) -> Sampling:
+        """When the rotation is sampled."""
+        measurement = self.block["measurement"]
+        return Sampling(measurement["rate_Hz"], tuple(measurement.get("times_s", ())))
+
+    @property
+    def samples(self) -> int:
+        """Samples in a trace, unless it was recorded."""
+        return len(self.sampling.over(torque_history(self.phases).end_s))
+
+    @property
+    def nonlinear_target(self) -> bool:
+        """Whether the target is made by the nonlinear model."""
+        return bool(self.block["models"]["target"] == "nonlinear")
+
+    @property
+    def file(self) -> str:
+        """The recorded trace."""
+        return str(self.block["measurement"]["file"])
+
+    @property
+    def columns(self) -> Columns:
+        """Where in its file a recorded trace stands."""
+        block = self.block["measurement"]
+        return Columns(
+            block["time"], block["rotation"], block.get("time_unit"), block.get("rotation_unit")
+        )
+
+    @property
+    def ranges(self) -> dict[str, GeneRange]:
+        """Range that is searched, by the name of the range."""
+        return build.gene_ranges(self.block["search_range"])
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether its identification takes the gripper's arms from a calibration."""
+        return self.block.get("assumed_gripper") == "calibrated"
+
+    @property
+    def calibration(self) -> CalibrationTest:
+        """The test without sample."""
+        return CalibrationTest(**self.block["calibration"])
+
+    @cached_property
+    def problem(self) -> CaseProblem:
+        """What its identification assumes; a calibration replaces the gripper's arms."""
+        assumed, measurement = self.block.get("assumed_gripper", {}), self.block["measurement"]
+        gripper = self.gripper
+        if not isinstance(assumed, str):
+            gripper = build.gripper(overlaid(self._gripper_block, assumed))
+        return CaseProblem(
+            gripper,
+            self.phases,
+            self.ranges,
+            self.sample,
+            self.fixed,
+            nonlinear=self.block["models"]["identification"] == "nonlinear",
+            offset=measurement.get("offset", False),
+            drift=measurement.get("drift", False),
+            noise_rad=measurement.get("noise_rad"),
+        )
+
+    def method(self, name: str) -> object:
+        """Settings of an identifier."""
+        return method_settings(name, self.block)
+
+    @property
+    def mutation_start(self) -> int:
+        """First generation whose children mutate."""
+        return int(self.block["genetic_algorithm"]["mutation_start"])
+
+    @property
+    def confidence(self) -> float:
+        """Confidence of all intervals."""
+        return float(self.block["identifiability"]["confidence"])
+
+    @property
+    def coverage_seeds(self) -> int:
+        """Over how many seeds intervals are held against the truth."""
+        return 0 if self.recorded else int(self.block["identifiability"]["coverage_seeds"])
+
+    @property
+    def has_valley(self) -> bool:
+        """Whether two exchangeable parameters are searched, among others."""
+        model = self.sample.model
+        pair = [name for name in model.exchangeable if name not in self.fixed]
+        return len(pair) == 2 and len(model.names) - len(self.fixed) > 2
+
+
+@dataclass(frozen=True)
+class Study:
+    """A checked study.
+
+    Parameters
+    ----------
+    config
+        The whole config, every case with its blocks filled in.
+    """
+
+    config: Mapping[str, Any]
+
+    @cached_property
+    def cases(self) -> dict[str, Case]:
+        """Cases by name, in their order."""
+        return self._cases(self.config["cases"])
+
+    @cached_property
+    def points(self) -> dict[str, Case]:
+        """The cases that the points of the sweeps are, by name."""
+        return self._cases(point_blocks(self.config))
+
+    @cached_property
+    def sweeps(self) -> dict[str, Sweep]:
+        """Sweeps by name."""
+        return sweeps_of(self.config)
+
+    def _cases(self, blocks: Mapping[str, Any]) -> dict[str, Case]:
+        actuator, seeds = self.config["actuator"], int(self.config["seeds"])
+        return {name: Case(name, block, actuator, seeds) for name, block in blocks.items()}
+
+    def case(self, name: str) -> Case:
+        """Return a case, or the case that a point of a sweep is."""
+        return self.cases[name] if name in self.cases else self.points[name]
+
+    @property
+    def study_seed(self) -> int:
+        """The one seed of the study."""
+        return int(self.config["study_seed"])
+
+    @property
+    def methods(self) -> list[str]:
+        """Identifiers; tables and figures that show one show the first."""
+        return list(self.config["methods"])
+
+    @property
+    def shown(self) -> str:
+        """The method that tables and figures of one method show."""
+        return self.methods[0]
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Sample models that every trace is fitted with."""
+        return tuple(self.config["model_selection"]["models"])
+
+    @property
+    def batch_size(self) -> int | None:
+        """Number of seeds a job, if the study says."""
+        size: int | None = self.config.get("batch_size")
+        return size
+
+    @property
+    def noise_floor_tolerance(self) -> float:
+        """By which share a misfit may exceed the noise, to be taken for as good."""
+        return float(self.config["evaluation"]["noise_floor_tolerance"])
+
+    @property
+    def optimum_tolerance(self) -> float:
+        """By how much chi-squared may exceed the lowest known, to be taken for as low."""
+        return float(self.config["evaluation"]["optimum_tolerance"])
+
+    @property
+    def gripper(self) -> Gripper:
+        """The gripper in its neutral configuration."""
+        return build.gripper(self.config["gripper"])
+
+    @property
+    def jaw_gap_m(self) -> float:
+        """Distance between the jaws there."""
+        return float(self.config["gripper"]["jaw_gap_m"])
+
+    @property
+    def actuator(self) -> CombDrive:
+        """The comb drives."""
+        return CombDrive(**self.config["actuator"])
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The protocol of cases without one of their own."""
+        return build.phases(self.config["protocol"], self.config["actuator"])
+
+    @property
+    def ranges(self) -> dict[str, GeneRange]:
+        """Range that is searched, of cases without one of their own."""
+        return build.gene_ranges(self.config["search_range"])
+
+    def reconstructed(self, block: str) -> tuple[str, ...]:
+        """Keys of a block, or the block itself, whose values the paper does not give."""
+        marked = self.config["reconstructed"]
+        return tuple(key for key in marked if key == block or key.startswith(f"{block}."))
+
+    def is_reconstructed(self, key: str) -> bool:
+        """Whether the paper does not give the value of a dotted key."""
+        marked = self.config["reconstructed"]
+        return any(key == name or key.startswith(f"{name}.") for name in marked)
+
+    @property
+    def simulated(self) -> list[str]:
+        """Cases with a target."""
+        return [name for name, case in self.cases.items() if not case.recorded]
+
+    @property
+    def recorded(self) -> list[str]:
+        """Cases whose trace was recorded."""
+        return [name for name, case in self.cases.items() if case.recorded]
+
+    @property
+    def covered(self) -> list[str]:
+        """Cases whose intervals are tested."""
+        return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
+
+    @property
+    def published(self) -> list[str]:
+        """Cases that the paper reports on."""
+        return [name for name, case in self.cases.items() if case.published.table is not None]
+
+    def coverage_seeds(self, case: Case) -> int:
+        """Over how many seeds the intervals of a case are tested."""
+        return case.coverage_seeds
