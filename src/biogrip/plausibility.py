@@ -130,8 +130,8 @@ def check_recording(
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.rotation}': found a rotation that goes "
             "against the torque, allowed is the closing rotation, positive where the arm closes. "
-            "It would fit if it were -1 times (is opening counted as positive?), or if an offset or "
-            "drift of the instrument, where it has one, were declared."
+            "It would fit if it were -1 times (is opening counted as positive?), or if an offset "
+            "or drift of the instrument, where it has one, were declared."
         )
     _check_turn(recording, fit.turn_rad, free_rotation(gripper, torque), path, columns)
 

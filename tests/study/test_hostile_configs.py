@@ -181,6 +181,14 @@ EXTREME = [
         phase("duration_s: 1.0e+308, torque_Nm: 1e-9"),
         r"phases\[0\].duration_s: found 1e\+308, allowed is at least 1e-06 and at most 1e\+09 s",
     ),
+    (
+        "gripper: {left: {damping_Nms_per_rad: 1e-20}}",
+        r"gripper.left.damping_Nms_per_rad: makes the arm's quality factor 6.63e\+09, allowed is",
+    ),
+    (
+        drop("assumed_gripper: {left: {damping_Nms_per_rad: 1e-20}}"),
+        r"assumed_gripper.left.damping_Nms_per_rad: makes the arm's quality factor 6.63e\+09",
+    ),
     (phase("duration_s: 1e-308, torque_Nm: 1e-9"), r"duration_s: found 1e-308, allowed is at leas"),
     (phase(f"duration_s: {'9' * 90}, torque_Nm: 1e-9"), r"duration_s: found 9+\.\.\., allowed is"),
     (
@@ -294,6 +302,12 @@ USABLE = {
 @pytest.mark.parametrize("name", USABLE)
 def test_what_is_unusual_but_clear_works(tmp_path: Path, name: str) -> None:
     assert load(written(tmp_path, USABLE[name])).seeds == 90
+
+
+@pytest.mark.parametrize("name", ["calibration", "recorded", "robustness"])
+def test_the_studies_laid_over_the_paper_s_load(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert load(ROOT / "config" / f"{name}.yaml").cases
 
 
 def test_an_empty_config_changes_nothing(tmp_path: Path) -> None:

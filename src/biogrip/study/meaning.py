@@ -15,6 +15,7 @@ Problem = tuple[KeyPath, str]
 
 _LONGEST_S = 1e9
 _LEAST_PARAMETER = 1e-18
+_LARGEST_QUALITY = 1e6
 _MOST_SAMPLES = 10_000_000
 _MOST_PERIODS = 10_000
 _DRIVING = (
@@ -174,6 +175,7 @@ def _phase_problems(path: KeyPath, phases: list[Mapping[str, Any]]) -> Iterator[
 def _gripper_problems(
     path: KeyPath, case: Mapping[str, Any], actuator: Mapping[str, Any]
 ) -> Iterator[Problem]:
+    yield from arm_problems((*path, "gripper"), case["gripper"])
     assumed = case.get("assumed_gripper", {})
     if isinstance(assumed, str):
         if assumed != "calibrated":
@@ -186,6 +188,16 @@ def _gripper_problems(
             build.contact_of(case["gripper"], actuator, case["sample"]["size_m"])
         except BiogripError as error:
             yield (*path, "sample", "size_m"), str(error)
+
+
+def arm_problems(path: KeyPath, gripper: Mapping[str, Any]) -> Iterator[Problem]:
+    """Find arms that ring for so long that their decay is lost in rounding."""
+    built = build.gripper(gripper)
+    for side, arm in (("left", built.left), ("right", built.right)):
+        if arm.quality_factor > _LARGEST_QUALITY:
+            text = f"makes the arm's quality factor {arm.quality_factor:.3g}, "
+            allowed = f"allowed is at most {_LARGEST_QUALITY:g}."
+            yield (*path, side, "damping_Nms_per_rad"), text + allowed
 
 
 def _calibration_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:

@@ -17,7 +17,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.identify.methods import METHODS
 from biogrip.recordings import nearest_unit
 from biogrip.sample import MODELS, MOST_BRANCHES
-from biogrip.study.meaning import Problem, meaning_problems, workflow_problems
+from biogrip.study.meaning import Problem, arm_problems, meaning_problems, workflow_problems
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweeps import placed, point_blocks, sweep_problems
 from biogrip.study.yaml_text import LONGEST_NUMBER
@@ -174,8 +174,9 @@ def _assumed_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     for name, case in config["cases"].items():
         assumed = case.get("assumed_gripper")
         if isinstance(assumed, Mapping):
-            errors = validator.iter_errors(overlaid(case["gripper"], assumed))
-            yield from _explained(errors, ("cases", name, "assumed_gripper"))
+            path, believed = ("cases", name, "assumed_gripper"), overlaid(case["gripper"], assumed)
+            odd = list(_explained(validator.iter_errors(believed), path))
+            yield from odd or arm_problems(path, believed)
 
 
 def value_problem(key: KeyPath, value: Any) -> str | None:
