@@ -15,8 +15,8 @@ from benchmarks.section import Row, Section, number
 from benchmarks.setup import POPULATION, Problem, problem
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array
-from biogrip.figures.style import BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
 from biogrip.identify.genetic import evolve
+from biogrip.products.figures.style import BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
 
 _ROUNDS = 5
 _POPULATIONS = (16, 64, 250, 1000, 4000, 16000)
@@ -104,7 +104,7 @@ def _seeds() -> list[Row]:
             evolve(p.misfit(), p.genome, p.genetic, np.random.default_rng(seed))
 
     row = _row("seeds", _OURS, {count: partial(identify, count) for count in _SEEDS}, rounds=1)
-    command = [sys.executable, "-c", "import biogrip.stages.identification"]
+    command = [sys.executable, "-c", "import biogrip.products.stages.identification"]
     started = [clocked(partial(subprocess.run, command, check=True))[0] for _ in range(_ROUNDS)]
     start_ms = 1e3 * float(np.median(started))
     sizes = [_SEEDS[0], _SEEDS[-1]]

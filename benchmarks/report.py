@@ -14,8 +14,8 @@ from benchmarks.nonlinear import nonlinear_section
 from benchmarks.optimum import optimum_section
 from benchmarks.section import Section, markdown, number
 from benchmarks.timing import clocked
-from biogrip.figures.style import styled
 from biogrip.files import write_text, written_whole
+from biogrip.products.figures.style import styled
 
 RESULTS = Path(__file__).parent / "results"
 

@@ -15,13 +15,12 @@ from biogrip.identify.genetic import settings_of as genetic_settings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
 from biogrip.identify.problem import problem_of
-from biogrip.measurement import Noise, add_noise, rms
-from biogrip.protocol import TorqueHistory, sample_times
+from biogrip.measurement import add_noise, rms
+from biogrip.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import misfit_of
 from biogrip.sample import SampleModel, model_named
-from biogrip.study import build
-from biogrip.study.config import load_study
+from biogrip.study.load import load_study
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 CASE = "endothelial_cell"
@@ -103,16 +102,14 @@ def problem(
     """
     study = load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG])
     chosen = study.cases[case]
-    measurement = chosen.blocks["measurement"]
-    gripper = build.gripper(chosen.blocks["gripper"])
-    steps = build.torque({"protocol": chosen.blocks["protocol"]})
-    time_s = sample_times(steps.end_s, rate_Hz or measurement["rate_Hz"])
-    own = model_named(chosen.model.name)
+    gripper, steps = chosen.gripper, torque_history(chosen.phases)
+    time_s = sample_times(steps.end_s, rate_Hz or chosen.sampling.rate_Hz)
+    own = chosen.sample.model
     truth = np.array([chosen.parameters[name] for name in own.names])
     clean = rotation(step_response(gripper, own.network(truth)), steps, time_s)[0]
-    trace = add_noise(clean, Noise(**measurement["noise"]), np.random.default_rng(seed))
-    model = model_named(chosen.model.name, branches)
-    ranges = build.gene_ranges(chosen.blocks["search_range"])
+    trace = add_noise(clean, chosen.noise, np.random.default_rng(seed))
+    model = model_named(chosen.sample.name, branches)
+    ranges = chosen.ranges
     return Problem(
         gripper,
         model,
@@ -123,6 +120,6 @@ def problem(
         rms(trace - clean),
         ranges,
         genome_of(model, ranges),
-        genetic_settings(chosen.blocks),
-        chosen.blocks,
+        genetic_settings(chosen.block),
+        chosen.block,
     )

@@ -150,7 +150,7 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.study.one_trace import (
+    from biogrip.one_trace import (
         Wanted,
         check_output,
         check_trace_file,

@@ -8,24 +8,25 @@ from pathlib import Path
 from typing import Any
 
 from biogrip import __version__
+from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.document import diagnosis_data, rounded
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import identifier
+from biogrip.products.files.traces import Measurements
+from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
 from biogrip.response.nuisance import nuisance_basis, within
 from biogrip.response.simulation import simulated_rotation
 from biogrip.sample import MODELS
-from biogrip.stages.recording import read_checked
-from biogrip.study.case_problem import CaseProblem, case_problem
-from biogrip.study.config import load_study, read_configs
 from biogrip.study.defaults import default_config
-from biogrip.study.plan import Plan
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import Study
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.study.validation import value_problem
-from biogrip.traces import Measurements
 
 _OPTIONS = {
     "time": "--time",
@@ -113,16 +114,16 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     BiogripError
         With file, line and column or key, if trace or config cannot be used.
     """
-    plan = _plan(wanted)
-    (case,) = plan.study.cases
-    recorded = read_checked(json.loads(plan.recording(case)), wanted.trace)
-    settings = json.loads(plan.identifiability(case))
-    posed = case_problem(settings)
+    study = _study(wanted)
+    (case,) = study.cases.values()
+    recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
+    settings, posed = judgement.settings_of(study, case), case.problem
     problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
     progress = Progress(str(wanted.trace), 1)
-    rng = stream(settings["study_seed"], case, 0, "identifiability")
-    found = identifier("least_squares", settings)(problem, rng, progress.within)
-    confidence = settings["confidence"]
+    rng = stream(study.study_seed, case.name, 0, "identifiability")
+    identify = identifier("least_squares", settings.least_squares)
+    found = identify(problem, rng, progress.within)
+    confidence = case.confidence
     told = diagnose(
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
     )
@@ -173,7 +174,7 @@ def in_words(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _plan(wanted: Wanted) -> Plan:
+def _study(wanted: Wanted) -> Study:
     check_trace_file(wanted.trace)
     for key, value in wanted.measurement.items():
         if problem := value_problem(("measurement", key), value):
@@ -187,8 +188,7 @@ def _plan(wanted: Wanted) -> Plan:
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.measurement, "file": str(wanted.trace)}
     merged["cases"] = {case: {"sample": {"model": wanted.model}, "measurement": measurement}}
-    study = load_study(merged, files, command_line=["cases"], for_workflow=False)
-    return Plan(study, Path("results"))
+    return load_study(merged, files, command_line=["cases"], for_workflow=False)
 
 
 def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Any) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identifiability.document import rounded
+from biogrip.digits import rounded
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identify.local_fit import FAIR, local_fit
 from biogrip.sample import SampleModel, with_fixed

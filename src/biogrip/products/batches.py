@@ -6,9 +6,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-MOST_FILES = 500
-"""Batches of a case, over all methods: one command names them all, and has room for 128 KiB."""
-
 _SMALLEST, _LARGEST = 25, 1000
 _BATCHES = 20
 
@@ -62,19 +59,13 @@ def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) ->
     return plan + _cut(covered, seeds, batch_size)
 
 
-def seeds_a_batch(seeds: int, methods: int = 1) -> int:
+def seeds_a_batch(seeds: int) -> int:
     """Size of the batches of a case where the study does not say.
 
     Enough that starting a job is little beside its work and that there are not
     too many jobs to plan, and no more than fit into little memory.
     """
-    wanted = min(max(_SMALLEST, -(-seeds // _BATCHES)), _LARGEST)
-    return max(wanted, smallest_batch(seeds, methods))
-
-
-def smallest_batch(seeds: int, methods: int) -> int:
-    """Fewest seeds in a batch with which a case has no more than `MOST_FILES`."""
-    return -(-seeds // (MOST_FILES // methods))
+    return min(max(_SMALLEST, -(-seeds // _BATCHES)), _LARGEST)
 
 
 def existing_batches(folder: Path) -> list[Batch]:

@@ -51,9 +51,7 @@ def _product(name: str) -> Product:
 
 
 def _declared(module: object) -> list[Product]:
-    found: list[Product] = []
-    for value in vars(module).values():
-        for item in value if isinstance(value, tuple) else (value,):
-            if isinstance(item, Product) and item.module == getattr(module, "__name__", ""):
-                found.append(item)
-    return found
+    values = vars(module).values()
+    items = [item for v in values for item in (v if isinstance(v, tuple) else (v,))]
+    own = getattr(module, "__name__", "")
+    return [item for item in items if isinstance(item, Product) and item.module == own]

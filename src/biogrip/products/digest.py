@@ -29,7 +29,9 @@ def digest(settings: object) -> str:
 def _plain(value: object) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return [
-            [field.name, _plain(getattr(value, field.name))] for field in fields(value) if field.init
+            [field.name, _plain(getattr(value, field.name))]
+            for field in fields(value)
+            if field.init
         ]
     if isinstance(value, Mapping):
         return [[str(key), _plain(inner)] for key, inner in value.items()]

@@ -12,8 +12,8 @@ from pathlib import Path
 from types import FrameType
 
 from biogrip.errors import BiogripError
-from biogrip.study.config import load_study, read_configs
 from biogrip.study.defaults import default_config, snakefile
+from biogrip.study.load import load_study, read_configs
 
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SHOWN = 6

@@ -1,14 +1,11 @@
 """From config files to a checked study."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from biogrip.sample import SampleModel
-from biogrip.study import build
 from biogrip.study.source import overlaid, read_config, read_places
-from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
+from biogrip.study.study import Study
 from biogrip.study.validation import OVERRIDABLE, check, with_numbers
 
 

@@ -7,7 +7,6 @@ from typing import Any
 from biogrip.errors import BiogripError, nearest
 from biogrip.sample import Parameter, SampleModel
 from biogrip.study import build
-from biogrip.study.batches import smallest_batch
 from biogrip.study.source import KeyPath
 from biogrip.study.trace_file import trace_file_problem
 
@@ -57,11 +56,6 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     for index, key in enumerate(config["reconstructed"]):
         if not _exists(config, key):
             yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
-    size, methods = config.get("batch_size"), len(config["methods"])
-    least = smallest_batch(config["seeds"], methods)
-    if size is not None and size < least:
-        text = f"found {size}, which makes too many files for one command; allowed is at least "
-        yield ("batch_size",), f"{text}{least} with {config['seeds']} seeds, {methods} methods."
 
 
 def workflow_problems(config: Mapping[str, Any]) -> Iterator[Problem]:

@@ -113,8 +113,8 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
 COMB = drawing(
     draw,
     name="comb",
-    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest; (c) its "
-    "torque against voltage, eq. (9), with the protocol's operating points.",
+    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest; "
+    "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
     settings=settings,
     sheet="input_figures",
 )

@@ -24,6 +24,7 @@ def drawing(
     draw: Callable[..., Figure],
     *,
     name: str,
+    file: str = "",
     caption: str,
     settings: Callable[..., object],
     reads: Mapping[str, Reads] | None = None,
@@ -40,7 +41,9 @@ def drawing(
     draw
         Draws it from its settings and, by keyword, from the files of `reads`.
     name
-        Its name; of a case's figure, the case follows in the file.
+        Its name.
+    file
+        Name of its file, if that is another; of a case's figure, the case follows.
     caption
         What the report says of it.
     settings
@@ -58,7 +61,8 @@ def drawing(
     weight
         How heavy its job is.
     """
-    path = f"results/figures/{name}" + ("_{case}" if cases else "_{sweep}" if sweeps else "")
+    whose = "{case}" if cases else "{sweep}" if sweeps else ""
+    path = f"results/figures/{file or name}" + (f"_{whose}" if whose else "")
 
     def jobs(plan: Plan) -> list[Wildcards]:
         if not when(plan.study):
@@ -83,11 +87,11 @@ def drawing(
         saved,
         chosen,
         jobs,
-        message=f"Drawing {name}" + (" of {case}" if cases else " of {sweep}" if sweeps else ""),
+        message=f"Drawing {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight,
         sheet=sheet,
         category="Figures",
-        item=name,
+        item=file or name,
         caption=caption,
     )

@@ -81,8 +81,9 @@ def draw(
 FIT = drawing(
     draw,
     name="fit",
-    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and the best fit of "
-    "all seeds, and below what the fit leaves of the measurement (points) and of the target (line).",
+    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and the best fit "
+    "of all seeds, and below what the fit leaves of the measurement (points) and of the target "
+    "(line).",
     settings=settings,
     reads={
         "identifications": the(PATH),

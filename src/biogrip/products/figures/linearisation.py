@@ -88,7 +88,8 @@ def _traces(axes: Axes, protocol: TorqueHistory, truth: Truth, gripper: Gripper)
 
 LINEARISATION_MAP = drawing(
     draw,
-    name="linearisation",
+    name="linearisation_map",
+    file="linearisation",
     caption=CAPTION,
     settings=settings,
     reads={"differences": the(DIFFERENCES.path)},

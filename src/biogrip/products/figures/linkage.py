@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
+from biogrip.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
-from biogrip.gripper import Gripper
 
 # Section 2: the largest sample the gripper is made for; the model itself needs no size.
 _SAMPLE_M = 120e-6
@@ -172,8 +172,8 @@ def _damper(axes: Axes, x0: float, x1: float, y: float, label: str) -> None:
 LINKAGE = drawing(
     draw,
     name="linkage",
-    caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample of "
-    "120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) the constitutive "
+    caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
+    "of 120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) the constitutive "
     "models. Arm length and angle are those of the config; in the default study they are "
     "reconstructed.",
     settings=lambda study: study.gripper,

@@ -13,7 +13,14 @@ from biogrip.arrays import Array
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.success import at_noise_floor
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import SHOWN_SEEDS, Fit, best_fit, first_seeds, scale_of, seeds_in_words
+from biogrip.products.figures.results import (
+    SHOWN_SEEDS,
+    Fit,
+    best_fit,
+    first_seeds,
+    scale_of,
+    seeds_in_words,
+)
 from biogrip.products.figures.style import (
     ALL_SEEDS,
     FITTED,
@@ -222,15 +229,13 @@ def _first(study: Study) -> str:
 OVERVIEW = drawing(
     draw,
     name="overview",
-    caption="(a) Target, noisy measurement and best fit of the first case. (b to d) Identified over "
-    "target value of every seed of the first three cases, for each parameter and for c + c_p; "
+    caption="(a) Target, noisy measurement and best fit of the first case. (b to d) Identified "
+    "over target value of every seed of the first three cases, for each parameter and for c + c_p; "
     "values off the axis are drawn at its edge.",
     settings=settings,
     reads={
         "identifications": of_cases(PATH, shown_cases),
-        "measurements": Reads(
-            lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))
-        ),
+        "measurements": Reads(lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))),
         "calibrated": Reads(
             lambda plan, _: calibration_of().files(plan, {"case": _first(plan.study)})
         ),

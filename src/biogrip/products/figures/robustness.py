@@ -11,9 +11,9 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
+from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
-from biogrip.identify.methods import METHODS
 from biogrip.products.heat_maps import (
     CAPTION,
     HeatMaps,
@@ -111,9 +111,7 @@ def _grid(maps: HeatMaps, points: pd.DataFrame, column: str) -> Array:
     return found
 
 
-def _heat_map(
-    axes: Axes, maps: HeatMaps, values: Array, norm: Normalize, colours: str
-) -> None:
+def _heat_map(axes: Axes, maps: HeatMaps, values: Array, norm: Normalize, colours: str) -> None:
     axes.set_facecolor(_WITHOUT_BOUND)
     axes.pcolormesh(values, norm=norm, cmap=colours, edgecolors="white", linewidth=0.5)
     for axis, set_ticks in (("rows", axes.set_yticks), ("columns", axes.set_xticks)):
@@ -163,7 +161,8 @@ def _symbol(quantity: str) -> str:
 
 ROBUSTNESS_MAP = drawing(
     draw,
-    name="robustness",
+    name="robustness_map",
+    file="robustness",
     caption=CAPTION,
     settings=heat_maps,
     reads={"points": points_of_cases()},

@@ -12,6 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
+from biogrip.identifiability.fisher import bound
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS
+from biogrip.measurement import Noise, standard_deviation
+from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.products.figures.style import (
     METHOD_STYLES,
@@ -22,12 +28,6 @@ from biogrip.products.figures.style import (
     figure,
     panel,
 )
-from biogrip.identifiability.fisher import bound
-from biogrip.identifiability.quantities import Quantity, parameters_and_sum
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS
-from biogrip.measurement import Noise, standard_deviation
-from biogrip.products.figures.declared import drawing
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import the

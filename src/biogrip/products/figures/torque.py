@@ -1,7 +1,7 @@
 """Figure 3: the torque that the comb drives exert, and the voltage it takes."""
 
-from itertools import pairwise
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.figure import Figure

@@ -1,5 +1,6 @@
 """What was identified, how it was found, and what it took: a row a seed, method by method."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -73,7 +74,7 @@ class Record:
     seed: int
     model: SampleModel
     searched: SampleModel
-    fixed: dict[str, float]
+    fixed: Mapping[str, float]
     answer: Identification
     noise_rms_rad: float | None
     cpu_s: float

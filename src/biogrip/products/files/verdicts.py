@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from biogrip.digits import rounded
 from biogrip.errors import BiogripError
 
 if TYPE_CHECKING:
@@ -14,9 +15,6 @@ if TYPE_CHECKING:
 
 PATH = "results/identifiability/{case}.json"
 EXPECTED = "results/identifiability/expected/{case}.json"
-
-# Far more than is determined, far fewer than those in which processors differ.
-_DIGITS = 5
 
 
 def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
@@ -55,11 +53,6 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     if not {"quantities", "trades", "notes"} <= set(found):
         raise BiogripError(f"{path}: holds no verdicts.")
     return found
-
-
-def rounded(value: float | None) -> float | None:
-    """Return a number to five significant digits."""
-    return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
 def _finding(finding: "Finding") -> dict[str, Any]:

@@ -108,7 +108,9 @@ def estimate(
     """
     posed = settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    INTERVALS.write(intervals, _rows(settings, posed, seeds, time_s, rotation, _determined(expected)))
+    INTERVALS.write(
+        intervals, _rows(settings, posed, seeds, time_s, rotation, _determined(expected))
+    )
 
 
 def _rows(

@@ -56,7 +56,10 @@ def joined(
 JOINED = (
     joined("all_times", TIMINGS, lambda plan: plan.study.cases, lambda case: case.seeds),
     joined(
-        "all_intervals", INTERVALS, lambda plan: plan.study.covered, lambda case: case.coverage_seeds
+        "all_intervals",
+        INTERVALS,
+        lambda plan: plan.study.covered,
+        lambda case: case.coverage_seeds,
     ),
     joined(
         "all_model_fits",

@@ -80,9 +80,7 @@ def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
     return ExpectedSettings(**vars(judged), parameters=case.parameters, noise=case.noise)
 
 
-def judge(
-    settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path
-) -> None:
+def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Judge the trace of the first seed, identified by least squares.
 
     Parameters

@@ -149,9 +149,7 @@ def _succeeded(
     return at_noise_floor(found, settings.noise_floor_tolerance)
 
 
-def _resolution_rad(
-    problem: CaseProblem, parameters: Mapping[str, float], time_s: Array
-) -> float:
+def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
     """RMS misfit, without noise, of the encodable parameters that are nearest to the truth."""
     truth = [parameters[p.name] for p in problem.model.parameters]
     rounded = [

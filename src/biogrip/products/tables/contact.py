@@ -35,9 +35,7 @@ def contacts(settings: Settings) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):
         try:
-            found = contact(
-                settings.gripper, settings.jaw_gap_m, settings.actuator, 1e-6 * size_um
-            )
+            found = contact(settings.gripper, settings.jaw_gap_m, settings.actuator, 1e-6 * size_um)
         except BiogripError as error:
             rows.append((float(size_um), None, None, None, None, str(error)))
             continue

@@ -53,7 +53,8 @@ def table(
     stem
         Path but for the ending.
     """
-    path = stem.format(name=name) + ("_{case}" if cases else "_{sweep}" if sweeps else "")
+    whose = "{case}" if cases else "{sweep}" if sweeps else ""
+    path = stem.format(name=name) + (f"_{whose}" if whose else "")
 
     def jobs(plan: Plan) -> list[Wildcards]:
         if not when(plan.study):
@@ -79,7 +80,7 @@ def table(
         written,
         chosen,
         jobs,
-        message=f"Writing the table {name}" + (" of {case}" if cases else " of {sweep}" if sweeps else ""),
+        message=f"Writing the table {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight,
         sheet=sheet,

@@ -71,9 +71,7 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
         for quantity in truth.model.quantities
     )
     rows: list[tuple[Cell, ...]] = []
-    for (name, (truth, samples)), path in zip(
-        settings.cases.items(), identifications, strict=True
-    ):
+    for (name, (truth, samples)), path in zip(settings.cases.items(), identifications, strict=True):
         found = read_identifications(path)
         rise = chi_square_rise(found, samples)
         for method in found["method"].unique():

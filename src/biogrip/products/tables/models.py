@@ -27,9 +27,7 @@ _COLUMNS = (
 
 def settings(study: Study) -> dict[str, str | None]:
     """Name the sample models that made the traces, by case; None of a recorded one."""
-    return {
-        name: None if case.recorded else case.sample.name for name, case in study.cases.items()
-    }
+    return {name: None if case.recorded else case.sample.name for name, case in study.cases.items()}
 
 
 def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:

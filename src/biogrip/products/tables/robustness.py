@@ -14,6 +14,7 @@ from biogrip.products.heat_maps import (
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 
+
 def robustness(maps: HeatMaps, points: list[Path]) -> Table:
     """Put together the sweep over all its cases.
 

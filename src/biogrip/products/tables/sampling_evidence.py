@@ -9,10 +9,10 @@ from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.measurement import Noise
-from biogrip.protocol import sample_times
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.protocol import sample_times
 from biogrip.study.study import Study, Truth
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
