@@ -129,9 +129,9 @@ def modes_of(
         weight_slopes.append(change / (rates * slope) - weight * steepening)
     return Modes(
         rates,
-        np.stack(weights, axis=1),
-        np.moveaxis(rate_slopes, 0, 1),
-        np.moveaxis(np.stack(weight_slopes, axis=1), 2, 0),
+        np.array(weights).swapaxes(0, 1),
+        rate_slopes.swapaxes(0, 1),
+        np.array(weight_slopes).transpose(2, 1, 0, 3),
     )
 
 
