@@ -88,7 +88,10 @@ class ModeRows:
         scale_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
         place_slopes = scale_slopes / (_WIDTH * (1 + scaled))[:, None]
         # Now (n, n_modes, n_drives), and (n, n_parameters, n_modes, n_drives).
-        weights, weight_slopes = modes.weights.swapaxes(-1, -2), modes.weight_slopes.swapaxes(-1, -2)
+        weights, weight_slopes = (
+            modes.weights.swapaxes(-1, -2),
+            modes.weight_slopes.swapaxes(-1, -2),
+        )
         amplitudes = weights * scale[..., None]
         amplitude_slopes = weight_slopes * scale[:, None, :, None]
         amplitude_slopes += weights[:, None] * scale_slopes[..., None]
