@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.many_fits import ManyFits
 
 
@@ -64,7 +65,28 @@ class HeldFits:
             self._fits.high,
             self._residuals.duration_s,
         )
-        found = self._fits.fitted(near, trace, tolerance, held=held)
+        return self._rises(self._fits.fitted(near, trace, tolerance, held=held), trace)
+
+    def with_fixed(
+        self, trace: IntArray, x: Array, fixed: BoolArray, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Fit with some parameters fixed; returns as `at`.
+
+        Parameters
+        ----------
+        trace : (n,)
+            Which trace is fitted.
+        x : (n, n_parameters)
+            Log-parameters to start from.
+        fixed : (n, n_parameters)
+            Which of them stay, be they within the search range or not.
+        tolerance
+            Of the fits, see `local_fit`.
+        """
+        low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
+        return self._rises(self._fits.fitted(x, trace, tolerance, low=low, high=high), trace)
+
+    def _rises(self, found: Minima, trace: IntArray) -> tuple[Array, Array]:
         excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
         return self._residuals.samples * excess / self._noise_rad[trace] ** 2, found.x
 

@@ -67,7 +67,13 @@ def many_limits(
     closed = np.flatnonzero(np.isfinite(ends[1]))
     limits = np.full(len(trace), np.nan)
     brackets = Brackets(
-        trace[closed], which[closed], *ends[:, closed], *rises[:, closed], near[closed]
+        trace[closed],
+        which[closed],
+        ends[0, closed],
+        ends[1, closed],
+        rises[0, closed],
+        rises[1, closed],
+        near[closed],
     )
     limits[closed] = crossings(fits, brackets, tolerance, accuracy)
     return limits.reshape(shape)

@@ -1,9 +1,8 @@
 """Profiles of all quantities of many traces at once.
 
-`biogrip.identifiability.profile.profile` for a batch. Outwards, each point is
-fitted from its neighbour's fit, in all profiles at the same time. Then every point
-is fitted from its outer neighbour's fit, again and again where that one has become
-better, so that a basin which is lower further out is followed inwards.
+`biogrip.identifiability.profile.profile` for a batch. All points are fitted from the
+optimum at once, then from the fits of both neighbours, again and again where these
+have become better: what is a basin anywhere in a profile is followed both ways.
 """
 
 from collections.abc import Sequence
@@ -15,10 +14,10 @@ from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.profile import Likelihood, Profile, grid_of
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import FINE
+from biogrip.identify.local_fit import FAIR, FINE
 
 _ACCURACY = 1e-5
-# Chi^2 by which a neighbour's fit must lead further down to be news to the next.
+# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
 _NEWS = 1e-3
 
 
@@ -43,22 +42,22 @@ def many_profiles(
     shape = (len(likelihoods), len(quantities))
     trace, which = (index.ravel() for index in np.indices(shape))
     grids = [grid_of(likelihood, quantity) for likelihood in likelihoods for quantity in quantities]
-    count = np.array([len(grid) for grid in grids])
     # Profiles side by side, (n_profiles, n_points), short ones filled up.
-    values = np.full((len(grids), count.max()), np.nan)
+    values = np.full((len(grids), max(len(grid) for grid in grids)), np.nan)
     for profile, grid in enumerate(grids):
         values[profile, : len(grid)] = grid
     starts = fits.at_best().ravel()
     middle = np.argmax(values == starts[:, None], axis=1)
     done = _Points(fits, trace, which, values)
-    _outwards(done, middle, count)
-    _inwards(done, middle, count)
-    closed, crossed = _crossed(likelihoods, done, count)
+    done.rises[np.arange(len(grids)), middle] = 0.0
+    _from_optimum(done, middle)
+    _from_neighbours(done, middle)
+    closed, crossed = _crossed(likelihoods, done)
     return [
         [
             Profile(
                 grids[index],
-                done.rises[index, : count[index]],
+                done.rises[index, : len(grids[index])],
                 float(starts[index]),
                 float(crossed[0, index]) if closed[0, index] else None,
                 float(crossed[1, index]) if closed[1, index] else None,
@@ -74,60 +73,60 @@ class _Points:
 
     def __init__(self, fits: HeldFits, trace: IntArray, which: IntArray, values: Array) -> None:
         self.fits, self.trace, self.which, self.values = fits, trace, which, values
-        self.rises = np.zeros_like(values)
+        self.count = np.sum(np.isfinite(values), axis=1)
+        self.rises = np.where(np.isfinite(values), np.inf, np.nan)
         self.x = np.repeat(fits.best[trace][:, None], values.shape[1], axis=1)
 
-    def fit(self, profile: IntArray, point: IntArray, neighbour: IntArray) -> tuple[Array, Array]:
-        """Fit points from their neighbours' fits: rises, (n,), and log-parameters."""
-        return self.fits.at(
+    def try_from(
+        self, profile: IntArray, point: IntArray, start: IntArray, tolerance: float
+    ) -> BoolArray:
+        """Fit points from other points' fits; tell which have become much better."""
+        rises, x = self.fits.at(
             self.trace[profile],
             self.which[profile],
             self.values[profile, point],
-            self.x[profile, neighbour],
-            FINE,
+            self.x[profile, start],
+            tolerance,
         )
+        news = np.zeros(self.values.shape, dtype=bool)
+        # A point may be fitted from both sides, so one side after the other.
+        for side in (point <= start, point > start):
+            here = profile[side], point[side]
+            before, after = self.rises[here], rises[side]
+            news[here] |= after < before - _NEWS * (1 + after)
+            better = after < before
+            at = here[0][better], here[1][better]
+            self.rises[at], self.x[at] = after[better], x[side][better]
+        return news
 
 
-def _outwards(points: _Points, middle: IntArray, count: IntArray) -> None:
-    """Fit every point from the neighbour that is closer to the optimum."""
-    for distance in range(1, points.values.shape[1]):
-        ahead, behind = middle + distance < count, middle - distance >= 0
-        profile = np.concatenate((np.flatnonzero(ahead), np.flatnonzero(behind)))
-        sense = np.repeat((1, -1), (np.sum(ahead), np.sum(behind)))
-        point = middle[profile] + sense * distance
-        if not len(profile):
-            break
-        rises, x = points.fit(profile, point, point - sense)
-        points.rises[profile, point], points.x[profile, point] = rises, x
-
-
-def _inwards(points: _Points, middle: IntArray, count: IntArray) -> None:
-    """Fit points from the neighbour that is further out, as long as that is of use."""
+def _from_optimum(points: _Points, middle: IntArray) -> None:
+    """Fit every point but the optimum from the optimum."""
     profile, point = np.nonzero(np.isfinite(points.values))
-    sense = np.sign(point - middle[profile])
-    neighbour = point + sense
-    chosen = (sense != 0) & (neighbour >= 0) & (neighbour < count[profile])
-    while np.any(chosen):
-        profile, point, sense = profile[chosen], point[chosen], sense[chosen]
-        rises, x = points.fit(profile, point, point + sense)
-        before = points.rises[profile, point]
-        better = rises < before
-        points.rises[profile[better], point[better]] = rises[better]
-        points.x[profile[better], point[better]] = x[better]
-        # Who is next inwards of those that are much better, and not the optimum itself.
-        point = point - sense
-        chosen = (rises < before - _NEWS) & (point != middle[profile])
+    profile, point = (index[point != middle[profile]] for index in (profile, point))
+    points.try_from(profile, point, middle[profile], FAIR)
 
 
-def _crossed(
-    likelihoods: Sequence[Likelihood], points: _Points, count: IntArray
-) -> tuple[BoolArray, Array]:
-    """Which ends of the profiles are closed, and where they cross the threshold, (2, n_profiles)."""
+def _from_neighbours(points: _Points, middle: IntArray) -> None:
+    """Fit points from their neighbours' fits, as long as these are news."""
+    news = np.isfinite(points.values)
+    while np.any(news):
+        profile, neighbour = (np.tile(index, 2) for index in np.nonzero(news))
+        point = neighbour + np.repeat((-1, 1), len(neighbour) // 2)
+        to_fit = (point >= 0) & (point < points.count[profile]) & (point != middle[profile])
+        profile, point, neighbour = profile[to_fit], point[to_fit], neighbour[to_fit]
+        news = points.try_from(profile, point, neighbour, FINE)
+
+
+def _crossed(likelihoods: Sequence[Likelihood], points: _Points) -> tuple[BoolArray, Array]:
+    """Which ends of profiles are closed, (2, n_profiles), and where these cross the threshold."""
     threshold = points.fits.threshold[points.trace]
-    certainty = np.array([max(each.certainty, each.threshold) for each in likelihoods])[points.trace]
-    everyone = np.arange(len(count))
+    certainty = np.array([max(each.certainty, each.threshold) for each in likelihoods])[
+        points.trace
+    ]
+    everyone = np.arange(len(points.count))
     closed = np.stack(
-        (points.rises[:, 0] > certainty, points.rises[everyone, count - 1] > certainty)
+        (points.rises[:, 0] > certainty, points.rises[everyone, points.count - 1] > certainty)
     )
     below = (points.rises < threshold[:, None]) & np.isfinite(points.values)
     first = np.argmax(below, axis=1)

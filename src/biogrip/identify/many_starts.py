@@ -54,8 +54,8 @@ def best_of_many_starts(
     winners = np.concatenate([_best(fine, trace[finalists] == own, 1) for own in traces])
     best = settled(fits, fine.of(winners), traces)
     answers = []
-    for own in traces:
-        rows = _descents(rough.of(np.flatnonzero(trace == own)), before[own])
+    for own, first_row in enumerate(before):
+        rows = _descents(rough.of(np.flatnonzero(trace == own)), first_row)
         finished = fine.evaluations[trace[finalists] == own].sum() + best.evaluations[own]
         misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
