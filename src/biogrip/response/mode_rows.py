@@ -17,15 +17,26 @@ from numpy.polynomial import chebyshev
 
 from biogrip.arrays import Array
 from biogrip.protocol import TorqueHistory
+from biogrip.response.decay_table import DEGREE, WIDTH
 from biogrip.response.sensitivity import Modes, responses_of_modes
 
-# The error of a piece is 3e-15 of what is tabulated, see `decay_table`.
-_WIDTH, _DEGREE = 1 / 64, 5
+# As in `decay_table`, wide pieces of high degree need the fewest rates, short ones of low degree
+# are the fastest to look up: the latter's error is 3e-15 of what is tabulated.
+_SHORTER, _DEGREE = 16, 5
+_WIDTH = WIDTH / _SHORTER
 _ORDERS = np.arange(_DEGREE + 1)
 # exp(-40) is lost in rounding; under a ramp, something is left that falls with the rate.
 _DECAYED, _DECAYED_UNDER_RAMPS = 40.0, 1e12
-# Numbers formed at once.
-_AT_ONCE = 2_000_000
+
+_WIDE_NODES = 0.5 + 0.5 * chebyshev.chebpts1(DEGREE + 1)
+# On a short piece from -1/2 to 1/2.
+_SHORT_NODES = 0.5 * chebyshev.chebpts1(_DEGREE + 1)
+_DIVIDED = (np.arange(_SHORTER)[:, None] + 0.5 + _SHORT_NODES).ravel() / _SHORTER
+_TO_SHORT = np.linalg.solve(
+    chebyshev.chebvander(2 * _WIDE_NODES - 1, DEGREE).T,
+    chebyshev.chebvander(2 * _DIVIDED - 1, DEGREE).T,
+).T
+_TO_POWERS = np.linalg.inv(np.vander(_SHORT_NODES, increasing=True))
 
 
 class ModeRows:
@@ -49,19 +60,17 @@ class ModeRows:
         self._end_s = float(time_s[-1])
         self._drives, self._rows = 1 if torque.symmetric else 2, to_rows.shape[1]
         decayed = _DECAYED if torque.only_steps else _DECAYED_UNDER_RAMPS
-        self._last = np.ceil(np.log1p(decayed * self._end_s / shortest_s) / _WIDTH)
-        nodes = 0.5 * chebyshev.chebpts1(_DEGREE + 1)
-        to_powers = np.linalg.inv(np.vander(nodes, increasing=True))
-        pieces = np.arange(self._last)
+        wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / WIDTH))
+        self._last = wide * _SHORTER
         # (n_pieces, n_drives, degree + 1, n_rows).
-        self._table = np.empty((len(pieces), self._drives, len(nodes), self._rows))
-        chunks = -(-len(pieces) * len(nodes) * self._drives * len(time_s) // _AT_ONCE)
-        for chunk in np.array_split(np.arange(len(pieces)), chunks):
-            u = _WIDTH * (pieces[chunk, None] + 0.5 + nodes).ravel()
+        self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
+        for piece in range(wide):
+            u = WIDTH * (piece + _WIDE_NODES)
             growth, _ = responses_of_modes(-np.expm1(u) / self._end_s, torque, time_s)
             values = (growth / np.expm1(u)[:, None]) @ to_rows
-            by_piece = values.reshape(self._drives, len(chunk), len(nodes), self._rows)
-            self._table[chunk] = to_powers @ by_piece.swapaxes(0, 1)
+            short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
+            here = slice(piece * _SHORTER, (piece + 1) * _SHORTER)
+            self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
 
     def __call__(self, modes: Modes) -> Array:
         """Rows of responses and of their derivatives.
