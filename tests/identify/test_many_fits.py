@@ -13,6 +13,7 @@ from biogrip.identify.answer import Identification
 from biogrip.identify.levenberg_marquardt import Normal, bounded_step
 from biogrip.identify.local_fit import FINE, ROUGH, local_fit
 from biogrip.identify.many_fits import ManyFits, fit_together
+from biogrip.identify.multi_start import screened
 from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.identify.settling import settled
 from biogrip.measurement import Noise, add_noise
@@ -64,14 +65,17 @@ def starts_of(problem: Problem, count: int) -> Array:
 
 
 @pytest.mark.parametrize("case", SAMPLES)
-def test_about_as_many_starts_reach_the_optimum_as_with_scipy(case: str) -> None:
+def test_the_best_of_the_study_s_starts_is_that_of_scipy(case: str) -> None:
+    """And not much fewer of them lead there; in 600 traces of each case none did in none."""
     (problem,) = of_case(case, 1)
-    starts = starts_of(problem, 30)
-    many = ManyFits([problem]).fitted(starts, np.zeros(30, dtype=np.int64), ROUGH).misfit_rad
+    starts = screened(problem.misfit, starts_of(problem, SETTINGS.candidates))[0][: SETTINGS.starts]
+    trace = np.zeros(len(starts), dtype=np.int64)
+    many = ManyFits([problem]).fitted(starts, trace, ROUGH).misfit_rad
     one = np.array([local_fit(problem, start, ROUGH).misfit_rad for start in starts])
-    samples, best = problem.residuals.samples, min(many.min(), one.min())
-    reached = [np.sum(samples * ((found / best) ** 2 - 1) < 1) for found in (many, one)]
-    assert reached[0] >= 0.8 * reached[1]
+    rises = problem.residuals.samples * ((np.stack((many, one)) / one.min()) ** 2 - 1)
+    assert rises[0].min() < 0.1
+    reached = np.sum(rises < 1, axis=1)
+    assert reached[0] >= 0.7 * reached[1]
 
 
 @pytest.mark.parametrize("case", SAMPLES)

@@ -154,7 +154,7 @@ class HeldQuantities:
         others = np.where(basic, 0.0, powers)
         of_product = (target - np.sum(others * x, axis=1, keepdims=True)) * powers
         taken = np.sum(np.abs(others) * np.exp(sense * (x - target)), axis=1, keepdims=True)
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
         return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
 
