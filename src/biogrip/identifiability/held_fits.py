@@ -11,6 +11,12 @@ from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.many_fits import ManyFits
 
+CLOSE = 1e-7
+"""Tolerance of fits whose chi^2, of some thousand samples, is to be known to 0.001.
+
+Along a valley, a fit to the last digit takes three times as many steps.
+"""
+
 
 class HeldFits:
     """Fits of any of a number of traces with any of a number of quantities held.

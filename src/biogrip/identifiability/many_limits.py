@@ -10,10 +10,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.identifiability.crossings import Brackets, crossings
-from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import FINE
 
 # Limits to a thousandth of a standard deviation.
 _ACCURACY = 1e-3
@@ -24,7 +23,7 @@ _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
 def many_limits(
     likelihoods: Sequence[Likelihood],
     quantities: Sequence[Quantity],
-    tolerance: float = FINE,
+    tolerance: float = CLOSE,
     accuracy: float = _ACCURACY,
 ) -> Array:
     """Find where the rise of chi^2 equals the threshold.

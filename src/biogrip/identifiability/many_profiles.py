@@ -11,7 +11,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.crossings import Brackets, crossings
-from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.profile import Likelihood, Profile, grid_of
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fit import FAIR, FINE
@@ -115,7 +115,7 @@ def _from_neighbours(points: _Points, middle: IntArray) -> None:
         point = neighbour + np.repeat((-1, 1), len(neighbour) // 2)
         to_fit = (point >= 0) & (point < points.count[profile]) & (point != middle[profile])
         profile, point, neighbour = profile[to_fit], point[to_fit], neighbour[to_fit]
-        news = points.try_from(profile, point, neighbour, FINE)
+        news = points.try_from(profile, point, neighbour, CLOSE)
 
 
 def _crossed(likelihoods: Sequence[Likelihood], points: _Points) -> tuple[BoolArray, Array]:
