@@ -26,8 +26,8 @@ class Brackets:
         Logarithms of the quantity below and above the threshold, on either side of each other.
     inside_rise, outside_rise : (n,)
         Rises of chi^2 there.
-    near : (n, n_parameters)
-        The fit inside.
+    inside_x, outside_x : (n, n_parameters)
+        Log-parameters fitted there.
     """
 
     trace: IntArray
@@ -36,7 +36,8 @@ class Brackets:
     outside: Array
     inside_rise: Array
     outside_rise: Array
-    near: Array
+    inside_x: Array
+    outside_x: Array
 
 
 def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: float) -> Array:
@@ -58,10 +59,11 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
     (n,)
         Logarithms of the quantities.
     """
-    trace, which, near = brackets.trace, brackets.which, brackets.near.copy()
+    trace, which = brackets.trace, brackets.which
     wanted = np.sqrt(fits.threshold[trace])
     # Inside and outside, by row.
     ends = np.stack((brackets.inside, brackets.outside))
+    x = np.stack((brackets.inside_x, brackets.outside_x))
     excess = np.sqrt(np.maximum((brackets.inside_rise, brackets.outside_rise), 0.0)) - wanted
     moved = np.full(len(trace), -1)
     found = ends[1].copy()
@@ -71,12 +73,12 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
         tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
-        rises, fitted = fits.at(trace[left], which[left], tried, near[left], tolerance)
+        near = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
+        rises, fitted = fits.at(trace[left], which[left], tried, near, tolerance)
         over = np.sqrt(np.maximum(rises, 0.0)) - wanted[left]
         found[left] = tried
         side = (over > 0).astype(np.int64)
-        ends[side, left], excess[side, left] = tried, over
-        near[left] = np.where(side[:, None] == 0, fitted, near[left])
+        ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
         # An end that stays a second time counts half, so that it moves, too.
         again = moved[left] == side
         excess[1 - side[again], left[again]] *= 0.5

@@ -51,16 +51,15 @@ def many_limits(
     stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[trace, which]
     # Inside and outside, by row.
     ends = np.stack((fits.at_best()[trace, which], np.full(len(trace), np.nan)))
-    rises, near = np.zeros_like(ends), fits.best[trace]
+    rises, x = np.zeros_like(ends), np.stack((fits.best[trace], fits.best[trace]))
     left = np.arange(len(trace))
     for _ in range(_MOST_DOUBLINGS):
         if not len(left):
             break
         tried = np.clip(ends[0, left] + stride[left], low[left], high[left])
-        rise, found = fits.at(trace[left], which[left], tried, near[left], tolerance)
+        rise, found = fits.at(trace[left], which[left], tried, x[0, left], tolerance)
         side = (rise >= fits.threshold[trace[left]]).astype(np.int64)
-        ends[side, left], rises[side, left] = tried, rise
-        near[left] = np.where(side[:, None] == 0, found, near[left])
+        ends[side, left], rises[side, left], x[side, left] = tried, rise, found
         stride[left] *= 2
         left = left[(side == 0) & (tried > low[left]) & (tried < high[left])]
     closed = np.flatnonzero(np.isfinite(ends[1]))
@@ -72,7 +71,8 @@ def many_limits(
         ends[1, closed],
         rises[0, closed],
         rises[1, closed],
-        near[closed],
+        x[0, closed],
+        x[1, closed],
     )
     limits[closed] = crossings(fits, brackets, tolerance, accuracy)
     return limits.reshape(shape)

@@ -142,6 +142,7 @@ def _crossed(likelihoods: Sequence[Likelihood], points: _Points) -> tuple[BoolAr
         points.rises[profile, inside],
         points.rises[profile, outside],
         points.x[profile, inside],
+        points.x[profile, outside],
     )
     crossed = np.full(closed.shape, np.nan)
     crossed[end, profile] = crossings(points.fits, brackets, FINE, _ACCURACY)
