@@ -12,6 +12,7 @@ from biogrip.arrays import Array, IntArray
 from biogrip.identifiability.held_fits import HeldFits
 
 _MOST_FITS = 40
+_CLOSEST = 1e-7
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,15 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
         tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
-        near = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
-        rises, fitted = fits.at(trace[left], which[left], tried, near, tolerance)
+        # The fits of the two ends may lie in different basins: what counts is the deeper one.
+        between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
+        starts = np.concatenate((between, x[0, left], x[1, left]))
+        all_rises, all_fitted = fits.at(
+            np.tile(trace[left], 3), np.tile(which[left], 3), np.tile(tried, 3), starts, tolerance
+        )
+        all_rises, all_fitted = all_rises.reshape(3, -1), all_fitted.reshape(3, len(left), -1)
+        deepest = np.argmin(all_rises, axis=0)
+        rises, fitted = all_rises[deepest, range(len(left))], all_fitted[deepest, range(len(left))]
         over = np.sqrt(np.maximum(rises, 0.0)) - wanted[left]
         found[left] = tried
         side = (over > 0).astype(np.int64)
@@ -83,5 +91,7 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         again = moved[left] == side
         excess[1 - side[again], left[again]] *= 0.5
         moved[left] = side
-        left = left[np.abs(over) > accuracy]
+        # Where a deeper basin begins the rise may jump past the threshold.
+        apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
+        left = left[(np.abs(over) > accuracy) & apart]
     return found
