@@ -140,14 +140,7 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     back again, so that a basin which is lower further out is followed inwards.
     """
     fits = _Held(likelihood, quantity, _EXACT)
-    low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
-    start = quantity.log(likelihood.best)
-    near = start + likelihood.deviation(quantity) * _NEAR
-    grid = np.unique(
-        np.concatenate(
-            ([start], near[(near > low) & (near < high)], np.linspace(low, high, _POINTS))
-        )
-    )
+    start, grid = quantity.log(likelihood.best), grid_of(likelihood, quantity)
     middle = int(np.searchsorted(grid, start))
     outwards = [(i, i - 1) for i in range(middle + 1, len(grid))]
     outwards += [(i, i + 1) for i in range(middle - 1, -1, -1)]
@@ -169,6 +162,18 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
         start,
         fits.crossing(grid, done, first, first - 1) if rises[0] > certainty else None,
         fits.crossing(grid, done, last, last + 1) if rises[-1] > certainty else None,
+    )
+
+
+def grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
+    """Values over a quantity's whole range, ascending: its best, denser near by, and both ends."""
+    low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
+    start = quantity.log(likelihood.best)
+    near = start + likelihood.deviation(quantity) * _NEAR
+    return np.unique(
+        np.concatenate(
+            ([start], near[(near > low) & (near < high)], np.linspace(low, high, _POINTS))
+        )
     )
 
 

@@ -4,15 +4,17 @@ The last survivors crowd in one basin. The survivors of the initial population
 are still everywhere, so local fits start from the best of both.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.identify import genetic
 from biogrip.identify.answer import History, Identification, Progress, silent
-from biogrip.identify.multi_start import best_of_starts
+from biogrip.identify.many_starts import best_of_many_starts
+from biogrip.identify.multi_start import Row, best_of_starts
 from biogrip.identify.problem import Problem
 
 
@@ -59,6 +61,45 @@ def identify(
     progress
         Is told after every generation and every fit.
     """
+    coarse, starts, before = _evolved(problem, settings, rng, progress)
+    return _polished(coarse, best_of_starts(problem, starts, before, progress))
+
+
+def identify_many(
+    problems: Sequence[Problem],
+    settings: RefinedSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify many traces, each as if it were alone; all are polished at once.
+
+    Parameters
+    ----------
+    problems
+        What is identified, one a trace.
+    settings
+        The budget of each.
+    rngs
+        A source of randomness for each.
+    progress
+        Is told after every generation, and in the end once for every trace.
+    """
+    evolved = [
+        _evolved(problem, settings, rng, progress)
+        for problem, rng in zip(problems, rngs, strict=True)
+    ]
+    coarse, starts, before = zip(*evolved, strict=True)
+    fine = best_of_many_starts(problems, starts, before, progress)
+    return [_polished(*both) for both in zip(coarse, fine, strict=True)]
+
+
+def _evolved(
+    problem: Problem,
+    settings: RefinedSettings,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[Identification, Array, Row]:
+    """Return what the genetic algorithm finds, the fits' starts, and their history's first row."""
     evolution = genetic.evolve(problem.misfit, problem.genome, settings.genetic, rng, progress)
     coarse = evolution.identification
     starts = np.concatenate(
@@ -69,7 +110,10 @@ def identify(
     )
     median = float(coarse.history.median_misfit[-1])
     before = coarse.parameters, coarse.misfit_rad, median, coarse.evaluations
-    fine = best_of_starts(problem, np.log(starts), before, progress)
+    return coarse, np.log(starts), before
+
+
+def _polished(coarse: Identification, fine: Identification) -> Identification:
     return Identification(
         fine.parameters,
         fine.misfit_rad,

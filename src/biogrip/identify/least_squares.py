@@ -1,14 +1,16 @@
 """Bounded multi-start least squares on log-parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification, Progress, silent
-from biogrip.identify.multi_start import best_of_starts, screened
+from biogrip.identify.many_starts import best_of_many_starts
+from biogrip.identify.multi_start import Row, best_of_starts, screened
 from biogrip.identify.problem import Problem
 
 
@@ -57,6 +59,45 @@ def identify(
     BiogripError
         If the model has no answer at any of the points.
     """
+    starts, before = _screened(problem, settings, rng)
+    return best_of_starts(problem, starts, before, progress)
+
+
+def identify_many(
+    problems: Sequence[Problem],
+    settings: LeastSquaresSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify many traces at once, each as if it were alone; a step is a fit.
+
+    Parameters
+    ----------
+    problems
+        What is identified, one a trace.
+    settings
+        The budget of each.
+    rngs
+        A source of randomness for each.
+    progress
+        Is told after every trace.
+
+    Raises
+    ------
+    BiogripError
+        If the model has no answer at any of the points.
+    """
+    screened_points = [
+        _screened(problem, settings, rng) for problem, rng in zip(problems, rngs, strict=True)
+    ]
+    starts, before = zip(*screened_points, strict=True)
+    return best_of_many_starts(problems, starts, before, progress)
+
+
+def _screened(
+    problem: Problem, settings: LeastSquaresSettings, rng: np.random.Generator
+) -> tuple[Array, Row]:
+    """Starting points, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
     points, misfit = screened(problem.misfit, rng.uniform(problem.low, problem.high, shape))
     if not len(points):
@@ -65,4 +106,4 @@ def identify(
             "allowed are smaller torques, or the linear model."
         )
     before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), settings.candidates
-    return best_of_starts(problem, points[: settings.starts], before, progress)
+    return points[: settings.starts], before

@@ -9,9 +9,11 @@ from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.local_fit import ROUGH, LocalFit, local_fit, settled
 from biogrip.identify.problem import Problem
 
-_FINISHED = 4
+FINISHED = 4
+"""Of the rough fits, so many of the best are finished."""
 
 Row = tuple[Array, float, float, int]
+"""Of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
 def best_of_starts(
@@ -46,11 +48,16 @@ def best_of_starts(
         progress(evaluations, rows[-1][1])
     # Which basin is deepest shows before its bottom is reached; only the best are worth that.
     found = [
-        local_fit(problem, rough.log_parameters) for rough in sorted(found, key=_rank)[:_FINISHED]
+        local_fit(problem, rough.log_parameters) for rough in sorted(found, key=_rank)[:FINISHED]
     ]
     best = settled(problem, min(found, key=_rank))
     evaluations += sum(fine.evaluations for fine in found) + best.evaluations
     rows[-1] = _row([best], evaluations)
+    return answer_of(rows)
+
+
+def answer_of(rows: list[Row]) -> Identification:
+    """Return the last row of a history as the answer."""
     parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
     history = History(
         np.array(best_misfit),
@@ -60,9 +67,9 @@ def best_of_starts(
     )
     return Identification(
         history.best_parameters[-1],
-        best.misfit_rad,
+        best_misfit[-1],
         len(rows) - 1,
-        evaluations,
+        counts[-1],
         "all starts fitted",
         history,
     )

@@ -14,6 +14,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.protocol import TorqueHistory
+from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
 
@@ -73,6 +74,14 @@ class Condensed:
             self._span[self._chosen].T, (without(self.nuisance, self._span.T) @ self._basis)
         )
         return np.pad(matrix, ((0, 0), (0, 1)))
+
+    @cached_property
+    def of_modes(self) -> ModeRows:
+        """Rows of the responses of many samples at once."""
+        events_s = [start for start, *_ in (*self._torque.jumps, *self._torque.swings)]
+        elapsed = np.subtract.outer(self.time_s, events_s)
+        shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
+        return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
     def _span(self) -> Array:

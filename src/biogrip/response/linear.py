@@ -281,8 +281,8 @@ def partial_fractions(transfer: TransferFunctions, rates: NDArray[Any]) -> StepR
 
 
 def evaluate(coefficients: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
-    """Polynomials in ascending powers, shape (n, terms), at z of shape (n, n_points)."""
-    value = np.zeros_like(z, dtype=np.result_type(coefficients, z))
-    for coefficient in coefficients.T[::-1]:
-        value = value * z + coefficient[:, None]
+    """Polynomials in ascending powers, shape (..., n, terms), at z of shape (n, n_points)."""
+    value: NDArray[Any] = np.zeros(1)
+    for term in range(coefficients.shape[-1])[::-1]:
+        value = value * z + coefficients[..., term, None]
     return value

@@ -10,7 +10,7 @@ from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
 from biogrip.response.condensed import MOST_SAMPLES, Condensed
 from biogrip.response.nuisance import without
-from biogrip.response.sensitivity import rotation_and_sensitivity
+from biogrip.response.sensitivity import modes_of, rotation_and_sensitivity
 from biogrip.sample import SampleModel
 
 
@@ -104,15 +104,44 @@ class Residuals:
         slopes : (n_parameters, n_rows)
             In rad.
         """
-        if self._nonlinear or self.samples > MOST_SAMPLES:
+        if not self.condensable:
             return self(log_parameters)
         rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
         to_rows = self._condensed.to_rows
-        return rotation @ to_rows - self._condensed_trace, sensitivity @ to_rows
+        return rotation @ to_rows - self.condensed_trace, sensitivity @ to_rows
+
+    @property
+    def condensable(self) -> bool:
+        """Whether few rows may stand for all samples."""
+        return not self._nonlinear and self.samples <= MOST_SAMPLES
 
     @cached_property
-    def _condensed_trace(self) -> Array:
+    def condensed_trace(self) -> Array:
+        """Rows of the trace, (n_rows,) in rad."""
         return self._condensed.of_trace(self._rotation_rad)
+
+    def condensed_responses(self, log_parameters: Array) -> Array:
+        """Rows of the responses of many samples, the same as of `condensed` before the trace's.
+
+        Parameters
+        ----------
+        log_parameters : (n, n_parameters)
+            Natural logarithms of the parameters in SI units.
+
+        Returns
+        -------
+        (n, 1 + n_parameters, n_rows)
+            In rad; first the response, then its derivatives by the log-parameters.
+        """
+        modes = modes_of(self._gripper, self._model, self._torque, np.exp(log_parameters))
+        return self._condensed.of_modes(modes)
+
+    def shares_responses(self, other: "Residuals") -> bool:
+        """Whether only the trace, and its noise, tell this from others."""
+        return self._assumed() == other._assumed() and self._condensed is other._condensed
+
+    def _assumed(self) -> tuple[object, ...]:
+        return self._gripper, self._model, self._nonlinear
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
         return rotation_and_sensitivity(

@@ -66,18 +66,20 @@ def roots(coefficients: Array) -> ComplexArray:
     z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
     off_diagonal = ~np.eye(degree, dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        settled = False
+        settled = resting = np.zeros((len(z), 1), dtype=bool)
         for _ in range(_SWEEPS):
             newton = _newton_step(coefficients, z)
             distance = z[:, :, None] - z[:, None, :]
             repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
-            step = np.where(np.isfinite(step), step, 0)
+            # What is done rests, so that its last bits do not depend on the other polynomials.
+            step = np.where(np.isfinite(step) & ~resting, step, 0)
             z = z - step
-            if settled:
+            if np.all(settled):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
-            settled = bool(np.all(np.abs(step) <= 1e-8 * np.abs(z)))
+            resting = settled
+            settled = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
     return separate(z)
 
 

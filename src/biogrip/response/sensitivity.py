@@ -2,15 +2,18 @@
 
 A parameter with a relative imaginary part of 1e-30 carries its derivative through
 the arithmetic of the transfer function without touching the real part (complex
-step); a pole's derivative is one Newton step of the tilted denominator from the
-untilted root. What is left are derivatives of exponentials in time, written out
-below, with no cancellation at either end.
+step). Poles, weights and exponentials in time are differentiated by hand, with no
+cancellation at either end. What is found for a sample does not depend, to the last
+bit, on which others are looked at with it.
 """
 
 from dataclasses import dataclass
 from functools import cache
+from itertools import permutations
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
 from biogrip.gripper import Gripper
@@ -18,7 +21,6 @@ from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import (
     LEFT,
     evaluate,
-    partial_fractions,
     phi_function,
     poles,
     slope_at_poles,
@@ -34,16 +36,16 @@ _STEP = 1e-3
 
 @dataclass(frozen=True)
 class Modes:
-    """Step response of one sample's left arm, and its derivatives by the log-parameters.
+    """Step responses of n samples' left arm, and their derivatives by the log-parameters.
 
     Parameters
     ----------
-    rates : (n_modes,)
+    rates : (n, n_modes)
         In 1/s, real and negative.
-    weights : (n_drives, n_modes)
+    weights : (n, n_drives, n_modes)
         In rad per N m.
-    rate_slopes : (n_parameters, n_modes)
-    weight_slopes : (n_parameters, n_drives, n_modes)
+    rate_slopes : (n, n_parameters, n_modes)
+    weight_slopes : (n, n_parameters, n_drives, n_modes)
     """
 
     rates: Array
@@ -81,8 +83,8 @@ def rotation_and_sensitivity(
     sensitivity : (n_parameters, n_times)
         In rad.
     """
-    modes = modes_of(gripper, model, torque, parameters)
-    phi, slopes = _mixed(modes, *responses_of_modes(modes.rates, torque, time_s))
+    modes = modes_of(gripper, model, torque, parameters[None])
+    phi, slopes = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s))
     if nonlinear:
         steps = _STEP * np.concatenate((np.zeros((1, len(parameters))), _both_ways(parameters)))
         found = correction(gripper, model.network(parameters * np.exp(steps)), torque, COARSE)
@@ -95,14 +97,48 @@ def rotation_and_sensitivity(
 def modes_of(
     gripper: Gripper, model: SampleModel, torque: TorqueHistory, parameters: Array
 ) -> Modes:
-    """Poles and weights of one sample without inertia, with their derivatives."""
-    tilted = parameters * _tilts(len(parameters))
+    """Poles and weights of samples without inertia, with their derivatives.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated.
+    parameters : (n, n_parameters)
+        All positive.
+    """
+    count = parameters.shape[1]
+    tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
     transfer = transfer_functions(gripper, model.network(tilted), symmetric=torque.symmetric)
-    real: Array = transfer.denominator[:1].real
-    rates = np.repeat(poles(real, real=True), len(tilted), axis=0)
-    newton = -evaluate(transfer.denominator, rates).imag / slope_at_poles(real, rates[:1])
-    weights = partial_fractions(transfer, rates + 1j * newton).weights[:, LEFT]
-    return Modes(rates[0], weights[0].real, newton[1:] / _TILT, weights[1:].imag / _TILT)
+    denominator, denominator_slopes = _untilted(transfer.denominator, count)
+    rates = poles(denominator, real=True)
+    slope = slope_at_poles(denominator, rates)
+    # A pole stays where the denominator is zero.
+    rate_slopes = -evaluate(denominator_slopes, rates) / slope
+    # Of log(p_j D'(p_j)), with D'(p_j) the leading coefficient times all p_j - p_i.
+    steepening = rate_slopes / rates + (denominator_slopes[..., -1] / denominator[:, -1])[..., None]
+    for i, j in permutations(range(rates.shape[1]), 2):
+        approach = rate_slopes[..., i] - rate_slopes[..., j]
+        steepening[..., i] += approach / (rates[:, i] - rates[:, j])
+    weights, weight_slopes = [], []
+    for row in transfer.numerators[LEFT]:
+        numerator, numerator_slopes = _untilted(row, count)
+        weight = evaluate(numerator, rates) / (rates * slope)
+        along = evaluate(numerator[:, 1:] * np.arange(1, numerator.shape[1]), rates)
+        change = evaluate(numerator_slopes, rates) + along * rate_slopes
+        weights.append(weight)
+        weight_slopes.append(change / (rates * slope) - weight * steepening)
+    return Modes(
+        rates,
+        np.array(weights).swapaxes(0, 1),
+        rate_slopes.swapaxes(0, 1),
+        np.array(weight_slopes).transpose(2, 1, 0, 3),
+    )
+
+
+def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
+    """Polynomials of n samples, (n, terms), and their derivatives, (n_parameters, n, terms)."""
+    of_tilts = coefficients.reshape(count + 1, -1, coefficients.shape[1])
+    return of_tilts[0].real, of_tilts[1:].imag / _TILT
 
 
 @cache
@@ -155,9 +191,9 @@ def responses_of_modes(rates: Array, torque: TorqueHistory, time_s: Array) -> tu
 
 def _mixed(modes: Modes, growth: Array, slope: Array) -> tuple[Array, Array]:
     """Weigh what the modes do; d(w g) = dw g + w dr dg/dr."""
-    weights, times = modes.weights, growth.shape[-1]
-    slanted = weights * modes.rate_slopes[:, None]
-    by_growth = np.concatenate((weights[None], modes.weight_slopes))
+    weights, times = modes.weights[0], growth.shape[-1]
+    slanted = weights * modes.rate_slopes[0][:, None]
+    by_growth = np.concatenate((weights[None], modes.weight_slopes[0]))
     by_slope = np.concatenate((np.zeros_like(weights)[None], slanted))
     both = np.concatenate(
         (by_growth.reshape(len(by_growth), -1), by_slope.reshape(len(by_slope), -1)), axis=1

@@ -1,0 +1,173 @@
+"""Quantities held exactly at given values, in many fits at once.
+
+One member of a quantity is eliminated: it follows from the others and the value
+(generalized reduced gradients, Abadie & Carpentier 1969). It is the member that
+dominates the quantity, chosen anew at every step among those that are not at a
+bound: eliminating another, a small step would throw it far. A stiff residual in
+its place would yield to the trace, the more the better the trace knows.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.levenberg_marquardt import Normal
+
+HINGE = 10.0
+"""A branch may relax within twice the experiment at the price of chi^2 rising by some 50."""
+
+# E-folds from a bound at which a member counts as free, and by which rounding may take it over.
+_FREE, _ROUNDING = 1e-9, 1e-7
+# Of members at a bound, for the choice of the one that is eliminated.
+_UNWILLING = 1e-9
+_SMALLEST = 1e-200
+
+
+class HeldQuantities:
+    """What holds each of n fits.
+
+    Parameters
+    ----------
+    quantities
+        Any number of them.
+    which : (n,)
+        Which of them each fit is held to.
+    targets : (n,)
+        And at which logarithm, within the quantity's range.
+    low, high : (n_parameters,)
+        Bounds of the log-parameters.
+    longest_s
+        Time within which branches have to relax for quantities that ask for it.
+    """
+
+    def __init__(
+        self,
+        quantities: Sequence[Quantity],
+        which: IntArray,
+        targets: Array,
+        low: Array,
+        high: Array,
+        longest_s: float,
+    ) -> None:
+        self._which, self._targets = which, targets
+        self._low, self._high = low, high
+        self._longest = float(np.log(longest_s))
+        self._powers = np.zeros((len(quantities), len(low)))
+        most = max(len(quantity.branches) for quantity in quantities)
+        self._relaxing = np.zeros((len(quantities), most, len(low)))
+        for index, quantity in enumerate(quantities):
+            self._powers[index, list(quantity.members)] = quantity.sign
+            for branch, (spring, damper) in enumerate(quantity.branches):
+                self._relaxing[index, branch, [damper, spring]] = 1.0, -1.0
+        senses = {"product": 0.0, "sum": 1.0, "series": -1.0}
+        self._senses = np.array([senses[quantity.form] for quantity in quantities])
+        self._most_members = max(len(quantity.members) for quantity in quantities)
+
+    def started(self, x: Array) -> Array:
+        """Move points, (n, n_parameters), to where the quantities have their values."""
+        everyone = np.arange(len(x))
+        powers, sense = self._form(everyone)
+        by = (self._targets - self._log(x, everyone))[:, None]
+        first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
+        moved = x + by * np.where(sense == 0, powers * first, powers)
+        moved = np.clip(moved, self._low, self._high)
+        restored = self.restored(moved, everyone, self._dominant(moved, everyone))
+        if np.any(np.isnan(restored)):
+            raise ValueError("a quantity is to be held outside its range")
+        return restored
+
+    def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
+        """Normal equations with residuals for branches that do not relax in time."""
+        relaxing = self._relaxing[self._which[fit]]
+        if not relaxing.size:
+            return normal
+        beyond = np.sum(relaxing * x[:, None], axis=2) - self._longest
+        late = (beyond > 0) & np.any(relaxing != 0, axis=2)
+        beyond = np.where(late, HINGE * beyond, 0.0)
+        slopes = HINGE * relaxing * late[:, :, None]
+        return replace(
+            normal,
+            square_sum=normal.square_sum + np.sum(beyond**2, axis=1),
+            gradient=normal.gradient + np.sum(beyond[:, :, None] * slopes, axis=1),
+            information=normal.information + slopes.swapaxes(1, 2) @ slopes,
+        )
+
+    def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
+        """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
+        basic = self._dominant(x, fit)
+        slopes = self._slopes(x, fit)
+        # Of the eliminated parameter by the others, with a minus; by itself 1.
+        ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
+        pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
+        across = np.sum(normal.information * basic[:, :, None], axis=1)
+        along = np.sum(across * basic, axis=1)[:, None, None]
+        outer = ratio[:, :, None] * across[:, None, :]
+        information = normal.information - outer - outer.swapaxes(1, 2)
+        information += along * (ratio[:, :, None] * ratio[:, None, :])
+        left_out = basic[:, :, None] | basic[:, None, :]
+        gradient = np.where(basic, 0.0, normal.gradient - pull * ratio)
+        information = np.where(left_out, np.eye(x.shape[1]), information)
+        return replace(normal, gradient=gradient, information=information), basic
+
+    def restored(self, x: Array, fit: IntArray, eliminated: BoolArray) -> Array:
+        """Points, (n, n_parameters), with the relation restored; NaN if bounds forbid that."""
+        x, basic, tried = x.copy(), eliminated, eliminated.copy()
+        left = np.arange(len(x))
+        for _ in range(self._most_members):
+            value = self._followed(x[left], fit[left], basic)
+            inside = np.clip(value, self._low, self._high)
+            x[left] = np.where(basic, inside, x[left])
+            reached = np.any(basic & (np.abs(value - inside) <= _ROUNDING), axis=1)
+            left = left[~reached]
+            if not len(left):
+                return x
+            # That one stays at its bound, and the next has to follow.
+            basic = self._dominant(x[left], fit[left], tried[left])
+            tried[left] |= basic
+        x[left] = np.nan
+        return x
+
+    def _dominant(self, x: Array, fit: IntArray, tried: BoolArray | None = None) -> BoolArray:
+        """Mark the member to eliminate, none if all have been tried."""
+        weight = np.abs(self._slopes(x, fit))
+        free = (x > self._low + _FREE) & (x < self._high - _FREE)
+        weight = np.where(free, weight, _UNWILLING * weight)
+        if tried is not None:
+            weight = np.where(tried, 0.0, weight)
+        chosen = np.argmax(weight, axis=1)[:, None] == np.arange(x.shape[1])
+        marked: BoolArray = chosen & (weight > 0)
+        return marked
+
+    def _slopes(self, x: Array, fit: IntArray) -> Array:
+        """Derivatives of the quantities' logarithms by the log-parameters, where they hold."""
+        powers, sense = self._form(fit)
+        shares = np.exp(np.minimum(sense * (x - self._targets[fit][:, None]), 0.0))
+        return np.where(sense == 0, powers, np.maximum(shares, _SMALLEST) * (powers != 0))
+
+    def _followed(self, x: Array, fit: IntArray, basic: BoolArray) -> Array:
+        """Values of the members marked at which the quantities have theirs; infinite beyond."""
+        powers, sense = self._form(fit)
+        target = self._targets[fit][:, None]
+        others = np.where(basic, 0.0, powers)
+        of_product = (target - np.sum(others * x, axis=1, keepdims=True)) * powers
+        taken = np.sum(np.abs(others) * np.exp(sense * (x - target)), axis=1, keepdims=True)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
+        return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
+
+    def _log(self, x: Array, fit: IntArray) -> Array:
+        """Logarithms of the quantities, (n,)."""
+        powers, sense = self._form(fit)
+        member = powers != 0
+        largest = np.max(np.where(member, sense * x, -np.inf), axis=1, keepdims=True)
+        terms = np.where(member, np.exp(np.minimum(sense * x - largest, 0.0)), 0.0)
+        of_sum = sense[:, 0] * (largest[:, 0] + np.log(np.sum(terms, axis=1)))
+        return np.where(sense[:, 0] == 0, np.sum(powers * x, axis=1), of_sum)
+
+    def _form(self, fit: IntArray) -> tuple[Array, Array]:
+        """Powers of the members, (n, n_parameters), and the sense of each sum, (n, 1)."""
+        which = self._which[fit]
+        return self._powers[which], self._senses[which][:, None]

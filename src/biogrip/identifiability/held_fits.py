@@ -1,0 +1,121 @@
+"""Rises of chi^2 with quantities held exactly, for many traces, quantities and values at once."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identifiability.held import HeldQuantities
+from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.levenberg_marquardt import Minima
+from biogrip.identify.many_fits import ManyFits
+
+CLOSE = 1e-7
+"""Tolerance of fits whose chi^2, of some thousand samples, is to be known to 0.001.
+
+Along a valley, a fit to the last digit takes three times as many steps.
+"""
+
+
+class HeldFits:
+    """Fits of any of a number of traces with any of a number of quantities held.
+
+    Parameters
+    ----------
+    likelihoods
+        One a trace; with their problems `fit_together` has to agree.
+    quantities
+        What may be held.
+    """
+
+    def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
+        problems = [likelihood.problem for likelihood in likelihoods]
+        self.quantities = quantities
+        self.best = np.stack([likelihood.best for likelihood in likelihoods])
+        self.threshold = np.array([likelihood.threshold for likelihood in likelihoods])
+        self._fits = ManyFits(problems)
+        self._residuals = problems[0].residuals
+        self._misfit_rad = np.array([likelihood.misfit_rad for likelihood in likelihoods])
+        self._noise_rad = np.array([likelihood.noise_rad for likelihood in likelihoods])
+        self._scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+
+    def at(
+        self, trace: IntArray, which: IntArray, targets: Array, near: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Fit with quantities held.
+
+        Parameters
+        ----------
+        trace, which : (n,)
+            Which trace is fitted, and which quantity held.
+        targets : (n,)
+            Logarithms at which the quantities are held, within their ranges.
+        near : (n, n_parameters)
+            Log-parameters to start from; moved to where the quantities have their values.
+        tolerance
+            Of the fits, see `local_fit`.
+
+        Returns
+        -------
+        rises : (n,)
+            Of chi^2 over each trace's optimum.
+        log_parameters : (n, n_parameters)
+            Where the quantities have their values to rounding.
+        """
+        held = HeldQuantities(
+            self.quantities,
+            which,
+            targets,
+            self._fits.low,
+            self._fits.high,
+            self._residuals.duration_s,
+        )
+        return self._rises(self._fits.fitted(near, trace, tolerance, held=held), trace)
+
+    def with_fixed(
+        self, trace: IntArray, x: Array, fixed: BoolArray, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Fit with some parameters fixed; returns as `at`.
+
+        Parameters
+        ----------
+        trace : (n,)
+            Which trace is fitted.
+        x : (n, n_parameters)
+            Log-parameters to start from.
+        fixed : (n, n_parameters)
+            Which of them stay, be they within the search range or not.
+        tolerance
+            Of the fits, see `local_fit`.
+        """
+        low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
+        return self._rises(self._fits.fitted(x, trace, tolerance, low=low, high=high), trace)
+
+    def _rises(self, found: Minima, trace: IntArray) -> tuple[Array, Array]:
+        excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
+        return self._residuals.samples * excess / self._noise_rad[trace] ** 2, found.x
+
+    def ranges(self) -> tuple[Array, Array]:
+        """Lowest and highest logarithm of each quantity, (n_quantities,) each."""
+        ends = [quantity.range(self._fits.low, self._fits.high) for quantity in self.quantities]
+        low, high = np.array(ends).T
+        return low, high
+
+    def at_best(self) -> Array:
+        """Logarithms of the quantities at the optima, (n_traces, n_quantities)."""
+        return np.array([[quantity.log(x) for quantity in self.quantities] for x in self.best])
+
+    def deviations(self) -> Array:
+        """Standard deviations of the logarithms to first order, at most 1.
+
+        Returns
+        -------
+        (n_traces, n_quantities)
+        """
+        information = self._fits.normal(self.best, np.arange(len(self.best))).information
+        information = information * ((self._scale_rad / self._noise_rad) ** 2)[:, None, None]
+        slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self.best])
+        # The prior keeps this regular.
+        spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)
+        return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0))

@@ -1,0 +1,78 @@
+"""Confidence limits of the optimum's own basin, for all quantities of many traces at once.
+
+`biogrip.identifiability.profile.limits_near` for a batch. To the last bit, the
+limits for a trace do not depend on which others there are.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.crossings import Brackets, crossings
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
+from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.quantities import Quantity
+
+# Limits to a thousandth of a standard deviation.
+_ACCURACY = 1e-3
+# The first step outwards, in standard deviations, and how often it may double.
+_FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
+
+
+def many_limits(
+    likelihoods: Sequence[Likelihood],
+    quantities: Sequence[Quantity],
+    tolerance: float = CLOSE,
+    accuracy: float = _ACCURACY,
+) -> Array:
+    """Find where the rise of chi^2 equals the threshold.
+
+    Parameters
+    ----------
+    likelihoods
+        One a trace.
+    quantities
+        Whose limits are wanted.
+    tolerance
+        Of the fits, see `local_fit`.
+    accuracy
+        Of the square root of the rise.
+
+    Returns
+    -------
+    (n_traces, n_quantities, 2)
+        Logarithms of the lower and upper limits; NaN where the trace does not close the profile.
+    """
+    fits = HeldFits(likelihoods, quantities)
+    shape = (len(likelihoods), len(quantities), 2)
+    trace, which, upper = (index.ravel() for index in np.indices(shape))
+    low, high = (end[which] for end in fits.ranges())
+    stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[trace, which]
+    # Inside and outside, by row.
+    ends = np.stack((fits.at_best()[trace, which], np.full(len(trace), np.nan)))
+    rises, x = np.zeros_like(ends), np.stack((fits.best[trace], fits.best[trace]))
+    left = np.arange(len(trace))
+    for _ in range(_MOST_DOUBLINGS):
+        if not len(left):
+            break
+        tried = np.clip(ends[0, left] + stride[left], low[left], high[left])
+        rise, found = fits.at(trace[left], which[left], tried, x[0, left], tolerance)
+        side = (rise >= fits.threshold[trace[left]]).astype(np.int64)
+        ends[side, left], rises[side, left], x[side, left] = tried, rise, found
+        stride[left] *= 2
+        left = left[(side == 0) & (tried > low[left]) & (tried < high[left])]
+    closed = np.flatnonzero(np.isfinite(ends[1]))
+    limits = np.full(len(trace), np.nan)
+    brackets = Brackets(
+        trace[closed],
+        which[closed],
+        ends[0, closed],
+        ends[1, closed],
+        rises[0, closed],
+        rises[1, closed],
+        x[0, closed],
+        x[1, closed],
+    )
+    limits[closed] = crossings(fits, brackets, tolerance, accuracy)
+    return limits.reshape(shape)

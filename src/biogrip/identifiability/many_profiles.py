@@ -1,0 +1,149 @@
+"""Profiles of all quantities of many traces at once.
+
+`biogrip.identifiability.profile.profile` for a batch. All points are fitted from the
+optimum at once, then from the fits of both neighbours, again and again where these
+have become better: what is a basin anywhere in a profile is followed both ways.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identifiability.crossings import Brackets, crossings
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
+from biogrip.identifiability.profile import Likelihood, Profile, grid_of
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.local_fit import FAIR, FINE
+
+_ACCURACY = 1e-5
+# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
+_NEWS = 1e-3
+
+
+def many_profiles(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+) -> list[list[Profile]]:
+    """Follow quantities over their whole ranges, and find their confidence limits.
+
+    Parameters
+    ----------
+    likelihoods
+        One a trace.
+    quantities
+        Whose profiles are wanted.
+
+    Returns
+    -------
+    list of list of Profile
+        By trace, then by quantity.
+    """
+    fits = HeldFits(likelihoods, quantities)
+    shape = (len(likelihoods), len(quantities))
+    trace, which = (index.ravel() for index in np.indices(shape))
+    grids = [grid_of(likelihood, quantity) for likelihood in likelihoods for quantity in quantities]
+    # Profiles side by side, (n_profiles, n_points), short ones filled up.
+    values = np.full((len(grids), max(len(grid) for grid in grids)), np.nan)
+    for profile, grid in enumerate(grids):
+        values[profile, : len(grid)] = grid
+    starts = fits.at_best().ravel()
+    middle = np.argmax(values == starts[:, None], axis=1)
+    done = _Points(fits, trace, which, values)
+    done.rises[np.arange(len(grids)), middle] = 0.0
+    _from_optimum(done, middle)
+    _from_neighbours(done, middle)
+    closed, crossed = _crossed(likelihoods, done)
+    return [
+        [
+            Profile(
+                grids[index],
+                done.rises[index, : len(grids[index])],
+                float(starts[index]),
+                float(crossed[0, index]) if closed[0, index] else None,
+                float(crossed[1, index]) if closed[1, index] else None,
+            )
+            for index in range(t * shape[1], (t + 1) * shape[1])
+        ]
+        for t in range(shape[0])
+    ]
+
+
+class _Points:
+    """Points of profiles, (n_profiles, n_points), as far as they are fitted."""
+
+    def __init__(self, fits: HeldFits, trace: IntArray, which: IntArray, values: Array) -> None:
+        self.fits, self.trace, self.which, self.values = fits, trace, which, values
+        self.count = np.sum(np.isfinite(values), axis=1)
+        self.rises = np.where(np.isfinite(values), np.inf, np.nan)
+        self.x = np.repeat(fits.best[trace][:, None], values.shape[1], axis=1)
+
+    def try_from(
+        self, profile: IntArray, point: IntArray, start: IntArray, tolerance: float
+    ) -> BoolArray:
+        """Fit points from other points' fits; tell which have become much better."""
+        rises, x = self.fits.at(
+            self.trace[profile],
+            self.which[profile],
+            self.values[profile, point],
+            self.x[profile, start],
+            tolerance,
+        )
+        news = np.zeros(self.values.shape, dtype=bool)
+        # A point may be fitted from both sides, so one side after the other.
+        for side in (point <= start, point > start):
+            here = profile[side], point[side]
+            before, after = self.rises[here], rises[side]
+            news[here] |= after < before - _NEWS * (1 + after)
+            better = after < before
+            at = here[0][better], here[1][better]
+            self.rises[at], self.x[at] = after[better], x[side][better]
+        return news
+
+
+def _from_optimum(points: _Points, middle: IntArray) -> None:
+    """Fit every point but the optimum from the optimum."""
+    profile, point = np.nonzero(np.isfinite(points.values))
+    profile, point = (index[point != middle[profile]] for index in (profile, point))
+    points.try_from(profile, point, middle[profile], FAIR)
+
+
+def _from_neighbours(points: _Points, middle: IntArray) -> None:
+    """Fit points from their neighbours' fits, as long as these are news."""
+    news = np.isfinite(points.values)
+    while np.any(news):
+        profile, neighbour = (np.tile(index, 2) for index in np.nonzero(news))
+        point = neighbour + np.repeat((-1, 1), len(neighbour) // 2)
+        to_fit = (point >= 0) & (point < points.count[profile]) & (point != middle[profile])
+        profile, point, neighbour = profile[to_fit], point[to_fit], neighbour[to_fit]
+        news = points.try_from(profile, point, neighbour, CLOSE)
+
+
+def _crossed(likelihoods: Sequence[Likelihood], points: _Points) -> tuple[BoolArray, Array]:
+    """Which ends of profiles are closed, (2, n_profiles), and where these cross the threshold."""
+    threshold = points.fits.threshold[points.trace]
+    certainty = np.array([max(each.certainty, each.threshold) for each in likelihoods])[
+        points.trace
+    ]
+    everyone = np.arange(len(points.count))
+    closed = np.stack(
+        (points.rises[:, 0] > certainty, points.rises[everyone, points.count - 1] > certainty)
+    )
+    below = (points.rises < threshold[:, None]) & np.isfinite(points.values)
+    first = np.argmax(below, axis=1)
+    last = below.shape[1] - 1 - np.argmax(below[:, ::-1], axis=1)
+    end, profile = np.nonzero(closed)
+    inside = np.where(end == 0, first[profile], last[profile])
+    outside = np.where(end == 0, inside - 1, inside + 1)
+    brackets = Brackets(
+        points.trace[profile],
+        points.which[profile],
+        points.values[profile, inside],
+        points.values[profile, outside],
+        points.rises[profile, inside],
+        points.rises[profile, outside],
+        points.x[profile, inside],
+        points.x[profile, outside],
+    )
+    crossed = np.full(closed.shape, np.nan)
+    crossed[end, profile] = crossings(points.fits, brackets, FINE, _ACCURACY)
+    return closed, crossed

@@ -1,0 +1,290 @@
+"""Least squares within bounds, many problems at once (Levenberg 1944, Marquardt 1963).
+
+Every problem has its own damping, adapted as Nielsen (1999) does, and drops out
+when it has converged (Moré 1978). A step stays within the bounds and within a box
+about the point it starts from: what would leave is fixed at the edge, and the rest
+solved for again. No sum runs over problems, nor in an order that depends on how
+many there are: to the last bit, what a problem comes out with does not depend on
+which others are solved with it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+
+_LEAST_DAMPING = 1e-9
+# In e-folds. Linearised, a rotation is a poor guide much further, and starts would be wasted.
+_LONGEST_STEP = 3.0
+_MOST_STEPS = 300
+_STANDSTILL = 1e-8
+_SMALLEST = 1e-300
+
+
+@dataclass
+class Normal:
+    """Normal equations of n problems.
+
+    Parameters
+    ----------
+    square_sum : (n,)
+        What is minimized, a sum of squares.
+    gradient : (n, n_parameters)
+        Half its gradient.
+    information : (n, n_parameters, n_parameters)
+        Half its second derivatives, as far as first derivatives of residuals give them.
+    misfit_rad : (n,)
+        RMS misfit to the trace.
+    """
+
+    square_sum: Array
+    gradient: Array
+    information: Array
+    misfit_rad: Array
+
+    @property
+    def parts(self) -> tuple[Array, ...]:
+        """All of it, in order."""
+        return self.square_sum, self.gradient, self.information, self.misfit_rad
+
+    def of(self, which: BoolArray | IntArray) -> "Normal":
+        """Return those of some problems."""
+        return Normal(*(part[which] for part in self.parts))
+
+
+Objective = Callable[[Array, IntArray], Normal]
+"""Normal equations at points (n, n_parameters) of the problems with given indices, (n,)."""
+
+
+class Constraint(Protocol):
+    """A relation between the parameters of each problem, kept exactly by eliminating one."""
+
+    def eliminated(self, normal: Normal, x: Array, problem: IntArray) -> tuple[Normal, BoolArray]:
+        """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
+
+    def restored(self, x: Array, problem: IntArray, eliminated: BoolArray) -> Array:
+        """Points, (n, n_parameters), with the relation restored; NaN if bounds forbid that."""
+
+
+@dataclass
+class Minima:
+    """Where the problems ended.
+
+    Parameters
+    ----------
+    x : (n, n_parameters)
+        Points.
+    misfit_rad : (n,)
+        RMS misfits there.
+    evaluations : (n,)
+        How often each problem was linearised.
+    """
+
+    x: Array
+    misfit_rad: Array
+    evaluations: IntArray
+
+    def of(self, which: IntArray) -> "Minima":
+        """Return those of some problems."""
+        return Minima(self.x[which], self.misfit_rad[which], self.evaluations[which])
+
+
+@dataclass
+class _State:
+    problem: IntArray
+    x: Array
+    low: Array
+    high: Array
+    normal: Normal
+    damping: Array
+    growth: Array
+
+
+def minimized(
+    objective: Objective,
+    starts: Array,
+    low: Array,
+    high: Array,
+    tolerance: float,
+    constraint: Constraint | None = None,
+    damping: float = 1e-2,
+) -> Minima:
+    """Descend from a starting point in every problem.
+
+    Parameters
+    ----------
+    objective
+        What is minimized.
+    starts : (n, n_parameters)
+        Within bounds, and fulfilling the constraint; logarithms, for steps are limited in length.
+    low, high : (n, n_parameters)
+        Bounds; what is equal stays.
+    tolerance
+        Stop when a step lowers the sum of squares, and was to lower it, by less than this share.
+    constraint
+        What is to hold on the way.
+    damping
+        Of the first steps, relative to the diagonal of the information.
+    """
+    count = len(starts)
+    everyone = np.arange(count)
+    minima = Minima(starts.copy(), np.zeros(count), np.ones(count, dtype=np.int64))
+    state = _State(
+        everyone,
+        starts,
+        low,
+        high,
+        objective(starts, everyone),
+        np.full(count, damping),
+        np.full(count, 2.0),
+    )
+    for _ in range(_MOST_STEPS):
+        minima.evaluations[state.problem] += 1
+        done = _advance(state, objective, constraint, tolerance)
+        if np.any(done):
+            _leave(state, done, minima)
+            state = _chosen(state, ~done)
+        if not len(state.problem):
+            break
+    _leave(state, np.ones(len(state.problem), dtype=bool), minima)
+    return minima
+
+
+def _advance(
+    state: _State, objective: Objective, constraint: Constraint | None, tolerance: float
+) -> BoolArray:
+    """Try a step in every problem, keep it where it leads down, and tell which are done."""
+    x, problem, normal = state.x, state.problem, state.normal
+    reduced, basic = normal, np.zeros(x.shape, dtype=bool)
+    if constraint is not None:
+        reduced, basic = constraint.eliminated(normal, x, problem)
+    below = np.where(basic, 0.0, np.maximum(state.low - x, -_LONGEST_STEP))
+    above = np.where(basic, 0.0, np.minimum(state.high - x, _LONGEST_STEP))
+    step = bounded_step(reduced, state.damping, below, above)
+    # Valleys are straight in the logarithms or, of sums, in the parameters themselves.
+    straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
+    tried, possible = x + straight, np.ones(len(x), dtype=bool)
+    if constraint is not None:
+        tried = constraint.restored(tried, problem, basic)
+        possible = np.isfinite(tried[:, 0])
+        tried = np.where(possible[:, None], tried, x)
+    tried = np.clip(tried, state.low, state.high)
+    found = objective(tried, problem)
+    predicted = -np.sum(step * (2 * reduced.gradient + _times(reduced.information, step)), axis=1)
+    gained = np.where(possible, normal.square_sum - found.square_sum, -np.inf)
+    small = tolerance * normal.square_sum
+    done = (np.abs(gained) <= small) & (predicted <= small)
+    done |= np.max(np.abs(step), axis=1) <= _STANDSTILL
+    _damp(state, gained, predicted)
+    better = gained > 0
+    state.x = np.where(better[:, None], tried, x)
+    state.normal = _either(better, found, normal)
+    return done
+
+
+def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
+    """Damped Gauss-Newton steps, with what would leave a box fixed at its edge.
+
+    Parameters
+    ----------
+    normal
+        Normal equations of n problems.
+    damping : (n,)
+        Relative to the diagonal of the information; 0 for plain Gauss-Newton.
+    below, above : (n, n_parameters)
+        How far each parameter may change; neither above nor below zero.
+
+    Returns
+    -------
+    (n, n_parameters)
+    """
+    gradient, information = normal.gradient, normal.information
+    fixed = ((below >= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))
+    wanted = _free_step(gradient, information, damping, fixed)
+    step = np.clip(wanted, below, above)
+    outside = step != wanted
+    again = np.flatnonzero(np.any(outside, axis=1))
+    if len(again):
+        information = information[again]
+        fixed = fixed[again] | outside[again]
+        given = np.where(fixed, step[again], 0.0)
+        pull = gradient[again] + _times(information, given)
+        rest = _free_step(pull, information, damping[again], fixed)
+        # Whatever leaves the box now is cut off there.
+        step[again] = np.clip(given + rest, below[again], above[again])
+    return step
+
+
+def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolArray) -> Array:
+    """Steps of what is not fixed."""
+    diagonal = np.arange(gradient.shape[1])
+    # Marquardt's scaling; what has no effect at all must not divide by zero.
+    size = np.abs(information[:, diagonal, diagonal]) + _SMALLEST
+    scale = np.where(fixed, 0.0, 1 / np.sqrt(size))
+    matrix = information * (scale[:, :, None] * scale[:, None, :])
+    matrix[:, diagonal, diagonal] = np.where(fixed, 1.0, 1.0 + damping[:, None])
+    return -scale * _solved(matrix, scale * gradient)
+
+
+def _solved(matrix: Array, vector: Array) -> Array:
+    """Solve positive definite systems, (n, size, size) and (n, size), by elimination.
+
+    For matrices this small it is several times as fast to do each of its steps for all
+    systems than all steps for each, as a library does.
+    """
+    a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
+    size = len(b)
+    for row in range(size - 1):
+        share = a[row + 1 :, row] / a[row, row]
+        a[row + 1 :, row + 1 :] -= share[:, None] * a[row, row + 1 :]
+        b[row + 1 :] -= share * b[row]
+    for row in range(size)[::-1]:
+        b[row] /= a[row, row]
+        b[:row] -= a[:row, row] * b[row]
+    return b.T
+
+
+def _damp(state: _State, gained: Array, predicted: Array) -> None:
+    """Adapt the damping to how much of what was predicted was gained (Nielsen 1999)."""
+    hopeful = predicted > 0
+    ratio = np.where(hopeful, gained / np.where(hopeful, predicted, 1.0), -1.0)
+    better = ratio > 0
+    less = np.maximum(1 / 3, 1 - (2 * np.where(better, ratio, 0.5) - 1) ** 3)
+    state.damping = np.where(
+        better, np.maximum(state.damping * less, _LEAST_DAMPING), state.damping * state.growth
+    )
+    state.growth = np.where(better, 2.0, 2 * state.growth)
+
+
+def _leave(state: _State, which: BoolArray, minima: Minima) -> None:
+    minima.x[state.problem[which]] = state.x[which]
+    minima.misfit_rad[state.problem[which]] = state.normal.misfit_rad[which]
+
+
+def _chosen(state: _State, which: BoolArray) -> _State:
+    return _State(
+        state.problem[which],
+        state.x[which],
+        state.low[which],
+        state.high[which],
+        state.normal.of(which),
+        state.damping[which],
+        state.growth[which],
+    )
+
+
+def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:
+    return Normal(
+        *(
+            np.where(which.reshape(-1, *[1] * (a.ndim - 1)), a, b)
+            for a, b in zip(one.parts, other.parts, strict=True)
+        )
+    )
+
+
+def _times(matrices: Array, vectors: Array) -> Array:
+    """Product of a matrix and a vector in each problem."""
+    return (matrices @ vectors[:, :, None])[:, :, 0]

@@ -1,0 +1,126 @@
+"""Local fits of many traces at once: same protocol, sampling times and model, linear.
+
+`biogrip.identify.local_fit` for any number of traces and starting points as one
+array. To the last bit, a fit does not depend on which others are made with it.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.identify.levenberg_marquardt import (
+    Constraint,
+    Minima,
+    Normal,
+    minimized,
+)
+from biogrip.identify.local_fit import FINE, PRIOR_WIDTH
+from biogrip.identify.problem import Problem
+
+
+class Held(Constraint, Protocol):
+    """What fits are held to: a relation between parameters, and perhaps residuals of its own."""
+
+    def started(self, x: Array) -> Array:
+        """Points near the given ones, one a fit, at which the relation holds."""
+
+    def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
+        """Normal equations with its own residuals in them."""
+
+
+def fit_together(problems: Sequence[Problem]) -> bool:
+    """Whether `ManyFits` can serve problems: few rows stand for all samples, the same for all."""
+    first = problems[0]
+    return all(
+        problem.residuals.condensable
+        and problem.residuals.shares_responses(first.residuals)
+        and np.array_equal(problem.low, first.low)
+        and np.array_equal(problem.high, first.high)
+        for problem in problems
+    )
+
+
+class ManyFits:
+    """Fits to any of a number of traces.
+
+    Parameters
+    ----------
+    problems
+        One a trace, with which `fit_together` has to agree.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        self.problems = problems
+        self.low, self.high = problems[0].low, problems[0].high
+        self._residuals = problems[0].residuals
+        self._traces = np.stack([problem.residuals.condensed_trace for problem in problems])
+        self._noise_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+        self._middle = 0.5 * (self.low + self.high)
+
+    def normal(self, x: Array, trace: IntArray) -> Normal:
+        """Normal equations of the `Objective` of each fit.
+
+        Parameters
+        ----------
+        x : (n, n_parameters)
+            Log-parameters.
+        trace : (n,)
+            Which trace each is compared with.
+        """
+        rows = self._residuals.condensed_responses(x)
+        rows[:, 0] -= self._traces[trace]
+        products = rows @ rows.swapaxes(1, 2)
+        misfit_rad = np.sqrt(products[:, 0, 0] / self._residuals.samples)
+        products /= (self._noise_rad[trace] ** 2)[:, None, None]
+        away = (x - self._middle) / PRIOR_WIDTH
+        diagonal = np.arange(1, 1 + x.shape[1])
+        products[:, diagonal, diagonal] += 1 / PRIOR_WIDTH**2
+        return Normal(
+            products[:, 0, 0] + np.sum(away**2, axis=1),
+            products[:, 0, 1:] + away / PRIOR_WIDTH,
+            products[:, 1:, 1:],
+            misfit_rad,
+        )
+
+    def fitted(
+        self,
+        starts: Array,
+        trace: IntArray,
+        tolerance: float = FINE,
+        *,
+        held: Held | None = None,
+        low: Array | None = None,
+        high: Array | None = None,
+    ) -> Minima:
+        """Fit from starting points.
+
+        Parameters
+        ----------
+        starts : (n, n_parameters)
+            Log-parameters; moved into the bounds if need be, and to where fits are held.
+        trace : (n,)
+            Which trace each is fitted to.
+        tolerance
+            `ROUGH`, `FAIR` or `FINE`.
+        held
+            What the fits are held to.
+        low, high : (n, n_parameters) or (n_parameters,)
+            Bounds instead of the search range; a parameter between equal ones is known.
+        """
+        low = np.broadcast_to(self.low if low is None else low, starts.shape)
+        high = np.broadcast_to(self.high if high is None else high, starts.shape)
+        starts = np.clip(starts, low, high)
+        if held is None:
+            return minimized(
+                lambda x, fit: self.normal(x, trace[fit]), starts, low, high, tolerance
+            )
+        return minimized(
+            lambda x, fit: held.added(self.normal(x, trace[fit]), x, fit),
+            held.started(starts),
+            low,
+            high,
+            tolerance,
+            held,
+        )

@@ -1,0 +1,125 @@
+"""What modes do under a protocol, condensed to rows, as a tabulated function of the rate.
+
+Under a given protocol and at given times the rows of a mode depend on its rate r
+alone, and smoothly (`biogrip.response.decay_table`). Divided by T r, T the last
+time, they are as large for slow modes as for any other, and polynomials of low
+degree in short pieces of
+
+    u = log(1 - T r)
+
+give them to all digits. So a response with its derivatives is one small matrix
+product: weights and powers of the places within pieces, times the pieces'
+coefficients.
+"""
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from biogrip.arrays import Array
+from biogrip.protocol import TorqueHistory
+from biogrip.response.decay_table import DEGREE, WIDTH
+from biogrip.response.sensitivity import Modes, responses_of_modes
+
+# As in `decay_table`, wide pieces of high degree need the fewest rates, short ones of low degree
+# are the fastest to look up: the latter's error is 3e-15 of what is tabulated.
+_SHORTER, _DEGREE = 16, 5
+_WIDTH = WIDTH / _SHORTER
+_ORDERS = np.arange(_DEGREE + 1)
+# exp(-40) is lost in rounding; under a ramp, something is left that falls with the rate.
+_DECAYED, _DECAYED_UNDER_RAMPS = 40.0, 1e12
+
+_WIDE_NODES = 0.5 + 0.5 * chebyshev.chebpts1(DEGREE + 1)
+# On a short piece from -1/2 to 1/2.
+_SHORT_NODES = 0.5 * chebyshev.chebpts1(_DEGREE + 1)
+_DIVIDED = (np.arange(_SHORTER)[:, None] + 0.5 + _SHORT_NODES).ravel() / _SHORTER
+_TO_SHORT = np.linalg.solve(
+    chebyshev.chebvander(2 * _WIDE_NODES - 1, DEGREE).T,
+    chebyshev.chebvander(2 * _DIVIDED - 1, DEGREE).T,
+).T
+_TO_POWERS = np.linalg.inv(np.vander(_SHORT_NODES, increasing=True))
+
+
+class ModeRows:
+    """Rows of the responses of any number of samples, with their derivatives.
+
+    Parameters
+    ----------
+    torque
+        The protocol.
+    time_s : (n_times,)
+        Ascending times at which a response has to be known.
+    to_rows : (n_times, n_rows)
+        Turns its values there, from their right, into rows.
+    shortest_s
+        Shortest time after a change of torque at which a mode is seen.
+    """
+
+    def __init__(
+        self, torque: TorqueHistory, time_s: Array, to_rows: Array, shortest_s: float
+    ) -> None:
+        self._end_s = float(time_s[-1])
+        self._drives, self._rows = 1 if torque.symmetric else 2, to_rows.shape[1]
+        decayed = _DECAYED if torque.only_steps else _DECAYED_UNDER_RAMPS
+        wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / WIDTH))
+        self._last = wide * _SHORTER
+        # (n_pieces, n_drives, degree + 1, n_rows).
+        self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
+        for piece in range(wide):
+            u = WIDTH * (piece + _WIDE_NODES)
+            growth, _ = responses_of_modes(-np.expm1(u) / self._end_s, torque, time_s)
+            values = (growth / np.expm1(u)[:, None]) @ to_rows
+            short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
+            here = slice(piece * _SHORTER, (piece + 1) * _SHORTER)
+            self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
+
+    def __call__(self, modes: Modes) -> Array:
+        """Rows of responses and of their derivatives.
+
+        Parameters
+        ----------
+        modes
+            Poles and weights of n samples, with derivatives.
+
+        Returns
+        -------
+        (n, 1 + n_parameters, n_rows)
+            In rad; first the response, then its derivatives by the log-parameters.
+        """
+        count, parameters, n_modes = modes.rate_slopes.shape
+        scaled = -self._end_s * modes.rates
+        u = np.log1p(scaled) / _WIDTH
+        decayed = u >= self._last
+        u = np.minimum(u, np.nextafter(self._last, 0))
+        piece = u.astype(np.intp)
+        powers, power_slopes = _powers(u - piece - 0.5)
+        # What was divided by, and the place, with their derivatives by the log-parameters.
+        scale = np.where(decayed, np.expm1(_WIDTH * self._last), scaled)
+        scale_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
+        place_slopes = scale_slopes / (_WIDTH * (1 + scaled))[:, None]
+        # Now (n, n_modes, n_drives), and (n, n_parameters, n_modes, n_drives).
+        weights, weight_slopes = (
+            modes.weights.swapaxes(-1, -2),
+            modes.weight_slopes.swapaxes(-1, -2),
+        )
+        amplitudes = weights * scale[..., None]
+        amplitude_slopes = weight_slopes * scale[:, None, :, None]
+        amplitude_slopes += weights[:, None] * scale_slopes[..., None]
+        moved = amplitudes[:, None] * place_slopes[..., None]
+        mixed = np.empty((count, 1 + parameters, n_modes, self._drives, len(_ORDERS)))
+        np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
+        np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
+        mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
+        # One product a sample: the order of its sums does not depend on how many there are.
+        pieces = self._table[piece].reshape(count, -1, self._rows)
+        rows: Array = mixed.reshape(count, 1 + parameters, -1) @ pieces
+        return rows
+
+
+def _powers(place: Array) -> tuple[Array, Array]:
+    """Powers, and their derivatives, of shape (..., 1, degree + 1)."""
+    powers = np.ones((*place.shape, 1, len(_ORDERS)))
+    for order in _ORDERS[1:]:
+        powers[..., 0, order] = powers[..., 0, order - 1] * place
+    slopes = np.zeros_like(powers)
+    slopes[..., 1:] = _ORDERS[1:] * powers[..., :-1]
+    return powers, slopes

@@ -1,0 +1,205 @@
+"""Quantities held exactly in many fits at once, against fits one by one with SciPy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array, IntArray
+from biogrip.identifiability.held import HeldQuantities
+from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identifiability.many_limits import many_limits
+from biogrip.identifiability.many_profiles import many_profiles
+from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
+from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
+from biogrip.identify.local_fit import FINE, local_fit
+from biogrip.sample import MODELS, model_named, with_fixed
+from tests.identify.test_many_fits import identified, of_case
+from tests.identify.test_methods import MODEL
+
+LOW = np.full(4, -3.0)
+HIGH = np.full(4, 4.0)
+PARAMETERS = parameters_and_sum(MODEL)
+COMBINATIONS = combinations_of(MODEL, [0, 1, 2])
+
+
+def likelihoods(case: str, count: int) -> list[Likelihood]:
+    problems = of_case(case, count)
+    return [
+        likelihood_of(problem, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+        for problem, found in zip(problems, identified(problems, [0] * count), strict=True)
+    ]
+
+
+def labelled(*labels: str) -> list[Quantity]:
+    return [quantity for quantity in PARAMETERS if quantity.label in labels]
+
+
+def rest_fitted(likelihood: Likelihood, known: list[int], logs: list[float], start: Array) -> float:
+    """Rise of chi^2 of a model in which parameters are known, fitted by SciPy."""
+    given = {MODEL.names[i]: float(np.exp(log)) for i, log in zip(known, logs, strict=True)}
+    problem = likelihood.problem
+    rest = replace(
+        problem,
+        residuals=problem.residuals.of_model(with_fixed(MODEL, given)),
+        low=np.delete(problem.low, known),
+        high=np.delete(problem.high, known),
+    )
+    return likelihood.rise(local_fit(rest, np.delete(start, known)).misfit_rad)
+
+
+def values(quantities: list[Quantity], which: IntArray, x: Array) -> Array:
+    return np.array([quantities[q].log(point) for q, point in zip(which, x, strict=True)])
+
+
+@pytest.mark.parametrize("branches", [1, 3])
+def test_points_are_moved_to_where_quantities_are_held(branches: int) -> None:
+    """Within bounds, from anywhere, for targets all over the ranges and at their very ends."""
+    model = model_named("generalized_maxwell", branches)
+    quantities = [*parameters_and_sum(model), *combinations_of(model, [0, 1, branches + 1])]
+    low, high = np.full(len(model.names), -3.0), np.full(len(model.names), 4.0)
+    ends = np.array([quantity.range(low, high) for quantity in quantities])
+    rng = np.random.default_rng(0)
+    which = rng.integers(len(quantities), size=3000)
+    share = rng.choice([0.0, 1.0, *rng.uniform(size=8)], size=3000)
+    targets = ends[which, 0] + share * (ends[which, 1] - ends[which, 0])
+    held = HeldQuantities(quantities, which, targets, low, high, 400.0)
+    x = held.started(rng.uniform(low, high, (3000, len(low))))
+    assert np.all((x >= low) & (x <= high))
+    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-6
+    with pytest.raises(ValueError, match="outside its range"):
+        HeldQuantities(quantities, which, targets + 20, low, high, 400.0).started(x)
+
+
+def test_held_values_are_attained_to_rounding() -> None:
+    (likelihood,) = likelihoods("endothelial_cell", 1)
+    quantities = [*PARAMETERS, *COMBINATIONS]
+    fits = HeldFits([likelihood], quantities)
+    which = np.repeat(np.arange(len(quantities)), 5)
+    targets = fits.at_best()[0, which] + np.tile([-1.0, -0.1, 0.01, 0.1, 1.0], len(quantities))
+    trace = np.zeros(len(which), dtype=np.int64)
+    rises, x = fits.at(trace, which, targets, fits.best[trace], FINE)
+    assert np.all(rises > -1e-3)
+    assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-9
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
+def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
+    """Against SciPy's fit of a model in which the parameter is fixed."""
+    (likelihood,) = likelihoods(case, 1)
+    problem, fits = likelihood.problem, HeldFits([likelihood], PARAMETERS)
+    trace = np.zeros(12, dtype=np.int64)
+    which = np.repeat(np.arange(4), 3)
+    targets = likelihood.best[which] + np.tile([-1.5, -0.3, 0.7], 4)
+    targets = np.clip(targets, problem.low[which], problem.high[which])
+    rises, x = fits.at(trace, which, targets, fits.best[trace], FINE)
+    for index, target, rise, point in zip(which, targets, rises, x, strict=True):
+        alone = rest_fitted(likelihood, [int(index)], [float(target)], point)
+        assert rise == pytest.approx(alone, abs=2e-3, rel=1e-5)
+
+
+def test_a_sum_is_held_as_by_a_stiffer_row() -> None:
+    """The penalty of a residual a thousand times as stiff as the profile's leaves no choice."""
+    (likelihood,) = likelihoods("liquid_drop_2", 1)
+    (total,) = labelled("c + c_p")
+    plain = replace(total, branches=())
+    fits = HeldFits([likelihood], [plain])
+    for shift in (-0.05, 0.02):
+        target = total.log(likelihood.best) + shift
+
+        def held(x: Array, target: float = target) -> tuple[Array, Array]:
+            stiffness = 1e5 / likelihood.deviation(total)
+            return (
+                np.array([stiffness * (total.log(x) - target)]),
+                stiffness * total.gradient(x)[None],
+            )
+
+        one = np.zeros(1, dtype=np.int64)
+        rises, _ = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
+        starts = [total.moved(likelihood.best, target)]
+        starts.append(fits.at(one, one, np.array([target]), starts[0][None], FINE)[1][0])
+        alone = min(local_fit(likelihood.problem, start, held=held).misfit_rad for start in starts)
+        assert rises[0] == pytest.approx(likelihood.rise(alone), rel=1e-3, abs=5e-3)
+
+
+def test_limits_are_where_the_rise_equals_the_threshold() -> None:
+    each = likelihoods("liquid_drop_2", 3)
+    quantities = labelled("k", "c_p", "c + c_p")
+    limits = many_limits(each, quantities)
+    fits = HeldFits(each, quantities)
+    trace, which, side = np.nonzero(np.isfinite(limits))
+    rises, _ = fits.at(trace, which, limits[trace, which, side], fits.best[trace], FINE)
+    threshold = np.array([likelihood.threshold for likelihood in each])[trace]
+    np.testing.assert_allclose(np.sqrt(rises), np.sqrt(threshold), rtol=0, atol=3e-3)
+    # Determined are k and the sum; c_p is bounded from above only.
+    assert np.all(np.isfinite(limits[:, [0, 2]]))
+    assert np.all(np.isnan(limits[:, 1, 0]))
+    assert np.all(limits[:, [0, 2], 0] < fits.at_best()[:, [0, 2]])
+    assert np.all(limits[:, [0, 2], 1] > fits.at_best()[:, [0, 2]])
+
+
+def test_limits_do_not_depend_on_the_batch() -> None:
+    each, quantities = likelihoods("endothelial_cell", 4), labelled("k", "c + c_p")
+    together = many_limits(each, quantities)
+    for chosen in ([2], [3, 0], [1, 3, 2]):
+        apart = many_limits([each[index] for index in chosen], quantities)
+        np.testing.assert_array_equal(apart, together[chosen])
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
+def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None:
+    """Against SciPy's from the optimum and from the profile's own fits."""
+    (likelihood,) = likelihoods(case, 1)
+    quantities = labelled("k", "c_p")
+    (profiles,) = many_profiles([likelihood], quantities)
+    for quantity, found in zip(quantities, profiles, strict=True):
+        (index,) = quantity.members
+        ends = likelihood.problem.low[index], likelihood.problem.high[index]
+        np.testing.assert_allclose(found.log_values[[0, -1]], ends)
+        assert np.min(found.rises) > -1e-3
+        for value, rise in zip(found.log_values[::6], found.rises[::6], strict=True):
+            alone = rest_fitted(likelihood, [index], [value], likelihood.best)
+            assert rise < alone + 1e-3 * (1 + alone)
+
+
+def test_limits_of_a_profile_are_those_near_the_optimum() -> None:
+    """Where there is but one basin."""
+    each = likelihoods("liquid_drop_2", 2)
+    quantities = labelled("k", "c + c_p")
+    limits = many_limits(each, quantities)
+    for near, profiles in zip(limits, many_profiles(each, quantities), strict=True):
+        ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
+        np.testing.assert_allclose(ends, near, rtol=0, atol=1e-3)
+
+
+def test_points_of_a_valley_take_one_call() -> None:
+    (likelihood,) = likelihoods("liquid_drop_2", 1)
+    fits = HeldFits([likelihood], PARAMETERS)
+    shares = np.array([0.1, 0.4, 0.7, 0.99, 0.9, 0.5])
+    total = np.exp(likelihood.best[2:]).sum() * np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.97])
+    x = np.tile(likelihood.best, (len(shares), 1))
+    x[:, 2], x[:, 3] = np.log(total * shares), np.log(total * (1 - shares))
+    fixed = np.tile([False, False, True, True], (len(shares), 1))
+    rises, found = fits.with_fixed(np.zeros(len(x), dtype=np.int64), x, fixed, FINE)
+    np.testing.assert_array_equal(found[:, 2:], x[:, 2:])
+    for rise, point in zip(rises, found, strict=True):
+        alone = rest_fitted(likelihood, [2, 3], list(point[2:]), point)
+        assert rise == pytest.approx(alone, rel=1e-5, abs=2e-3)
+
+
+def test_a_model_with_one_parameter_has_a_profile() -> None:
+    damper = MODELS["damper"]
+    (problem,) = of_case("liquid_drop_2", 1)
+    posed = replace(
+        problem,
+        residuals=problem.residuals.of_model(damper),
+        low=problem.low[3:],
+        high=problem.high[3:],
+    )
+    best = local_fit(posed, np.array([2.0]))
+    likelihood = likelihood_of(posed, best.log_parameters, best.misfit_rad, confidence=0.95)
+    quantities = parameters_and_sum(damper)
+    (limits,) = many_limits([likelihood], quantities)
+    alone = profile(likelihood, quantities[0])
+    ends = np.array([alone.low, alone.high], dtype=float)
+    np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
