@@ -18,10 +18,9 @@ from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fit import Objective
 
-_MOST_EVALUATIONS = 200
-# Levenberg's and Marquardt's: shares of the curvature that are added to it.
-_FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-3, 1e-7, 1e9
-_LONGEST_STEP = 2.0
+_MOST_STEPS = 200
+# In e-folds, along each axis of the curvature.
+_LONGEST_STEP, _SHORTEST_STEP = 2.0, 1e-8
 _ON_TARGET = 1e-12
 
 
@@ -35,16 +34,46 @@ class HeldFit:
         Where it is.
     chi2
         Sum of squares there, in units of the noise.
+    bend : (n_parameters, n_parameters)
+        What second derivatives of residuals and quantity add to the curvature
+        there, as far as the steps have told. A fit nearby is the faster for it.
     """
 
     log_parameters: Array
     chi2: float
+    bend: Array
+
+
+@dataclass(frozen=True)
+class _Here:
+    """The objective at a point, and what holding the quantity costs to first order."""
+
+    x: Array
+    rows: Array
+    jacobian: Array
+    slope: Array
+
+    @property
+    def cost(self) -> float:
+        return 0.5 * float(self.rows @ self.rows)
+
+    @property
+    def gradient(self) -> Array:
+        return self.jacobian.T @ self.rows
 
 
 def held_fit(
-    objective: Objective, quantity: Quantity, target: float, start: Array, tolerance: float
+    objective: Objective,
+    quantity: Quantity,
+    target: float,
+    start: Array,
+    bend: Array,
+    tolerance: float,
 ) -> HeldFit:
-    """Fit with a quantity held, by damped least squares within the bounds.
+    """Fit with a quantity held, by steps of limited length within the bounds.
+
+    The curvature is that of Gauss and Newton, and what the steps before have
+    told of the rest of it: along a valley the first is next to nothing.
 
     Parameters
     ----------
@@ -54,32 +83,39 @@ def held_fit(
         What is held, and its logarithm.
     start : (n_parameters,)
         Log-parameters, anywhere.
+    bend : (n_parameters, n_parameters)
+        Of a fit nearby, or zero.
     tolerance
-        Ends when a step lowers the cost by less than this share.
+        Ends when no step is expected to lower the cost by more than this share.
     """
     low, high = objective.low, objective.high
-    x = brought_to(quantity, target, start, low, high)
-    rows, jacobian = objective.both(x)
-    cost, damping = float(rows @ rows), _FIRST_DAMPING
-    for _ in range(_MOST_EVALUATIONS):
-        step = _step(x, rows, jacobian, quantity.gradient(x), damping, low, high)
-        # To first order in what it is told; a curve is what the damping is for.
-        expected = cost - float(np.sum((rows + jacobian @ step) ** 2))
-        if not expected > (tolerance * cost if damping <= _FIRST_DAMPING else 0.0):
-            break
-        trial = brought_to(quantity, target, x + step, low, high)
-        trial_rows, trial_jacobian = objective.both(trial)
-        lowered = cost - float(trial_rows @ trial_rows)
-        if lowered > 0:
-            x, rows, jacobian, cost = trial, trial_rows, trial_jacobian, cost - lowered
-            damping = max(0.1 * damping, _LEAST_DAMPING)
-            if lowered <= tolerance * cost and damping <= _FIRST_DAMPING:
+
+    def at(x: Array) -> _Here:
+        moved = brought_to(quantity, target, x, low, high)
+        return _Here(moved, *objective.both(moved), quantity.gradient(moved))
+
+    here, longest, nothing = at(start), _LONGEST_STEP, np.zeros_like(bend)
+    told, doubted = bend, False
+    for _ in range(_MOST_STEPS):
+        step, price, expected = _step(here, told, longest, low, high)
+        if not expected > tolerance * here.cost or longest < _SHORTEST_STEP:
+            if doubted or not np.any(told):
                 break
-        elif damping > _MOST_DAMPING or abs(lowered) <= 1e-3 * tolerance * cost:
-            break
-        else:
-            damping *= 10
-    return HeldFit(x, objective.chi2(rows))
+            # What was told elsewhere may make a slope look like the bottom of a gorge.
+            told, longest, doubted = nothing, _LONGEST_STEP, True
+            continue
+        there = at(here.x + step)
+        lowered = here.cost - there.cost
+        if lowered > 0.75 * expected:
+            longest = min(2 * longest, _LONGEST_STEP)
+        elif not lowered > 0.25 * expected:
+            longest = 0.25 * min(longest, float(np.max(np.abs(step))))
+        doubted = doubted and not lowered > tolerance * here.cost
+        if lowered > 0:
+            # A step too long tells of the curvature somewhere else.
+            told = bend = _told(told, here, there, price)
+            here = there
+    return HeldFit(here.x, objective.chi2(here.rows), bend)
 
 
 def brought_to(quantity: Quantity, target: float, x: Array, low: Array, high: Array) -> Array:
@@ -113,34 +149,49 @@ def brought_to(quantity: Quantity, target: float, x: Array, low: Array, high: Ar
 
 
 def _step(
-    x: Array, rows: Array, jacobian: Array, slope: Array, damping: float, low: Array, high: Array
-) -> Array:
-    """Damped step along the surface; parameters that push against a bound stay on it."""
-    downhill = -(jacobian.T @ rows)
-    curvature = jacobian.T @ jacobian
-    curvature[np.diag_indices_from(curvature)] *= 1 + damping
-    at_low, at_high = x <= low, x >= high
+    here: _Here, bend: Array, longest: float, low: Array, high: Array
+) -> tuple[Array, float, float]:
+    """Step along the surface, the quantity's price, and by how much the cost should fall.
+
+    Parameters that push against a bound stay on it.
+    """
+    gradient = here.gradient
+    curvature = here.jacobian.T @ here.jacobian + bend
+    at_low, at_high = here.x <= low, here.x >= high
     free = ~(at_low | at_high)
-    for _ in range(len(x) + 1):
-        step, price = _within(curvature, downhill, slope, free)
-        push = downhill - price * slope
+    while True:
+        slope = here.slope[free]
+        across = float(slope @ slope)
+        price = float(slope @ gradient[free]) / across if across > 0 else 0.0
+        push = price * here.slope - gradient
         blocked = ~free & ((at_low & (push > 0)) | (at_high & (push < 0)))
         if not np.any(blocked):
             break
         free[np.argmax(np.where(blocked, np.abs(push), 0.0))] = True
-    return step * min(1.0, _LONGEST_STEP / max(float(np.max(np.abs(step))), 1e-300))
+    along = _tangents(slope)
+    bends, axes = np.linalg.eigh(along.T @ curvature[np.ix_(free, free)] @ along)
+    axes = along @ axes
+    # Where it curves down, as far downhill as a mirrored curve would lead.
+    bends, uphill = np.maximum(np.abs(bends), 1e-12), axes.T @ gradient[free]
+    lengths = np.clip(-uphill / bends, -longest, longest)
+    step = np.zeros_like(gradient)
+    step[free] = axes @ lengths
+    return step, price, -float(np.sum(lengths * (uphill + 0.5 * bends * lengths)))
 
 
-def _within(
-    curvature: Array, downhill: Array, slope: Array, free: Array
-) -> tuple[Array, float]:
-    """Step of some parameters that leaves the quantity as it is, and the quantity's price."""
-    step, price = np.zeros_like(downhill), 0.0
-    if np.any(free):
-        solved = np.linalg.solve(
-            curvature[np.ix_(free, free)], np.stack((downhill[free], slope[free]), axis=1)
-        )
-        across = float(slope[free] @ solved[:, 1])
-        price = float(slope[free] @ solved[:, 0]) / across if across > 0 else 0.0
-        step[free] = solved[:, 0] - price * solved[:, 1]
-    return step, price
+def _tangents(slope: Array) -> Array:
+    """Orthonormal directions, as columns, in which a quantity of a given slope is constant."""
+    if not np.any(slope):
+        return np.eye(len(slope))
+    return np.linalg.qr(slope[:, None], mode="complete")[0][:, 1:]
+
+
+def _told(bend: Array, here: _Here, there: _Here, price: float) -> Array:
+    """Bend that explains how the gradient has changed over a step, too (symmetric rank one)."""
+    step = there.x - here.x
+    change = (there.jacobian - here.jacobian).T @ there.rows - price * (there.slope - here.slope)
+    left = change - bend @ step
+    share = float(left @ step)
+    if not abs(share) > 1e-6 * float(np.linalg.norm(left) * np.linalg.norm(step)):
+        return bend
+    return bend + np.outer(left, left) / share

@@ -5,11 +5,9 @@ variance, is the rise of chi^2. A quantity has a confidence limit where the rise
 is the threshold, and what is returned is the value at which it was found to be.
 """
 
-from bisect import bisect
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
@@ -25,6 +23,7 @@ _CERTAIN = 0.999
 # A branch may relax within twice the experiment at the price of chi^2 rising by some 50.
 _HINGE = 10.0
 _MOST_DOUBLINGS = 12
+_MOST_HALVINGS = 60
 
 
 @dataclass(frozen=True)
@@ -159,21 +158,20 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     outwards += [(i, i + 1) for i in range(middle - 1, -1, -1)]
     inwards = [(i, i - 1) for i in range(1, middle)]
     inwards += [(i, i + 1) for i in range(len(grid) - 2, middle, -1)]
-    done = [_Point(start, 0.0, likelihood.best)] * len(grid)
+    done = [fits.best] * len(grid)
     for index, neighbour in outwards:
         done[index] = fits.at(grid[index], done[neighbour])
     for index, neighbour in inwards:
         done[index] = _lower(done[index], fits.at(grid[index], done[neighbour]))
+    limits = [fits.outermost(done, -1), fits.outermost(done, 1)]
     rises = np.array([point.rise for point in done])
-    inside = np.flatnonzero(rises < likelihood.threshold)
     certainty = max(likelihood.certainty, likelihood.threshold)
-    first, last = int(inside[0]), int(inside[-1])
     return Profile(
         grid,
         rises,
         start,
-        fits.crossing(done[first], done[first - 1]) if rises[0] > certainty else None,
-        fits.crossing(done[last], done[last + 1]) if rises[-1] > certainty else None,
+        limits[0] if rises[0] > certainty else None,
+        limits[1] if rises[-1] > certainty else None,
     )
 
 
@@ -184,16 +182,14 @@ def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | Non
     start, step = quantity.log(likelihood.best), likelihood.deviation(quantity)
     found = []
     for end, sign in zip(ends, (-1, 1), strict=True):
-        inner = _Point(start, 0.0, likelihood.best)
+        inner = fits.best
         limit = None
         for doubling in range(_MOST_DOUBLINGS):
             target = start + sign * 2.2 * step * 2**doubling
             target = max(target, end) if sign < 0 else min(target, end)
             outer = fits.at(target, inner)
-            if outer.rise >= likelihood.threshold:
-                limit = fits.crossing(inner, outer)
-                break
-            if target == end:
+            limit, outer = fits.crossing(inner, outer)
+            if limit is not None or target == end:
                 break
             inner = outer
         found.append(limit)
@@ -202,11 +198,12 @@ def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | Non
 
 @dataclass(frozen=True)
 class _Point:
-    """A quantity's logarithm, the rise of chi^2 there, and the log-parameters."""
+    """A quantity's logarithm, the rise of chi^2 there, and the fit; see `HeldFit`."""
 
     target: float
     rise: float
     log_parameters: Array
+    bend: Array
 
 
 def _lower(one: _Point, other: _Point) -> _Point:
@@ -224,38 +221,74 @@ class _Held:
         self._longest = float(np.log(likelihood.problem.residuals.duration_s))
         further = self._unrelaxed if quantity.branches else None
         self._objective = Objective(likelihood.problem, further)
+        best = likelihood.best
+        self.best = _Point(quantity.log(best), 0.0, best, np.zeros((len(best), len(best))))
 
     def at(self, target: float, near: _Point) -> _Point:
         """Fit at a target, from a point nearby."""
         found = held_fit(
-            self._objective, self._quantity, target, near.log_parameters, self._accuracy.fit
+            self._objective,
+            self._quantity,
+            target,
+            near.log_parameters,
+            near.bend,
+            self._accuracy.fit,
         )
         residuals = self._likelihood.problem.residuals
         misfit = residuals.noise_scale_rad * float(np.sqrt(found.chi2 / residuals.samples))
-        return _Point(target, self._likelihood.rise(misfit), found.log_parameters)
+        return _Point(target, self._likelihood.rise(misfit), found.log_parameters, found.bend)
 
-    def crossing(self, inside: _Point, outside: _Point) -> float:
-        """Logarithm at which the rise is the threshold between two points.
+    def outermost(self, points: list[_Point], sign: int) -> float | None:
+        """Logarithm of the last crossing towards one end of a grid; points are lowered in place."""
+        threshold = self._likelihood.threshold
+        last = max(i * sign for i, point in enumerate(points) if point.rise < threshold) * sign
+        while 0 <= last + sign < len(points):
+            limit, outside = self.crossing(points[last], points[last + sign])
+            if limit is not None:
+                return limit
+            last += sign
+            points[last] = outside
+        return None
 
-        Every fit is tried from the nearest points on both sides, so that of two
-        basins that meet in between it is the lower that is followed.
+    def crossing(self, inside: _Point, outside: _Point) -> tuple[float | None, _Point]:
+        """Find where the rise is the threshold between two points.
+
+        Every fit is tried from both sides, so that of two basins that meet in
+        between it is the lower that is followed; and as far out as it is lower.
+
+        Returns
+        -------
+        limit
+            Logarithm; None if the rise at the outer point is below the threshold.
+        outside
+            The outer point, perhaps lowered.
         """
         threshold = self._likelihood.threshold
-        known = sorted((inside, outside), key=lambda point: point.target)
-
-        def excess(target: float) -> float:
-            place = bisect(known, target, key=lambda point: point.target)
-            point = known[place - 1]
-            if point.target != target:
-                point = _lower(self.at(target, point), self.at(target, known[place]))
-                known.insert(place, point)
-            if abs(point.rise - threshold) <= self._accuracy.limit * threshold:
-                return 0.0
+        allowed = self._accuracy.limit * threshold
+        weights, was_inside = [1.0, 1.0], None
+        for _ in range(_MOST_HALVINGS):
+            if outside.rise < threshold:
+                return None, outside
             # The square root of the rise is nearly linear.
-            return float(np.sqrt(max(point.rise, 0.0)) - np.sqrt(threshold))
-
-        ends = known[0].target, known[-1].target
-        return float(brentq(excess, *ends, xtol=1e-12 * (ends[1] - ends[0]), rtol=1e-14))
+            roots = np.sqrt(np.maximum([inside.rise, outside.rise], 0.0)) - np.sqrt(threshold)
+            short, beyond = np.abs(roots) * weights
+            share = min(max(float(short / (short + beyond)), 1e-3), 1 - 1e-3)
+            target = inside.target + share * (outside.target - inside.target)
+            near, far = self.at(target, inside), self.at(target, outside)
+            if far.rise - near.rise > allowed:
+                outside = _lower(outside, self.at(outside.target, near))
+                if outside.rise < threshold:
+                    return None, outside
+            point = _lower(near, far)
+            if abs(point.rise - threshold) <= allowed:
+                return target, outside
+            # An end that stays twice counts half (Illinois).
+            is_inside = point.rise < threshold
+            again = 0.5 if is_inside is was_inside else 1.0
+            weights = [1.0, again * weights[1]] if is_inside else [again * weights[0], 1.0]
+            inside, outside = (point, outside) if is_inside else (inside, point)
+            was_inside = is_inside
+        return inside.target, outside
 
     def _unrelaxed(self, x: Array) -> tuple[Array, Array]:
         """Rows, and slopes, that are zero as long as branches relax within the experiment."""
