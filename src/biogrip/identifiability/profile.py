@@ -100,6 +100,8 @@ class Profile:
         Value at the optimum.
     low, high
         Confidence limits; None where the trace does not close the profile.
+    lowest : (n_parameters,)
+        Log-parameters at the lowest rise, which is below zero if the optimum was missed.
     """
 
     log_values: Array
@@ -107,6 +109,7 @@ class Profile:
     best: float
     low: float | None
     high: float | None
+    lowest: Array
 
 
 def likelihood_of(
@@ -172,6 +175,7 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
         start,
         limits[0] if rises[0] > certainty else None,
         limits[1] if rises[-1] > certainty else None,
+        done[int(np.argmin(rises))].log_parameters,
     )
 
 

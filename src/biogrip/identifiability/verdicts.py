@@ -33,7 +33,7 @@ class Finding:
     quantity, profile
         Which one, and how chi^2 rises away from the optimum.
     deviation
-        Standard deviation of its logarithm to first order (Cramer-Rao), at most 1.
+        Standard deviation of its logarithm to first order, see `Likelihood.deviation`.
     """
 
     quantity: Quantity

@@ -31,8 +31,9 @@ _MOST_STEPS = 30
 # more take the rest of it below rounding.
 _NEARLY_SETTLED = 1e-9
 _LAST_STEPS = 4
-# So near, the curvature is that of the optimum itself; and the step that it is differenced with.
-_CLOSE = 1e-3
+# While every step is so much shorter than the last, the curvature need not be found anew.
+_SHRUNK = 0.1
+# Step of the differences that it is found by.
 _STEP = 1e-5
 
 
@@ -162,10 +163,11 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
     Gauss and Newton leaves out most of it, and its steps go to and fro for ever.
     """
     objective, nearby = Objective(problem, condensed=False), Objective(problem)
-    x, left, length = found.log_parameters, _MOST_STEPS, np.inf
+    x, left = found.log_parameters, _MOST_STEPS
+    length = before = np.inf
     while left > 0:
         downhill = -objective.gradient(x)
-        if length > _CLOSE:
+        if not length < _SHRUNK * before:
             curvature = _curvature(nearby, x)
         edge = 1e-6 * (problem.high - problem.low)
         stuck = ((x <= problem.low + edge) & (downhill < 0)) | (
@@ -176,7 +178,7 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
         step = np.zeros_like(x)
         # What rounding does to a step, the next one mends.
         step[~stuck] = _newton(curvature[np.ix_(~stuck, ~stuck)], downhill[~stuck])
-        length = float(np.max(np.abs(step)))
+        before, length = length, float(np.max(np.abs(step)))
         x = np.clip(x + step / max(length, 1.0), problem.low, problem.high)
         left = _LAST_STEPS if left > _LAST_STEPS and length < _NEARLY_SETTLED else left - 1
     misfit = objective.misfit_rad(x)

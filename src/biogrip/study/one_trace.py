@@ -6,8 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
+from biogrip.arrays import Array
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
@@ -82,7 +84,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
         "model": posed.model.name,
         "model_title": posed.model.title,
         "confidence": confidence,
-        **_instrument(posed, recorded, found.parameters),
+        **_instrument(posed, recorded, np.exp(told.likelihood.best)),
         **diagnosis_data(told),
     }
     write_text(output, json.dumps(data, indent=1) + "\n")
@@ -136,7 +138,7 @@ def _plan(wanted: Wanted) -> Plan:
     return Plan(load_study(merged, files, command_line=["cases"]), Path("results"))
 
 
-def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Any) -> dict[str, Any]:
+def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -> dict[str, Any]:
     """Offset and drift that the best fit leaves to the instrument."""
     if not (posed.offset or posed.drift):
         return {}
