@@ -7,7 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from biogrip import __version__
+from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import write_text
@@ -122,7 +125,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     progress = Progress(str(wanted.trace), 1)
     rng = stream(study.study_seed, case.name, 0, "identifiability")
     identify = identifier("least_squares", settings.least_squares)
-    found = identify(problem, rng, progress.within)
+    (found,) = identify([problem], [rng], progress.within)
     confidence = case.confidence
     told = diagnose(
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
@@ -133,7 +136,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
         "model": posed.model.name,
         "model_title": posed.model.title,
         "confidence": confidence,
-        **_instrument(posed, recorded, found.parameters),
+        **_instrument(posed, recorded, np.exp(told.likelihood.best)),
         **diagnosis_data(told),
     }
     write_text(output, json.dumps(data, indent=1) + "\n")
@@ -191,7 +194,7 @@ def _study(wanted: Wanted) -> Study:
     return load_study(merged, files, command_line=["cases"], for_workflow=False)
 
 
-def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Any) -> dict[str, Any]:
+def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -> dict[str, Any]:
     """Offset and drift that the best fit leaves to the instrument."""
     if not (posed.offset or posed.drift):
         return {}

@@ -22,9 +22,9 @@ class Progress:
         self._done = 0
         self._said = time.monotonic()
 
-    def done(self) -> None:
-        """Count one piece."""
-        self._done += 1
+    def done(self, pieces: int = 1) -> None:
+        """Count what is done."""
+        self._done += pieces
         self._say("")
 
     def within(self, evaluations: int, misfit_rad: float) -> None:

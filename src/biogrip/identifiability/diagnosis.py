@@ -7,6 +7,7 @@ import numpy as np
 from biogrip.identifiability.profile import Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
 from biogrip.identify.answer import Identification
+from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
 from biogrip.sample import SampleModel
 
@@ -16,6 +17,8 @@ _TOO_MUCH = 1.2
 _CORRELATED = 5.0
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
+# Chi^2 that the prior, by which optima are chosen where the trace says nothing, may cost.
+_MISSED = 0.05
 
 
 @dataclass(frozen=True)
@@ -50,28 +53,40 @@ def diagnose(
 ) -> Diagnosis:
     """Judge what is identified from one trace.
 
+    Where a profile comes below the optimum, that was not the global one, and all
+    is judged again from there.
+
     Parameters
     ----------
     problem, model
         The trace, and the model whose parameters were searched.
     found
-        Its global optimum.
+        Its global optimum, as far as is known.
     confidence
         Of the limits, e.g. 0.95.
     noise_rad
         Standard deviation of the noise, if it is known; else that of the residual.
     """
-    best = np.log(found.parameters)
-    likelihood = likelihood_of(
-        problem, best, found.misfit_rad, confidence=confidence, noise_rad=noise_rad
-    )
-    findings = findings_of(likelihood, model)
+    best, misfit_rad = np.log(found.parameters), found.misfit_rad
+    while True:
+        likelihood = likelihood_of(
+            problem, best, misfit_rad, confidence=confidence, noise_rad=noise_rad
+        )
+        findings = findings_of(likelihood, model)
+        lowest = min((finding.profile for finding in findings), key=lambda p: float(p.rises.min()))
+        if lowest.rises.min() > -_MISSED:
+            break
+        fit = settled(problem, local_fit(problem, lowest.lowest))
+        if likelihood.rise(fit.misfit_rad) > -_MISSED:
+            break
+        best, misfit_rad = fit.log_parameters, fit.misfit_rad
     trades = trades_of(likelihood, model, findings)
-    return Diagnosis(likelihood, findings, trades, _notes(likelihood, found.misfit_rad))
+    return Diagnosis(likelihood, findings, trades, _notes(likelihood))
 
 
-def _notes(likelihood: Likelihood, misfit_rad: float) -> list[str]:
+def _notes(likelihood: Likelihood) -> list[str]:
     residual, _ = likelihood.problem.residuals(likelihood.best)
+    misfit_rad = likelihood.misfit_rad
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return []
     notes = []

@@ -11,8 +11,9 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.profile import Likelihood, limits_near
 from biogrip.identifiability.quantities import Quantity
+from biogrip.identify.many_fits import fit_together
 
 # Limits to a thousandth of a standard deviation.
 _ACCURACY = 1e-3
@@ -76,3 +77,11 @@ def many_limits(
     )
     limits[closed] = crossings(fits, brackets, tolerance, accuracy)
     return limits.reshape(shape)
+
+
+def limits_of(likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> Array:
+    """Limits as of `many_limits`, one by one where `fit_together` does not agree."""
+    if quantities and fit_together([likelihood.problem for likelihood in likelihoods]):
+        return many_limits(likelihoods, quantities)
+    found = [[limits_near(each, quantity) for quantity in quantities] for each in likelihoods]
+    return np.array(found, dtype=float).reshape(len(likelihoods), len(quantities), 2)

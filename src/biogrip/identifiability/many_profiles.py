@@ -12,9 +12,10 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood, Profile, grid_of
+from biogrip.identifiability.profile import Likelihood, Profile, grid_of, profile
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fit import FAIR, FINE
+from biogrip.identify.many_fits import fit_together
 
 _ACCURACY = 1e-5
 # Share of one more than the rise by which a fit has to become better to be news to its neighbours.
@@ -61,11 +62,19 @@ def many_profiles(
                 float(starts[index]),
                 float(crossed[0, index]) if closed[0, index] else None,
                 float(crossed[1, index]) if closed[1, index] else None,
+                done.x[index, int(np.nanargmin(done.rises[index]))],
             )
             for index in range(t * shape[1], (t + 1) * shape[1])
         ]
         for t in range(shape[0])
     ]
+
+
+def profiles_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Profile]:
+    """Profiles of one trace, all at once where `fit_together` agrees, else one by one."""
+    if fit_together([likelihood.problem]):
+        return many_profiles([likelihood], quantities)[0]
+    return [profile(likelihood, quantity) for quantity in quantities]
 
 
 class _Points:

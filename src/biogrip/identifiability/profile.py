@@ -1,37 +1,34 @@
 """Profile likelihood: how well a trace can still be fitted with one quantity held.
 
 The rise of the sum of squares over its minimum, in units of the noise's
-variance, is the rise of chi^2. Quantities are held by one stiff row of the
-least squares, not exactly: what the fit comes out with is a constrained optimum
-for the value it came out with, and that value is what is kept.
+variance, is the rise of chi^2. A quantity has a confidence limit where the rise
+is the threshold, and what is returned is the value at which it was found to be.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
-from biogrip.identifiability.fisher import bound
+from biogrip.identifiability.held_fit import held_fit
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.local_fit import FAIR, FINE, local_fit
+from biogrip.identify.local_fit import FAIR, FINE, Objective
 from biogrip.identify.problem import Problem
 
 # Steps away from the best fit, in standard deviations, that every profile has.
 _NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
 _POINTS = 35
-# The row yields by 1e-4 standard deviations at the confidence limits.
-_STIFFNESS = 140.0
 _CERTAIN = 0.999
 # A branch may relax within twice the experiment at the price of chi^2 rising by some 50.
 _HINGE = 10.0
 _MOST_DOUBLINGS = 12
+_MOST_HALVINGS = 60
 
 
 @dataclass(frozen=True)
 class _Accuracy:
-    """Of a fit, as the share of its cost that ends it; of a limit, as a share of its bracket."""
+    """Of a fit, as the share of its cost that ends it; of a limit, as a share of the threshold."""
 
     fit: float
     limit: float
@@ -78,9 +75,17 @@ class Likelihood:
         return float(self.problem.residuals.samples * excess / self.noise_rad**2)
 
     def deviation(self, quantity: Quantity) -> float:
-        """Standard deviation of a quantity's logarithm to first order; at most one e-fold."""
+        """Standard deviation of a quantity's logarithm to first order, some e-folds at most.
+
+        Every parameter counts as known to an e-fold beforehand: beyond that a
+        straight line says nothing of it, nor of what it does to others. Unlike a
+        `bound`, this has no threshold that a parameter's information may pass.
+        """
         _, sensitivity = self.problem.residuals(self.best)
-        return min(bound(sensitivity, self.noise_rad, self.best, quantity), 1.0)
+        relative = sensitivity / self.noise_rad
+        slope = quantity.gradient(self.best)
+        information = relative @ relative.T + np.eye(len(slope))
+        return float(np.sqrt(slope @ np.linalg.solve(information, slope)))
 
 
 @dataclass(frozen=True)
@@ -95,6 +100,8 @@ class Profile:
         Value at the optimum.
     low, high
         Confidence limits; None where the trace does not close the profile.
+    lowest : (n_parameters,)
+        Log-parameters at the lowest rise, which is below zero if the optimum was missed.
     """
 
     log_values: Array
@@ -102,6 +109,7 @@ class Profile:
     best: float
     low: float | None
     high: float | None
+    lowest: Array
 
 
 def likelihood_of(
@@ -146,22 +154,21 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     outwards += [(i, i + 1) for i in range(middle - 1, -1, -1)]
     inwards = [(i, i - 1) for i in range(1, middle)]
     inwards += [(i, i + 1) for i in range(len(grid) - 2, middle, -1)]
-    done = [(0.0, likelihood.best)] * len(grid)
+    done = [fits.best] * len(grid)
     for index, neighbour in outwards:
-        done[index] = fits.at(grid[index], done[neighbour][1])
+        done[index] = fits.at(grid[index], done[neighbour])
     for index, neighbour in inwards:
-        found = fits.at(grid[index], done[neighbour][1])
-        done[index] = min(done[index], found, key=lambda point: point[0])
-    rises = np.array([rise for rise, _ in done])
-    inside = np.flatnonzero(rises < likelihood.threshold)
+        done[index] = _lower(done[index], fits.at(grid[index], done[neighbour]))
+    limits = [fits.outermost(done, -1), fits.outermost(done, 1)]
+    rises = np.array([point.rise for point in done])
     certainty = max(likelihood.certainty, likelihood.threshold)
-    first, last = int(inside[0]), int(inside[-1])
     return Profile(
         grid,
         rises,
         start,
-        fits.crossing(grid, done, first, first - 1) if rises[0] > certainty else None,
-        fits.crossing(grid, done, last, last + 1) if rises[-1] > certainty else None,
+        limits[0] if rises[0] > certainty else None,
+        limits[1] if rises[-1] > certainty else None,
+        done[int(np.argmin(rises))].log_parameters,
     )
 
 
@@ -184,21 +191,33 @@ def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | Non
     start, step = quantity.log(likelihood.best), likelihood.deviation(quantity)
     found = []
     for end, sign in zip(ends, (-1, 1), strict=True):
-        inner, inner_point = start, (0.0, likelihood.best)
+        inner = fits.best
         limit = None
         for doubling in range(_MOST_DOUBLINGS):
-            outer = start + sign * 2.2 * step * 2**doubling
-            outer = max(outer, end) if sign < 0 else min(outer, end)
-            outer_point = fits.at(outer, inner_point[1])
-            if outer_point[0] >= likelihood.threshold:
-                pair = np.array([inner, outer])
-                limit = fits.crossing(pair, [inner_point, outer_point], 0, 1)
+            target = start + sign * 2.2 * step * 2**doubling
+            target = max(target, end) if sign < 0 else min(target, end)
+            outer = fits.at(target, inner)
+            limit, outer = fits.crossing(inner, outer)
+            if limit is not None or target == end:
                 break
-            if outer == end:
-                break
-            inner, inner_point = outer, outer_point
+            inner = outer
         found.append(limit)
     return found[0], found[1]
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A quantity's logarithm, the rise of chi^2 there, and the fit; see `HeldFit`."""
+
+    target: float
+    rise: float
+    log_parameters: Array
+    bend: Array
+
+
+def _lower(one: _Point, other: _Point) -> _Point:
+    """Return the lower of two points; of equals, in single precision, the first."""
+    return min(one, other, key=lambda point: np.float32(point.rise))
 
 
 class _Held:
@@ -208,45 +227,86 @@ class _Held:
         self._accuracy = accuracy
         self._likelihood = likelihood
         self._quantity = quantity
-        self._stiffness = _STIFFNESS / likelihood.deviation(quantity)
         self._longest = float(np.log(likelihood.problem.residuals.duration_s))
+        further = self._unrelaxed if quantity.branches else None
+        self._objective = Objective(likelihood.problem, further)
+        best = likelihood.best
+        self.best = _Point(quantity.log(best), 0.0, best, np.zeros((len(best), len(best))))
 
-    def at(self, target: float, near: Array) -> tuple[float, Array]:
-        """Rise of chi^2, and log-parameters, with the quantity at a target."""
+    def at(self, target: float, near: _Point) -> _Point:
+        """Fit at a target, from a point nearby."""
+        found = held_fit(
+            self._objective,
+            self._quantity,
+            target,
+            near.log_parameters,
+            near.bend,
+            self._accuracy.fit,
+        )
+        residuals = self._likelihood.problem.residuals
+        misfit = residuals.noise_scale_rad * float(np.sqrt(found.chi2 / residuals.samples))
+        return _Point(target, self._likelihood.rise(misfit), found.log_parameters, found.bend)
 
-        def held(x: Array) -> tuple[Array, Array]:
-            values = [self._stiffness * (self._quantity.log(x) - target)]
-            slopes = [self._stiffness * self._quantity.gradient(x)]
-            for spring, damper in self._quantity.branches:
-                beyond = x[damper] - x[spring] - self._longest
-                slope = np.zeros_like(x)
-                if beyond > 0:
-                    slope[damper], slope[spring] = _HINGE, -_HINGE
-                values.append(_HINGE * max(beyond, 0.0))
-                slopes.append(slope)
-            return np.array(values), np.array(slopes)
+    def outermost(self, points: list[_Point], sign: int) -> float | None:
+        """Logarithm of the last crossing towards one end of a grid; points are lowered in place."""
+        threshold = self._likelihood.threshold
+        last = max(i * sign for i, point in enumerate(points) if point.rise < threshold) * sign
+        while 0 <= last + sign < len(points):
+            limit, outside = self.crossing(points[last], points[last + sign])
+            if limit is not None:
+                return limit
+            last += sign
+            points[last] = outside
+        return None
 
-        start = self._quantity.moved(near, target)
-        found = local_fit(self._likelihood.problem, start, self._accuracy.fit, held)
-        return self._likelihood.rise(found.misfit_rad), found.log_parameters
+    def crossing(self, inside: _Point, outside: _Point) -> tuple[float | None, _Point]:
+        """Find where the rise is the threshold between two points.
 
-    def crossing(
-        self, grid: Array, points: list[tuple[float, Array]], inside: int, outside: int
-    ) -> float:
-        """Logarithm at which the rise reaches the threshold between two points of a grid."""
-        wanted = np.sqrt(self._likelihood.threshold)
-        known = {
-            float(grid[inside]): points[inside][0],
-            float(grid[outside]): points[outside][0],
-        }
+        Every fit is tried from both sides, so that of two basins that meet in
+        between it is the lower that is followed; and as far out as it is lower.
 
-        def excess(target: float) -> float:
+        Returns
+        -------
+        limit
+            Logarithm; None if the rise at the outer point is below the threshold.
+        outside
+            The outer point, perhaps lowered.
+        """
+        threshold = self._likelihood.threshold
+        allowed = self._accuracy.limit * threshold
+        weights, was_inside = [1.0, 1.0], None
+        for _ in range(_MOST_HALVINGS):
+            if outside.rise < threshold:
+                return None, outside
             # The square root of the rise is nearly linear.
-            rise = known.get(target)
-            if rise is None:
-                rise = self.at(target, points[inside][1])[0]
-            return float(np.sqrt(max(rise, 0.0)) - wanted)
+            roots = np.sqrt(np.maximum([inside.rise, outside.rise], 0.0)) - np.sqrt(threshold)
+            short, beyond = np.abs(roots) * weights
+            share = min(max(float(short / (short + beyond)), 1e-3), 1 - 1e-3)
+            target = inside.target + share * (outside.target - inside.target)
+            near, far = self.at(target, inside), self.at(target, outside)
+            if far.rise - near.rise > allowed:
+                outside = _lower(outside, self.at(outside.target, near))
+                if outside.rise < threshold:
+                    return None, outside
+            point = _lower(near, far)
+            if abs(point.rise - threshold) <= allowed:
+                return target, outside
+            # An end that stays twice counts half (Illinois).
+            is_inside = point.rise < threshold
+            again = 0.5 if is_inside is was_inside else 1.0
+            weights = [1.0, again * weights[1]] if is_inside else [again * weights[0], 1.0]
+            inside, outside = (point, outside) if is_inside else (inside, point)
+            was_inside = is_inside
+        return inside.target, outside
 
-        width = abs(float(grid[inside] - grid[outside]))
-        xtol = self._accuracy.limit * width
-        return float(brentq(excess, grid[inside], grid[outside], xtol=xtol, rtol=1e-12))
+    def _unrelaxed(self, x: Array) -> tuple[Array, Array]:
+        """Rows, and slopes, that are zero as long as branches relax within the experiment."""
+        values, slopes = [], []
+        for spring, damper in self._quantity.branches:
+            beyond = x[damper] - x[spring] - self._longest
+            slope = np.zeros_like(x)
+            if beyond > 0:
+                slope[damper], slope[spring] = _HINGE, -_HINGE
+            values.append(_HINGE * max(beyond, 0.0))
+            slopes.append(slope)
+        return np.array(values), np.array(slopes)

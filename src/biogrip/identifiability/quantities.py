@@ -61,13 +61,11 @@ class Quantity:
         return slope
 
     def moved(self, log_parameters: Array, target: float) -> Array:
-        """Log-parameters at which the quantity has a given logarithm, all else nearly alike."""
+        """Log-parameters with all members moved alike, until the quantity has a given logarithm."""
         by = target - self.log(log_parameters)
         moved = log_parameters.copy()
-        if self.form == "product":
-            moved[self.members[0]] += by * self.sign[0]
-        else:
-            moved[list(self.members)] += by
+        shares = np.divide(self.sign, len(self.members)) if self.form == "product" else 1.0
+        moved[list(self.members)] += by * shares
         return moved
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:

@@ -7,13 +7,17 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identify.local_fit import FAIR, local_fit
+from biogrip.identify.many_fits import fit_together
 from biogrip.sample import SampleModel, with_fixed
 
 # Shares of the first in the sum, and sums over the best sum: fine where the valley is.
 _SHARES = np.linspace(0.002, 0.998, 25)
 _BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
+# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
+_NEWS = 1e-3
 _SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
 
 
@@ -40,13 +44,7 @@ def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | 
     best = np.exp(likelihood.best[pair])
     sums = best.sum() * _SUMS[:, None]
     x_values, y_values = sums * _SHARES, sums * (1 - _SHARES)
-    rises = np.empty_like(x_values)
-    start = np.delete(likelihood.best, pair)
-    for i in range(len(rises)):
-        # Back and forth, so that each point starts from a neighbour's fit.
-        for j in range(rises.shape[1])[:: 1 if i % 2 else -1]:
-            here = (float(x_values[i, j]), float(y_values[i, j]))
-            rises[i, j], start = _rest_fitted(likelihood, model, pair, here, start)
+    rises = _rises(likelihood, model, pair, x_values, y_values)
     x, y = (model.parameters[index] for index in pair)
     return {
         "x": {"name": x.name, "symbol": x.symbol, "unit": x.unit},
@@ -60,6 +58,57 @@ def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | 
 
 def _listed(values: Array) -> list[list[float | None]]:
     return [[rounded(float(value)) for value in row] for row in values]
+
+
+def _rises(
+    likelihood: Likelihood, model: SampleModel, pair: list[int], x_values: Array, y_values: Array
+) -> Array:
+    """Rise of chi^2 at every point of the grid, (n_sums, n_shares)."""
+    if fit_together([likelihood.problem]):
+        return _rises_at_once(likelihood, pair, x_values, y_values)
+    rises = np.empty_like(x_values)
+    start = np.delete(likelihood.best, pair)
+    for i in range(len(rises)):
+        # Back and forth, so that each point starts from a neighbour's fit.
+        for j in range(rises.shape[1])[:: 1 if i % 2 else -1]:
+            here = (float(x_values[i, j]), float(y_values[i, j]))
+            rises[i, j], start = _rest_fitted(likelihood, model, pair, here, start)
+    return rises
+
+
+def _rises_at_once(
+    likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
+) -> Array:
+    """Fit all points from the optimum, then from neighbours as long as these are news."""
+    fits = HeldFits([likelihood], [])
+    rows, columns = x_values.shape
+    x = np.tile(likelihood.best, (rows * columns, 1))
+    x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
+    held = np.zeros(x.shape[1], dtype=bool)
+    held[pair] = True
+    rises = np.full(len(x), np.inf)
+    points, start = np.arange(len(x)), x.copy()
+    # A point, and its neighbours on the grid.
+    beside = np.pad(points.reshape(rows, columns), 1, constant_values=-1)
+    shifts = ((0, 1), (2, 1), (1, 0), (1, 2))
+    neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
+    tolerance = FAIR
+    while len(points):
+        fixed = np.broadcast_to(held, start.shape)
+        trace = np.zeros(len(points), dtype=np.int64)
+        found, fitted = fits.with_fixed(trace, start, fixed, tolerance)
+        news = np.zeros(len(x), dtype=bool)
+        for point, rise, parameters in zip(points, found, fitted, strict=True):
+            if rise < rises[point]:
+                news[point] |= rise < rises[point] - _NEWS * (1 + rise)
+                rises[point], x[point] = rise, parameters
+        origin = np.repeat(np.flatnonzero(news), 4)
+        points = neighbours[:, news].T.ravel()
+        origin, points = origin[points >= 0], points[points >= 0]
+        start = x[origin].copy()
+        start[:, pair] = x[points][:, pair]
+        tolerance = CLOSE
+    return rises.reshape(rows, columns)
 
 
 def _rest_fitted(

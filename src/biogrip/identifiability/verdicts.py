@@ -6,7 +6,8 @@ from itertools import combinations
 
 import numpy as np
 
-from biogrip.identifiability.profile import Likelihood, Profile, profile
+from biogrip.identifiability.many_profiles import profiles_of
+from biogrip.identifiability.profile import Likelihood, Profile
 from biogrip.identifiability.quantities import (
     Quantity,
     combinations_of,
@@ -33,7 +34,7 @@ class Finding:
     quantity, profile
         Which one, and how chi^2 rises away from the optimum.
     deviation
-        Standard deviation of its logarithm to first order (Cramer-Rao), at most 1.
+        Standard deviation of its logarithm to first order, see `Likelihood.deviation`.
     """
 
     quantity: Quantity
@@ -103,7 +104,7 @@ class Trade:
 
 def findings_of(likelihood: Likelihood, model: SampleModel) -> list[Finding]:
     """Judge every parameter, and the sum of those that the model calls exchangeable."""
-    return [_finding(likelihood, quantity) for quantity in parameters_and_sum(model)]
+    return _findings(likelihood, parameters_and_sum(model))
 
 
 def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding]) -> list[Trade]:
@@ -124,7 +125,7 @@ def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding
         candidates = combinations_of(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
         if min(deviations) < _WORTH_A_LOOK:
-            finding = _finding(likelihood, candidates[int(np.argmin(deviations))])
+            (finding,) = _findings(likelihood, [candidates[int(np.argmin(deviations))]])
             if finding.verdict == DETERMINED:
                 trades.append(_trade(model, list(pair), finding))
     return trades
@@ -134,5 +135,9 @@ def _trade(model: SampleModel, members: list[int], finding: Finding) -> Trade:
     return Trade(tuple(model.parameters[index].name for index in members), finding)
 
 
-def _finding(likelihood: Likelihood, quantity: Quantity) -> Finding:
-    return Finding(quantity, profile(likelihood, quantity), likelihood.deviation(quantity))
+def _findings(likelihood: Likelihood, quantities: list[Quantity]) -> list[Finding]:
+    profiles = profiles_of(likelihood, quantities)
+    return [
+        Finding(quantity, profile, likelihood.deviation(quantity))
+        for quantity, profile in zip(quantities, profiles, strict=True)
+    ]

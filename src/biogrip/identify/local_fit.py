@@ -31,6 +31,10 @@ _MOST_STEPS = 30
 # more take the rest of it below rounding.
 _NEARLY_SETTLED = 1e-9
 _LAST_STEPS = 4
+# While every step is so much shorter than the last, the curvature need not be found anew.
+_SHRUNK = 0.1
+# Step of the differences that it is found by.
+_STEP = 1e-5
 
 
 @dataclass(frozen=True)
@@ -56,23 +60,24 @@ Rows = Callable[[Array], tuple[Array, Array]]
 
 
 class Objective:
-    """Residuals in units of the noise, with the prior and perhaps further rows below them.
+    """Residuals in units of the noise, perhaps with further rows below them, and with the prior.
 
     Parameters
     ----------
     problem
         What is fitted.
-    held
-        Values, and derivatives by the log-parameters, of rows that hold the fit to something.
+    further
+        Values, and derivatives by the log-parameters, of what else a fit should keep small.
     condensed
         Whether few rows may stand for all samples, at the price of some digits.
     """
 
     def __init__(
-        self, problem: Problem, held: Rows | None = None, *, condensed: bool = True
+        self, problem: Problem, further: Rows | None = None, *, condensed: bool = True
     ) -> None:
         self._of = problem.residuals.condensed if condensed else problem.residuals
-        self._held = held
+        self._further = further
+        self.low, self.high = problem.low, problem.high
         self._residuals = problem.residuals
         self._middle = 0.5 * (problem.low + problem.high)
         self._prior = np.eye(len(self._middle)) / PRIOR_WIDTH
@@ -84,12 +89,13 @@ class Objective:
         if self._last is None or not np.array_equal(self._last[0], x):
             scale = self._residuals.noise_scale_rad
             residual, sensitivity = self._of(x)
-            rows = [residual / scale, (x - self._middle) / PRIOR_WIDTH]
-            slopes = [sensitivity.T / scale, self._prior]
-            if self._held is not None:
-                values, derivatives = self._held(x)
+            rows, slopes = [residual / scale], [sensitivity.T / scale]
+            if self._further is not None:
+                values, derivatives = self._further(x)
                 rows.append(values)
                 slopes.append(derivatives)
+            rows.append((x - self._middle) / PRIOR_WIDTH)
+            slopes.append(self._prior)
             misfit = float(np.linalg.norm(residual)) / np.sqrt(self._residuals.samples)
             self._last = x.copy(), np.concatenate(rows), np.concatenate(slopes), misfit
             self.evaluations += 1
@@ -103,6 +109,16 @@ class Objective:
         """Their Jacobian."""
         return self.both(x)[1]
 
+    def gradient(self, x: Array) -> Array:
+        """Derivatives of half the sum of squares, (n_parameters,)."""
+        rows, jacobian = self.both(x)
+        return jacobian.T @ rows
+
+    def chi2(self, rows: Array) -> float:
+        """Sum of squares of rows, in units of the noise, without what is the prior's."""
+        told = rows[: -len(self._middle)]
+        return float(told @ told)
+
     def misfit_rad(self, x: Array) -> float:
         """RMS misfit."""
         self.both(x)
@@ -110,9 +126,7 @@ class Objective:
         return self._last[3]
 
 
-def local_fit(
-    problem: Problem, start: Array, tolerance: float = FINE, held: Rows | None = None
-) -> LocalFit:
+def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalFit:
     """Fit from one starting point with SciPy's bounded trust-region least squares.
 
     Parameters
@@ -123,10 +137,8 @@ def local_fit(
         Log-parameters; moved into the bounds if need be.
     tolerance
         `ROUGH`, `FAIR` or `FINE`.
-    held
-        What the fit is held to, see `Objective`.
     """
-    objective = Objective(problem, held)
+    objective = Objective(problem)
     inside = 1e-9 * (problem.high - problem.low)
     found = least_squares(
         objective.rows,
@@ -142,17 +154,21 @@ def local_fit(
 
 
 def settled(problem: Problem, found: LocalFit) -> LocalFit:
-    """Take Gauss-Newton steps until an optimum stands still to the last digits.
+    """Take Newton steps until an optimum stands still to the last digits.
 
     A trust region compares sums of squares, and so finds an optimum to half the
     digits; where the gradient vanishes can be found to all of them, from all the
-    samples. Parameters that push against a bound stay on it.
+    samples. Parameters that push against a bound stay on it. The curvature is the
+    full one: along a valley, where parameters trade against each other, that of
+    Gauss and Newton leaves out most of it, and its steps go to and fro for ever.
     """
-    objective = Objective(problem, condensed=False)
+    objective, nearby = Objective(problem, condensed=False), Objective(problem)
     x, left = found.log_parameters, _MOST_STEPS
+    length = before = np.inf
     while left > 0:
-        rows, jacobian = objective.both(x)
-        downhill = -(jacobian.T @ rows)
+        downhill = -objective.gradient(x)
+        if not length < _SHRUNK * before:
+            curvature = _curvature(nearby, x)
         edge = 1e-6 * (problem.high - problem.low)
         stuck = ((x <= problem.low + edge) & (downhill < 0)) | (
             (x >= problem.high - edge) & (downhill > 0)
@@ -160,13 +176,27 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
         x = np.where(stuck & (downhill < 0), problem.low, x)
         x = np.where(stuck & (downhill > 0), problem.high, x)
         step = np.zeros_like(x)
-        free = jacobian[:, ~stuck]
-        # The prior keeps this regular; what rounding does to a step, the next one mends.
-        step[~stuck] = np.linalg.solve(free.T @ free, downhill[~stuck])
-        x = np.clip(x + step, problem.low, problem.high)
-        nearly = left > _LAST_STEPS and np.max(np.abs(step)) < _NEARLY_SETTLED
-        left = _LAST_STEPS if nearly else left - 1
+        # What rounding does to a step, the next one mends.
+        step[~stuck] = _newton(curvature[np.ix_(~stuck, ~stuck)], downhill[~stuck])
+        before, length = length, float(np.max(np.abs(step)))
+        x = np.clip(x + step / max(length, 1.0), problem.low, problem.high)
+        left = _LAST_STEPS if left > _LAST_STEPS and length < _NEARLY_SETTLED else left - 1
     misfit = objective.misfit_rad(x)
+    evaluations = objective.evaluations + nearby.evaluations
     if not misfit <= found.misfit_rad * (1 + FINE):
-        return replace(found, evaluations=objective.evaluations)
-    return LocalFit(x, misfit, objective.evaluations)
+        return replace(found, evaluations=evaluations)
+    return LocalFit(x, misfit, evaluations)
+
+
+def _newton(curvature: Array, downhill: Array) -> Array:
+    """Step to where a quadratic form is flat, or, if it curves down, mirrored to go downhill."""
+    bend, turned = np.linalg.eigh(curvature)
+    step: Array = turned @ ((turned.T @ downhill) / np.maximum(np.abs(bend), PRIOR_WIDTH**-2))
+    return step
+
+
+def _curvature(objective: Objective, x: Array) -> Array:
+    """Second derivatives of half the sum of squares, from differences of its gradient."""
+    here = objective.gradient(x)
+    rows = [(objective.gradient(x + step) - here) / _STEP for step in _STEP * np.eye(len(x))]
+    return 0.5 * (np.array(rows) + np.array(rows).T)

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identify import local_fit
 from biogrip.identify.answer import Identification, Progress
 from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.local_fit import ROUGH
@@ -62,6 +63,31 @@ def best_of_many_starts(
         progress(evaluations, misfit_rad)
         answers.append(answer_of(rows))
     return answers
+
+
+def fitted_from(problems: Sequence[Problem], start: Array) -> Array:
+    """Fit every trace from one starting point, and settle the optima.
+
+    Parameters
+    ----------
+    problems
+        What is fitted, one a trace.
+    start : (n_parameters,)
+        Log-parameters.
+
+    Returns
+    -------
+    (n_traces, n_parameters)
+        Log-parameters of the optima.
+    """
+    if not fit_together(problems):
+        fits_alone = [
+            local_fit.settled(each, local_fit.local_fit(each, start)) for each in problems
+        ]
+        return np.array([fit.log_parameters for fit in fits_alone])
+    fits, traces = ManyFits(problems), np.arange(len(problems))
+    starts = np.broadcast_to(start, (len(problems), len(start)))
+    return settled(fits, fits.fitted(starts, traces), traces).x
 
 
 def _best(found: Minima, which: BoolArray, count: int) -> IntArray:

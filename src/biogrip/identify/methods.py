@@ -1,12 +1,13 @@
 """The identifiers that there are.
 
-Each is a module of its own here, named like the method, with two functions:
-``settings_of(blocks)`` reads its config blocks, and ``identify(problem, settings,
-rng, progress)`` returns an `Identification`. Ranges and traces are the
+Each is a module of its own here, named like the method, with two functions or three:
+``settings_of(blocks)`` reads its config blocks, ``identify(problem, settings,
+rng, progress)`` returns an `Identification`, and ``identify_many(problems, settings,
+rngs, progress)`` those of many traces at once. Ranges and traces are the
 problem's, randomness is the generator's, the budget is in the settings.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -16,7 +17,10 @@ import numpy as np
 from biogrip.identify.answer import Identification, Progress
 from biogrip.identify.problem import Problem
 
-Identify = Callable[[Problem, np.random.Generator, Progress], Identification]
+Identify = Callable[
+    [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
+]
+"""Identifies traces, each with a generator of its own, and each as if it were alone."""
 
 
 @dataclass(frozen=True)
@@ -82,8 +86,13 @@ def identifier(name: str, settings: object) -> Identify:
     """
     module = import_module(METHODS[name].module)
 
-    def identify(problem: Problem, rng: np.random.Generator, progress: Progress) -> Identification:
-        answer: Identification = module.identify(problem, settings, rng, progress)
-        return answer
+    def identify(
+        problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
+    ) -> list[Identification]:
+        if hasattr(module, "identify_many"):
+            answers: list[Identification] = module.identify_many(problems, settings, rngs, progress)
+            return answers
+        pairs = zip(problems, rngs, strict=True)
+        return [module.identify(problem, settings, rng, progress) for problem, rng in pairs]
 
     return identify

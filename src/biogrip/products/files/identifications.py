@@ -56,11 +56,13 @@ class Record:
 
     Parameters
     ----------
-    case, method, seed
+    case, method
         Whose it is.
     model, searched, fixed
         Sample model; the same without the parameters that were not identified;
         and those, by name.
+    seed
+        Of which trace.
     answer
         What came out.
     noise_rms_rad
@@ -71,10 +73,10 @@ class Record:
 
     case: str
     method: str
-    seed: int
     model: SampleModel
     searched: SampleModel
     fixed: Mapping[str, float]
+    seed: int
     answer: Identification
     noise_rms_rad: float | None
     cpu_s: float

@@ -21,6 +21,7 @@ from biogrip.products.files.traces import MEASUREMENTS, read_measurements
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
 from biogrip.study.study import Study
@@ -77,27 +78,26 @@ def identify(
     parameters, history
         Identified parameters, CSV, and the way to them, Parquet.
     timing
-        Processor times, CSV.
+        Processor times, CSV: of traces that are identified together, the mean.
     """
     case, method = settings.case, settings.method
     posed = settings.problem.calibrated(calibrated)
     identified = identifier(method, settings.of_method)
     recorded = read_measurements(measurements, list(seeds))
     progress = Progress(f"{case}, {method}", len(seeds))
+    whose = case, method, posed.model, posed.searched, posed.fixed
     records = []
-    for seed in seeds:
-        trace = recorded.rotation_rad[seed]
+    for group in groups(seeds):
+        traces = [recorded.rotation_rad[seed] for seed in group]
+        rngs = [stream(settings.study_seed, case, seed, method) for seed in group]
         start = time.process_time()
-        rng = stream(settings.study_seed, case, seed, method)
-        answer = identified(posed.of(recorded.time_s, trace), rng, progress.within)
-        cpu_s = time.process_time() - start
-        noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
-        records.append(
-            Record(
-                case, method, seed, posed.model, posed.searched, posed.fixed, answer, noise, cpu_s
-            )
-        )
-        progress.done()
+        problems = [posed.of(recorded.time_s, trace) for trace in traces]
+        answers = identified(problems, rngs, progress.within)
+        cpu_s = (time.process_time() - start) / len(group)
+        for seed, trace, answer in zip(group, traces, answers, strict=True):
+            noise = None if recorded.target_rad is None else rms(trace - recorded.target_rad)
+            records.append(Record(*whose, seed, answer, noise, cpu_s))
+        progress.done(len(group))
     write_identifications(parameters, records)
     write_histories(history, records)
     write_timings(timing, records)

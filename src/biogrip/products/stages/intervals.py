@@ -9,12 +9,13 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.identifiability.fisher import covariance
-from biogrip.identifiability.profile import likelihood_of, limits_near
+from biogrip.identifiability.many_limits import limits_of
+from biogrip.identifiability.profile import likelihood_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.many_starts import fitted_from
 from biogrip.identify.methods import METHODS, identifier
 from biogrip.measurement import Noise, add_noise, standard_deviation
 from biogrip.products.files.rows import RowFile
@@ -23,6 +24,7 @@ from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
 from biogrip.sample import with_fixed
@@ -132,23 +134,31 @@ def _rows(
     given = {name: parameters[name] for i, name in enumerate(names) if i not in told}
     rest_known = with_fixed(posed.searched, given)
     progress = Progress(f"{case}, intervals", len(seeds))
-    for seed in seeds:
-        trace = add_noise(rotation, noise, stream(settings.study_seed, case, seed, "noise"))
-        problem = posed.of(time_s, trace)
-        found = identify(problem, stream(settings.study_seed, case, seed, "coverage"), silent)
-        likelihood = likelihood_of(
-            problem, np.log(found.parameters), found.misfit_rad, confidence=settings.confidence
-        )
-        simpler = posed.of(time_s, trace, rest_known)
-        bottom = settled(simpler, local_fit(simpler, truth[told]))
-        known = truth.copy()
-        known[told] = bottom.log_parameters
-        for quantity in quantities:
-            limits = limits_near(likelihood, quantity)
-            numbers = (quantity.log(likelihood.best), *limits, quantity.log(known))
-            texts = ["" if u is None else f"{math.exp(u):.5g}" for u in numbers]
-            yield case, quantity.label, seed, *texts
-        progress.done()
+    for group in groups(seeds):
+        streams = {
+            purpose: [stream(settings.study_seed, case, seed, purpose) for seed in group]
+            for purpose in ("noise", "coverage")
+        }
+        traces = [add_noise(rotation, noise, rng) for rng in streams["noise"]]
+        problems = [posed.of(time_s, trace) for trace in traces]
+        found = identify(problems, streams["coverage"], silent)
+        likelihoods = [
+            likelihood_of(
+                problem, np.log(each.parameters), each.misfit_rad, confidence=settings.confidence
+            )
+            for problem, each in zip(problems, found, strict=True)
+        ]
+        limits = limits_of(likelihoods, quantities)
+        simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
+        known = np.tile(truth, (len(group), 1))
+        known[:, told] = fitted_from(simpler, truth[told])
+        for index, seed in enumerate(group):
+            for which, quantity in enumerate(quantities):
+                best, other = quantity.log(likelihoods[index].best), quantity.log(known[index])
+                numbers = (best, *limits[index, which], other)
+                texts = ["" if math.isnan(u) else f"{math.exp(u):.5g}" for u in numbers]
+                yield case, quantity.label, seed, *texts
+        progress.done(len(group))
 
 
 def _determined(expected: Path) -> set[str]:

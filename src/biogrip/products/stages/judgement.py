@@ -99,7 +99,7 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     problem = posed.of(recorded.time_s, recorded.rotation_rad[TRACE])
     identify = identifier("least_squares", settings.least_squares)
     rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
-    found = identify(problem, rng, silent)
+    (found,) = identify([problem], [rng], silent)
     told = diagnose(
         problem,
         posed.searched,

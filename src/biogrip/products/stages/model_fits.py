@@ -12,6 +12,7 @@ from biogrip.products.files.traces import MEASUREMENTS, Measurements, read_measu
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.random_streams import stream
 from biogrip.sample import MODELS
@@ -88,12 +89,14 @@ def _rows(
     progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
     for name in settings.models:
         model = MODELS[name]
-        for seed in seeds:
-            problem = posed.of(recorded.time_s, recorded.rotation_rad[seed], model)
-            rng = stream(settings.study_seed, case, seed, f"model {name}")
-            found = identify(problem, rng, silent)
-            yield case, name, seed, len(model.names), samples, f"{found.misfit_rad:.8e}"
-            progress.done()
+        for group in groups(seeds):
+            traces = [recorded.rotation_rad[seed] for seed in group]
+            problems = [posed.of(recorded.time_s, trace, model) for trace in traces]
+            rngs = [stream(settings.study_seed, case, seed, f"model {name}") for seed in group]
+            found = identify(problems, rngs, silent)
+            for seed, answer in zip(group, found, strict=True):
+                yield case, name, seed, len(model.names), samples, f"{answer.misfit_rad:.8e}"
+            progress.done(len(group))
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:

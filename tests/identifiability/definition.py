@@ -1,0 +1,156 @@
+"""What a confidence limit is, by other means than the study's.
+
+With a quantity held, SciPy searches all samples for the lowest chi^2 over what is left free,
+without a prior. A parameter is held by leaving it out; of a sum what is left free is the logarithm
+of the ratio of its two members. The starts are the best of many random points, some others of
+them, and what is handed in.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import expit, log_expit
+
+from biogrip.arrays import Array
+from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.quantities import Quantity
+
+CANDIDATES, BEST, ANY = 400, 8, 16
+ROUGH, TIGHT = 1e-6, 1e-11
+# What the project says of branches that do not relax within the experiment.
+HINGE = 10.0
+
+
+class Held:
+    """A quantity's logarithm held at a target; points are of what is left free.
+
+    Parameters
+    ----------
+    likelihood
+        The trace.
+    quantity
+        A parameter, or the sum of two.
+    target
+        Its logarithm.
+    """
+
+    def __init__(self, likelihood: Likelihood, quantity: Quantity, target: float) -> None:
+        self._likelihood, self._quantity, self._target = likelihood, quantity, target
+        problem = likelihood.problem
+        self._first = quantity.members[0]
+        low, high = problem.low, problem.high
+        if len(quantity.members) == 1:
+            self._rest = [i for i in range(len(low)) if i != self._first]
+            self.low, self.high = low[self._rest], high[self._rest]
+        else:
+            assert quantity.form == "sum"
+            assert len(quantity.members) == 2
+            second = quantity.members[1]
+            self._rest = [i for i in range(len(low)) if i not in quantity.members]
+            lows = max(ratio(low[self._first], target), -ratio(high[second], target))
+            highs = min(ratio(high[self._first], target), -ratio(low[second], target))
+            self.low, self.high = (
+                np.append(low[self._rest], lows),
+                np.append(high[self._rest], highs),
+            )
+
+    def log_parameters(self, point: Array) -> Array:
+        """All log-parameters."""
+        x = np.empty(len(self._likelihood.best))
+        x[self._rest] = point[: len(self._rest)]
+        x[self._first] = self._target
+        if len(self._quantity.members) == 2:
+            x[self._first] += log_expit(point[-1])
+            x[self._quantity.members[1]] = self._target + log_expit(-point[-1])
+        return x
+
+    def point(self, x: Array) -> Array:
+        """What is left free, at or near log-parameters."""
+        free = x[self._rest]
+        if len(self._quantity.members) == 2:
+            free = np.append(free, x[self._first] - x[self._quantity.members[1]])
+        inside = 1e-9 * (self.high - self.low)
+        return np.clip(free, self.low + inside, self.high - inside)
+
+    def _rows(self, point: Array) -> Array:
+        x = self.log_parameters(point)
+        rows = self._likelihood.problem.residuals(x)[0] / self._likelihood.noise_rad
+        return np.append(rows, [HINGE * max(late, 0.0) for late in self._late(x)])
+
+    def _late(self, x: Array) -> list[float]:
+        longest = np.log(self._likelihood.problem.residuals.duration_s)
+        return [float(x[c] - x[k] - longest) for k, c in self._quantity.branches]
+
+    def _slopes(self, point: Array) -> Array:
+        x = self.log_parameters(point)
+        problem = self._likelihood.problem
+        slopes = problem.residuals(x)[1].T / self._likelihood.noise_rad
+        for (k, c), late in zip(self._quantity.branches, self._late(x), strict=True):
+            row = np.zeros(len(x))
+            if late > 0:
+                row[c], row[k] = HINGE, -HINGE
+            slopes = np.vstack((slopes, row))
+        turned = slopes[:, self._rest]
+        if len(self._quantity.members) == 2:
+            second = self._quantity.members[1]
+            along = slopes[:, self._first] * expit(-point[-1]) - slopes[:, second] * expit(
+                point[-1]
+            )
+            turned = np.column_stack((turned, along))
+        return turned
+
+    def fitted(self, x: Array, tolerance: float = TIGHT) -> tuple[float, Array]:
+        """Rise of chi^2 of a fit from log-parameters, and where it ends."""
+        ends = dict.fromkeys(("ftol", "xtol", "gtol"), tolerance)
+        bounds = (self.low, self.high)
+        found = least_squares(self._rows, self.point(x), self._slopes, bounds, max_nfev=200, **ends)
+        residuals = self._likelihood.problem.residuals
+        least = residuals.samples * (self._likelihood.misfit_rad / self._likelihood.noise_rad) ** 2
+        return 2 * float(found.cost) - least, self.log_parameters(found.x)
+
+    def rise(self, rng: np.random.Generator, starts: Iterable[Array] = ()) -> float:
+        """Lowest rise of chi^2 from many starts."""
+        points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
+        many = np.array([self.log_parameters(point) for point in points])
+        misfit = self._likelihood.problem.misfit(np.exp(many))
+        late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
+        rises = np.array([self._likelihood.rise(float(u)) for u in misfit]) + HINGE**2 * late
+        order = np.argsort(rises)
+        first = np.concatenate((many[order[:BEST]], many[order[BEST :: len(order) // ANY]]))
+        found = sorted((self.fitted(x, ROUGH) for x in (*first, *starts)), key=lambda fit: fit[0])
+        return min(self.fitted(x)[0] for _, x in found[:3])
+
+
+def ratio(log_member: float, log_sum: float) -> float:
+    """Logarithm of a member of a sum over the rest of it."""
+    share = log_member - log_sum
+    return np.inf if share >= 0 else float(share - np.log(-np.expm1(share)))
+
+
+def rise_at(
+    likelihood: Likelihood, quantity: Quantity, limit: float, rng: np.random.Generator
+) -> float:
+    """Rise at a limit: lowest over random starts, from the best fit, and from the other basin.
+
+    In the other basin exchangeable members have changed places.
+    """
+    held = Held(likelihood, quantity, limit)
+    other = likelihood.best.copy()
+    other[[-2, -1]] = other[[-1, -2]]
+    return held.rise(rng, (likelihood.best, other))
+
+
+def rise_along(likelihood: Likelihood, quantity: Quantity, limit: float, steps: int = 24) -> float:
+    """Rise at a limit, followed in small steps from the optimum, or back from beyond the limit."""
+    x, rises = likelihood.best, []
+    start = quantity.log(x)
+    ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
+    beyond = float(np.clip(1.25 * limit - 0.25 * start, *ends))
+    there = np.linspace(start, limit, steps + 1)[1:]
+    on = np.linspace(limit, beyond, steps // 4 + 1)[1:]
+    for target in (*there, *on, *on[-2::-1], limit):
+        rise, x = Held(likelihood, quantity, float(target)).fitted(x)
+        if target == limit:
+            rises.append(rise)
+    return min(rises)

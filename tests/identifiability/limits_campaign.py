@@ -1,0 +1,117 @@
+"""Confidence limits against their definition, on very many traces.
+
+``python -m tests.identifiability.limits_campaign [traces [case ...]]`` takes some 10 minutes for
+100 traces of a case, one for the ``example`` under twenty names. The test suite has a few.
+"""
+
+import functools
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
+from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identify.answer import silent
+from biogrip.identify.methods import identifier
+from biogrip.identify.problem import Problem, problem_of
+from biogrip.random_streams import stream
+from biogrip.study import build
+from tests.identifiability.definition import rise_along, rise_at
+from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run
+
+ALLOWED = 0.01
+ALIKE = 1e-3
+EXAMPLE = Path(__file__).parents[2] / "data" / "example_trace.csv"
+NAMES = ("example_trace", *(f"trace_{year}" for year in range(2006, 2021)), "a", "b", "zz", "cell")
+
+
+def likelihood_for(case: str, seed: int) -> Likelihood:
+    """What the limits of a simulated trace are measured against."""
+    posed = problem(case, seed, rate_Hz=10.0)
+    found = run("least_squares", posed, seed)
+    return likelihood_of(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+
+
+@functools.cache
+def _example() -> Problem:
+    time_s, rotation_rad = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1, unpack=True)
+    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    ranges = build.gene_ranges(CONFIG["search_range"])
+    return problem_of(gripper, MODEL, torque, time_s, rotation_rad, ranges)
+
+
+def example(name: str) -> Likelihood:
+    """Likelihood of the example trace in a file of some name: its random starts follow from it."""
+    rng = stream(CONFIG["study_seed"], name, 0, "identifiability")
+    found = identifier("least_squares", CONFIG)(_example(), rng, silent)
+    return likelihood_of(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
+
+
+def misses(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float]]:
+    """Quantity, whose limit, its logarithm, and by what share of the threshold the rise misses."""
+    rng = np.random.default_rng(0)
+    for quantity in parameters_and_sum(MODEL):
+        found = profile(likelihood, quantity)
+        for limit in (found.low, found.high):
+            if limit is not None:
+                rise = rise_at(likelihood, quantity, limit, rng)
+                yield quantity.label, "profile", limit, rise / likelihood.threshold - 1
+        for limit in limits_near(likelihood, quantity):
+            if limit is not None:
+                rise = rise_along(likelihood, quantity, limit)
+                yield quantity.label, "near", limit, rise / likelihood.threshold - 1
+
+
+def differences(limits: Array) -> Array:
+    """Largest differences of limits in shares of the intervals' widths.
+
+    Parameters
+    ----------
+    limits : (n_names, n_quantities, 2)
+        Logarithms, NaN where there is none; measured from the estimate, if there is but one.
+
+    Returns
+    -------
+    (n_quantities,)
+    """
+    assert np.array_equal(np.isnan(limits).any(axis=0), np.isnan(limits).all(axis=0))
+    spread = np.nanmax(np.ptp(limits, axis=0), axis=1)
+    width = limits[0, :, 1] - limits[0, :, 0]
+    return spread / np.where(np.isnan(width), 1.0, width)
+
+
+def limits_of(likelihood: Likelihood) -> list[tuple[float, float]]:
+    """Limits of every quantity's profile, NaN where there is none."""
+    found = [profile(likelihood, quantity) for quantity in parameters_and_sum(MODEL)]
+    return [
+        (np.nan if p.low is None else p.low, np.nan if p.high is None else p.high) for p in found
+    ]
+
+
+def main(traces: int, cases: list[str]) -> None:
+    """Print what misses its definition, and how far the worst of the others are from it."""
+    for case in cases:
+        if case == "example":
+            apart = differences(np.array([limits_of(example(name)) for name in NAMES]))
+            print(f"example: {len(NAMES)} names, limits differ by {apart.max():.1e} of the width")
+            continue
+        limits, failed, worst = 0, 0, 0.0
+        for seed in range(traces):
+            for label, whose, limit, miss in misses(likelihood_for(case, seed)):
+                limits += 1
+                if abs(miss) <= ALLOWED:
+                    worst = max(worst, abs(miss))
+                    continue
+                failed += 1
+                print(f"{case} {seed}: {label} ({whose}) {np.exp(limit):.6g}: {miss:+.2%}")
+        print(f"{case}: {traces} traces, {limits} limits, {failed} miss; the others by {worst:.3%}")
+
+
+if __name__ == "__main__":
+    main(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 100,
+        sys.argv[2:] or ["example", *SAMPLES],
+    )

@@ -1,0 +1,118 @@
+"""Confidence limits are where their definition has them, whatever the random starts.
+
+All 100 traces of each case, and the whole profiles of twenty names, are `limits_campaign`'s.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identifiability.held_fit import brought_to, held_fit
+from biogrip.identifiability.profile import limits_near
+from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
+from biogrip.identify.local_fit import FINE, Objective, local_fit, settled
+from biogrip.sample import model_named
+from tests.identifiability.definition import Held
+from tests.identifiability.limits_campaign import (
+    ALIKE,
+    ALLOWED,
+    NAMES,
+    differences,
+    example,
+    likelihood_for,
+    limits_of,
+    misses,
+)
+from tests.identify.test_methods import MODEL, problem, run
+
+
+@pytest.mark.parametrize(
+    ("case", "seed"), [("endothelial_cell", 0), ("liquid_drop_1", 4), ("liquid_drop_2", 0)]
+)
+def test_the_rise_at_a_limit_is_the_threshold(case: str, seed: int) -> None:
+    found = list(misses(likelihood_for(case, seed)))
+    assert len(found) >= 8
+    assert [miss for miss in found if abs(miss[-1]) > ALLOWED] == []
+
+
+def test_the_name_of_a_trace_changes_no_limit() -> None:
+    """The fast limits of all names, and whole profiles of the two whose optima differ most."""
+    likelihoods = [example(name) for name in NAMES]
+    best = np.array([likelihood.best for likelihood in likelihoods])
+    assert np.ptp(best, axis=0).max() < 1e-4
+    quantities = parameters_and_sum(MODEL)
+    fast = [
+        [[math.nan if u is None else u for u in limits_near(likelihood, q)] for q in quantities]
+        for likelihood in likelihoods
+    ]
+    assert differences(np.array(fast)).max() < ALIKE
+    away = np.abs(best - best[0]).max(axis=1)
+    pair = [limits_of(likelihoods[0]), limits_of(likelihoods[int(np.argmax(away))])]
+    assert differences(np.array(pair)).max() < ALIKE
+    assert [miss for miss in misses(likelihoods[3]) if abs(miss[-1]) > ALLOWED] == []
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
+def test_an_optimum_is_the_same_from_wherever_it_is_reached(case: str) -> None:
+    posed = problem(case, 0, rate_Hz=10.0)
+    best = np.log(run("least_squares", posed).parameters)
+    rng = np.random.default_rng(0)
+    starts = best + 0.3 * rng.standard_normal((5, len(best)))
+    found = [settled(posed, local_fit(posed, start)).log_parameters for start in starts]
+    assert np.ptp([best, *found], axis=0).max() < 1e-7
+
+
+def test_an_optimum_that_was_missed_is_judged_again() -> None:
+    posed = problem("liquid_drop_2", 0, rate_Hz=10.0)
+    found = run("least_squares", posed)
+    start = np.log(found.parameters) + np.array([0.0, 0.0, 0.05, 0.0])
+    missed = replace(
+        found, parameters=np.exp(start), misfit_rad=float(posed.misfit(np.exp(start)[None])[0])
+    )
+    right, again = (diagnose(posed, MODEL, f, confidence=0.95) for f in (found, missed))
+    assert again.likelihood.misfit_rad == pytest.approx(right.likelihood.misfit_rad, rel=1e-9)
+    for one, other in zip(right.findings, again.findings, strict=True):
+        assert other.verdict == one.verdict
+        assert other.profile.high == pytest.approx(one.profile.high, abs=1e-5)
+
+
+BURGERS = model_named("burgers")
+FORMS: dict[str, Quantity] = {
+    "parameter": parameters_and_sum(BURGERS)[1],
+    "sum": combinations_of(BURGERS, [0, 2])[0],
+    "series": combinations_of(BURGERS, [0, 2])[1],
+    "time": combinations_of(BURGERS, [0, 3])[0],
+    "sum of three": parameters_and_sum(model_named("generalized_maxwell", 2))[-1],
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_quantity_is_brought_to_a_value_within_bounds(form: str) -> None:
+    quantity = FORMS[form]
+    rng = np.random.default_rng(0)
+    count = max(quantity.members) + 1
+    low, high = np.full(count, -3.0), np.linspace(2.0, 5.0, count)
+    first, last = quantity.range(low, high)
+    for target in np.linspace(first, last, 9):
+        x: Array = brought_to(quantity, float(target), rng.uniform(-4, 6, count), low, high)
+        assert np.all((x >= low) & (x <= high))
+        assert quantity.log(x) == pytest.approx(target, abs=1e-9)
+
+
+@pytest.mark.parametrize("label", ["k", "c", "c_p", "c + c_p"])
+def test_a_held_fit_is_scipys(label: str) -> None:
+    likelihood = likelihood_for("endothelial_cell", 1)
+    objective = Objective(likelihood.problem)
+    (quantity,) = (q for q in parameters_and_sum(MODEL) if q.label == label)
+    for away in (-0.3, 0.1):
+        target = quantity.log(likelihood.best) + away
+        none = np.zeros((len(MODEL.parameters),) * 2)
+        found = held_fit(objective, quantity, target, likelihood.best, none, FINE)
+        assert quantity.log(found.log_parameters) == pytest.approx(target, abs=1e-11)
+        rise = likelihood.rise(objective.misfit_rad(found.log_parameters))
+        scipys, _ = Held(likelihood, quantity, target).fitted(likelihood.best)
+        assert rise == pytest.approx(scipys, abs=0.02)
