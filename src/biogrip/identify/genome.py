@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import prod
 
 import numpy as np
 
@@ -58,6 +59,20 @@ class Genome:
         """Draw chromosomes uniformly, shape (count, n_genes)."""
         return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
 
+    def draw_genes(self, count: int, times: int, rng: np.random.Generator) -> IntArray:
+        """Choose a gene of each of some chromosomes and draw its new value, so many times.
+
+        Returns
+        -------
+        (times, 2, count)
+            Genes and values.
+        """
+        drawn = np.empty((times, 2, count), dtype=np.int64)
+        for gene, value in drawn:
+            gene[:] = rng.integers(self.genes, size=count)
+            value[:] = rng.integers(self.low[gene], self.high[gene], endpoint=True)
+        return drawn
+
     def decode(self, chromosomes: IntArray) -> Array:
         """Parameters of chromosomes, 10^g_1 (0.1 g_2 + 0.01 g_3) (eq. 10).
 
@@ -77,29 +92,150 @@ class Genome:
         return parameters
 
     def code(self, chromosomes: IntArray) -> IntArray:
-        """Number chromosomes so that different ones have different numbers.
+        """Number chromosomes in the order of their genes; different ones differ.
+
+        Each word is a number whose digits are genes, counted from their smallest
+        values. So crossover and mutation are arithmetic on codes.
+
+        Parameters
+        ----------
+        chromosomes : (n, n_genes)
 
         Returns
         -------
         (n_words, n)
-            Fifteen genes a word, for sorting and comparing.
         """
         shifted = chromosomes - self.low
-        return np.array([shifted[:, genes] @ weights for genes, weights in self._words])
+        codes = np.zeros((self._words, len(chromosomes)), dtype=np.int64)
+        for gene, (word, weight) in enumerate(zip(self._word, self._weight, strict=True)):
+            codes[word] += shifted[:, gene] * weight
+        return codes
+
+    def parameters(self, codes: IntArray) -> Array:
+        """Parameters of chromosomes from their codes, as `decode` has them.
+
+        Parameters
+        ----------
+        codes : (n_words, ...)
+
+        Returns
+        -------
+        (..., n_parameters)
+        """
+        parameters = np.empty((self.genes // _GENES, *codes.shape[1:]))
+        rest = codes
+        for parameter, values in enumerate(self._values):
+            last = _GENES * parameter + _GENES - 1
+            word, weight = self._word[last], int(self._weight[last])
+            if parameter == 0 or word != self._word[last - _GENES]:
+                rest = codes[word]
+            which = rest // weight
+            rest = rest - which * weight
+            values.take(which, out=parameters[parameter], mode="clip")
+        return np.moveaxis(parameters, 0, -1)
+
+    def crossed(
+        self, mothers: IntArray, fathers: IntArray, cut: IntArray
+    ) -> tuple[IntArray, IntArray]:
+        """Both children of each pair: all genes from the cut on are swapped.
+
+        Parameters
+        ----------
+        mothers, fathers : (n_words, ...)
+            Codes.
+        cut : (...)
+            Number of genes before the cut.
+
+        Returns
+        -------
+        Codes like the parents'.
+        """
+        modulus = self._modulus.take(cut, axis=1)
+        swapped = fathers % modulus - mothers % modulus
+        return mothers + swapped, fathers - swapped
+
+    def redraw(
+        self,
+        codes: IntArray,
+        population: IntArray,
+        individual: IntArray,
+        gene: IntArray,
+        value: IntArray,
+    ) -> None:
+        """Give genes of some chromosomes another value, in place.
+
+        Parameters
+        ----------
+        codes : (n_words, n_populations, n)
+        population, individual, gene, value : (n_redrawn,)
+            Indices of the chromosome, none twice; index of its gene; the gene's new value.
+        """
+        which, weight = (self._word[gene], population, individual), self._weight[gene]
+        before = codes[which]
+        old = before // weight % self._span[gene]
+        codes[which] = before + (value - self.low[gene] - old) * weight
 
     @cached_property
-    def _words(self) -> list[tuple[slice, IntArray]]:
-        """Genes of each word, and what a step of each of them counts."""
-        words = []
-        for start in range(0, self.genes, _GENES_A_WORD):
-            genes = slice(start, start + _GENES_A_WORD)
-            span = (self.high - self.low + 1)[genes]
-            words.append((genes, np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))))
-        return words
+    def _span(self) -> IntArray:
+        """How many values each gene has."""
+        return self.high - self.low + 1
+
+    @cached_property
+    def _word(self) -> IntArray:
+        """Word of each gene; the genes of a parameter share one."""
+        words, filled = [0], 1
+        for genes in self._span.reshape(-1, _GENES).tolist():
+            filled *= prod(genes)
+            if filled > 2**WORD_BITS:
+                words.append(words[-1] + 1)
+                filled = prod(genes)
+            else:
+                words.append(words[-1])
+        return np.repeat(words[1:], _GENES)
+
+    @property
+    def _words(self) -> int:
+        return int(self._word[-1]) + 1
+
+    @cached_property
+    def _weight(self) -> IntArray:
+        """What a step of each gene counts in its word."""
+        weights = np.ones(self.genes, dtype=np.int64)
+        for gene in range(self.genes - 2, -1, -1):
+            if self._word[gene] == self._word[gene + 1]:
+                weights[gene] = weights[gene + 1] * self._span[gene + 1]
+        return weights
+
+    @cached_property
+    def _modulus(self) -> IntArray:
+        """What is left of a word, modulo this, are the genes from a cut on; (n_words, n_genes)."""
+        moduli = np.empty((self._words, self.genes), dtype=np.int64)
+        for word in range(self._words):
+            own = np.flatnonzero(self._word == word)
+            every = self._weight[own[0]] * self._span[own[0]]
+            moduli[word] = np.where(np.arange(self.genes) < own[0], every, 1)
+            moduli[word, own] = self._weight[own] * self._span[own]
+        return moduli
+
+    @cached_property
+    def _values(self) -> list[Array]:
+        """All values of each parameter, by the number that its genes are."""
+        ranges = [
+            np.arange(low, high + 1) for low, high in zip(self.low, self.high, strict=True)
+        ]
+        parameters = []
+        for start in range(0, self.genes, _GENES):
+            grid = np.meshgrid(*ranges[start : start + _GENES], indexing="ij")
+            parameters.append(self.decode(np.stack(grid, axis=-1).reshape(-1, _GENES))[:, 0])
+        return parameters
 
 
-# Five parameters of the widest range, (37 * 9 * 9)^5, stay below 2^63.
-_GENES_A_WORD = 15
+_GENES = 3
+"""Genes of a parameter."""
+
+WORD_BITS = 48
+"""A word of a code is below two to this power."""
+
 # The largest power of ten that is an exact double.
 _LARGEST_POWER = 22
 _POWERS = range(-_LARGEST_POWER, _LARGEST_POWER + 1)
