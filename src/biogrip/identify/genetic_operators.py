@@ -10,6 +10,7 @@ import numpy as np
 from biogrip.arrays import IntArray
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import Genome
+from biogrip.identify.redraws import redraws
 
 
 def cross(
@@ -42,28 +43,29 @@ def cross(
         min(cut if cut > 0 else genome.genes + cut, genome.genes - 1)
         for cut in (settings.first_cut, settings.last_cut)
     )
-    drawn = np.empty((populations, 2 * pairs), dtype=np.int64)
+    drawn = np.empty((populations, pairs, 2), dtype=np.int64)
     cut = np.empty((populations, pairs), dtype=np.int64)
-    for population, rng in enumerate(rngs):
-        drawn[population] = _mates(count, 2 * pairs, settings, rng)
-        cut[population] = rng.integers(min(first, last), last, size=pairs, endpoint=True)
-    drawn += count * np.arange(populations)[:, None]
-    everyone = parents.reshape(words, -1)
-    mothers, fathers = (everyone.take(drawn[:, parent::2], axis=1) for parent in (0, 1))
-    children = np.concatenate(genome.crossed(mothers, fathers, cut), axis=2)
-    return children[:, :, :wanted]
+    for mates, cuts, rng in zip(drawn, cut, rngs, strict=True):
+        mates[:] = _mates(count, pairs, settings, rng)
+        cuts[:] = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+    drawn += count * np.arange(populations)[:, None, None]
+    mated = parents.reshape(words, -1).take(drawn.swapaxes(1, 2), axis=1)
+    children = genome.crossed(mated, cut).reshape(words, populations, -1)
+    return np.ascontiguousarray(children[:, :, :wanted])
 
 
 def _mates(
-    parents: int, wanted: int, settings: GeneticSettings, rng: np.random.Generator
+    parents: int, pairs: int, settings: GeneticSettings, rng: np.random.Generator
 ) -> IntArray:
-    """Indices of parents; two that follow one another, the first at an even place, mate."""
+    """Indices of mothers and fathers, (pairs, 2)."""
     if settings.mating == "rank":
         rank = np.arange(parents, 0, -1)
-        return rng.choice(parents, size=(wanted // 2, 2), p=rank / rank.sum()).ravel()
+        return rng.choice(parents, size=(pairs, 2), p=rank / rank.sum())
     even = parents // 2 * 2
-    rounds = [rng.permutation(parents)[:even] for _ in range(-(-wanted // even))]
-    return np.concatenate(rounds)[:wanted]
+    if 2 * pairs <= even:
+        return rng.permutation(parents)[: 2 * pairs].reshape(pairs, 2)
+    rounds = [rng.permutation(parents)[:even] for _ in range(-(-2 * pairs // even))]
+    return np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
 
 
 def mutate(
@@ -88,12 +90,8 @@ def mutate(
     chance = np.empty(children.shape[1:])
     for own, rng in zip(chance, rngs, strict=True):
         rng.random(out=own)
-    mutating = chance < settings.mutation_probability
-    population, child = np.nonzero(mutating)
-    counts = np.count_nonzero(mutating, axis=1).tolist()
-    redrawn = [
-        genome.draw_genes(count, settings.mutated_genes, rng)
-        for count, rng in zip(counts, rngs, strict=True)
-    ]
-    for gene, value in np.concatenate(redrawn, axis=2):
-        genome.redraw(children, population, child, gene, value)
+    mutating = np.flatnonzero(chance < settings.mutation_probability)
+    counts = np.bincount(mutating // chance.shape[1], minlength=len(rngs)).tolist()
+    flat = children.reshape(len(children), -1)
+    for gene, value in redraws(genome, counts, settings.mutated_genes, rngs):
+        genome.redraw(flat, mutating, gene, value)

@@ -59,20 +59,6 @@ class Genome:
         """Draw chromosomes uniformly, shape (count, n_genes)."""
         return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
 
-    def draw_genes(self, count: int, times: int, rng: np.random.Generator) -> IntArray:
-        """Choose a gene of each of some chromosomes and draw its new value, so many times.
-
-        Returns
-        -------
-        (times, 2, count)
-            Genes and values.
-        """
-        drawn = np.empty((times, 2, count), dtype=np.int64)
-        for gene, value in drawn:
-            gene[:] = rng.integers(self.genes, size=count)
-            value[:] = rng.integers(self.low[gene], self.high[gene], endpoint=True)
-        return drawn
-
     def decode(self, chromosomes: IntArray) -> Array:
         """Parameters of chromosomes, 10^g_1 (0.1 g_2 + 0.01 g_3) (eq. 10).
 
@@ -129,51 +115,49 @@ class Genome:
             word, weight = self._word[last], int(self._weight[last])
             if parameter == 0 or word != self._word[last - _GENES]:
                 rest = codes[word]
-            which = rest // weight
-            rest = rest - which * weight
+            which = rest // weight if weight > 1 else rest
+            if weight > 1:
+                rest = rest - which * weight
             values.take(which, out=parameters[parameter], mode="clip")
         return np.moveaxis(parameters, 0, -1)
 
-    def crossed(
-        self, mothers: IntArray, fathers: IntArray, cut: IntArray
-    ) -> tuple[IntArray, IntArray]:
+    def crossed(self, parents: IntArray, cut: IntArray) -> IntArray:
         """Both children of each pair: all genes from the cut on are swapped.
 
         Parameters
         ----------
-        mothers, fathers : (n_words, ...)
-            Codes.
-        cut : (...)
+        parents : (n_words, ..., 2, n_pairs)
+            Codes of mothers and fathers.
+        cut : (..., n_pairs)
             Number of genes before the cut.
 
         Returns
         -------
-        Codes like the parents'.
+        Codes like the parents', the children that begin like their mothers first.
         """
-        modulus = self._modulus.take(cut, axis=1)
-        swapped = fathers % modulus - mothers % modulus
-        return mothers + swapped, fathers - swapped
+        tails = parents % self._modulus.take(cut, axis=1)[..., None, :]
+        children: IntArray = parents - tails
+        children += tails[..., ::-1, :]
+        return children
 
-    def redraw(
-        self,
-        codes: IntArray,
-        population: IntArray,
-        individual: IntArray,
-        gene: IntArray,
-        value: IntArray,
-    ) -> None:
+    def redraw(self, codes: IntArray, which: IntArray, gene: IntArray, value: IntArray) -> None:
         """Give genes of some chromosomes another value, in place.
 
         Parameters
         ----------
-        codes : (n_words, n_populations, n)
-        population, individual, gene, value : (n_redrawn,)
-            Indices of the chromosome, none twice; index of its gene; the gene's new value.
+        codes : (n_words, n)
+        which, gene, value : (n_redrawn,)
+            Index of the chromosome, none twice; index of its gene; the gene's new value.
         """
-        which, weight = (self._word[gene], population, individual), self._weight[gene]
-        before = codes[which]
-        old = before // weight % self._span[gene]
-        codes[which] = before + (value - self.low[gene] - old) * weight
+        weight = self._weight.take(gene)
+        if self._words > 1:
+            which = which + codes.shape[1] * self._word.take(gene)
+        before = codes.take(which)
+        change = value - self.low.take(gene)
+        change -= before // weight % self._span.take(gene)
+        change *= weight
+        change += before
+        codes.put(which, change)
 
     @cached_property
     def _span(self) -> IntArray:
@@ -193,7 +177,7 @@ class Genome:
                 words.append(words[-1])
         return np.repeat(words[1:], _GENES)
 
-    @property
+    @cached_property
     def _words(self) -> int:
         return int(self._word[-1]) + 1
 

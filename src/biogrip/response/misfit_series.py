@@ -13,7 +13,7 @@ in the population, and however many populations are looked at together.
 """
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -21,9 +21,14 @@ from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory, drives
 from biogrip.response.decay_table import DecayTable
-from biogrip.response.linear import LEFT, StepResponse, step_response
+from biogrip.response.linear import LEFT, is_symmetric, step_response
+from biogrip.response.two_modes import two_modes
 from biogrip.sample import SampleModel
 
+# Rate of a constant, over the sampling rate: z^n is 1 for any n.
+_NO_DECAY = -1e-100
+# Individuals looked at together: enough to make calls worth their while, and to stay in the cache.
+_AT_ONCE = 2000
 # Modes of a closed form; the rates of more are iterated for, until those of all have settled.
 _CLOSED_FORM = 2
 
@@ -60,7 +65,8 @@ class SeriesMisfit:
         self._first_samples = starts.astype(np.int64)
         # From a step to the first sample of its phase.
         self._late = np.maximum(starts - steps, 0)
-        self._counts = np.diff(starts, append=self._samples)
+        # One sample, and all of each phase.
+        self._lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
 
     @classmethod
@@ -83,8 +89,8 @@ class SeriesMisfit:
 
     @cached_property
     def _closed_form(self) -> bool:
-        model = self._simulated[1]
-        return self._response(np.ones((1, len(model.parameters)))).rates.shape[1] <= _CLOSED_FORM
+        rates, _ = self._modes(np.ones((1, len(self._simulated[1].parameters))))
+        return len(rates) <= 1 + _CLOSED_FORM
 
     @cached_property
     def projections(self) -> DecayTable:
@@ -121,66 +127,69 @@ class SeriesMisfit:
         -------
         (n_populations, n_individuals)
         """
+        populations, size = parameters.shape[:2]
+        some = max(1, _AT_ONCE // size)
+        misfit = np.empty((populations, size))
+        for start in range(0, populations, some):
+            these = slice(start, start + some)
+            misfit[these] = self._of_some(parameters[these], traces[these])
+        return misfit
+
+    def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         shape = parameters.shape[:2]
-        response = self._response(parameters.reshape(-1, parameters.shape[2]))
-        static = np.ascontiguousarray(response.static[:, LEFT].T)
-        weights = np.ascontiguousarray(response.weights[:, LEFT].transpose(1, 2, 0))
-        rates = np.ascontiguousarray(response.rates.T) * self._simulated[3]
-        trace = np.repeat(traces, shape[1])
-        square = self._square_sums[trace] + self._model_square_sums(rates, static, weights)
-        square -= 2 * self._products(trace, rates, static, weights)
+        rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
+        trace = traces.repeat(shape[1])
+        square = self._square_sums.take(trace) + self._model_square_sums(rates, weights)
+        for drive, of_modes in enumerate(weights):
+            which = trace if len(weights) == 1 else len(weights) * trace + drive
+            square -= 2 * _sum(of_modes * self.projections.of(which, rates))
         misfit: Array = np.sqrt(np.maximum(square, 0) / self._samples).reshape(shape)
         return misfit
 
-    def _response(self, parameters: Array) -> StepResponse:
-        gripper, model, torque, _ = self._simulated
+    def _modes(self, parameters: Array) -> tuple[Array, Array]:
+        """Rates per sample (n_modes, n), weights (n_drives, n_modes, n); the constant first."""
+        gripper, model, torque, interval_s = self._simulated
         network = model.network(parameters)
-        return step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+        static: Array
+        if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
+            static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
+        else:
+            response = step_response(
+                gripper, network, symmetric=torque.symmetric, inertia=False
+            )
+            rates, static = response.rates.T, response.static[:, LEFT].T
+            weights = response.weights[:, LEFT].transpose(1, 2, 0)
+        modes, individuals = rates.shape
+        all_rates = np.empty((1 + modes, individuals))
+        all_rates[0] = _NO_DECAY
+        np.multiply(rates, interval_s, out=all_rates[1:])
+        all_weights = np.empty((len(self._heights), 1 + modes, individuals))
+        all_weights[:, 0] = static
+        all_weights[:, 1:] = weights
+        return all_rates, all_weights
 
-    def _products(self, trace: IntArray, rates: Array, static: Array, weights: Array) -> Array:
-        """Products of responses with their traces, shape (n,)."""
-        products = np.zeros(len(trace))
-        of_constant = self._projections_of_constant
-        for drive, (at_rest, decaying) in enumerate(zip(static, weights, strict=True)):
-            which = trace * len(self._heights) + drive
-            products += at_rest * of_constant[which]
-            for mode in decaying * self.projections.of(which, rates):
-                products += mode
-        return products
-
-    @cached_property
-    def _projections_of_constant(self) -> Array:
-        return self.projections(np.zeros(1))[:, 0]
-
-    def _model_square_sums(self, rates: Array, static: Array, weights: Array) -> Array:
+    def _model_square_sums(self, rates: Array, weights: Array) -> Array:
         """Sums over all samples of squared responses, shape (n,).
 
-        A phase of N samples contributes ((z_i z_j)^N - 1) / (z_i z_j - 1) for each
-        pair of modes. Those of products follow from z^N - 1 and z - 1 without
-        cancellation.
+        In a phase of N samples, ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes.
+        Those of products follow from z^N - 1 and z - 1 without cancellation.
         """
-        step = np.expm1(rates)
-        phase = [np.expm1(count * rates) for count in self._counts]
-        amplitudes = self._amplitudes(rates, weights, [1 + decay for decay in phase])
-        modes = range(len(rates))
-        squares = [step[j] * (2 + step[j]) for j in modes]
-        products = {(i, j): _of_product(step[i], step[j]) for j in modes for i in range(j)}
-        sums = np.zeros(rates.shape[1])
-        constant = np.zeros(rates.shape[1])
-        for p, (count, decay) in enumerate(zip(self._counts, phase, strict=True)):
-            for height, at_rest in zip(self._heights[:, p], static, strict=True):
-                constant += height * at_rest
-            sums += count * constant * constant
-            for j, amplitude in enumerate(amplitudes[p]):
-                own = amplitude * decay[j] * (2 + decay[j]) / squares[j]
-                own += 2 * constant * (decay[j] / step[j])
-                sums += amplitude * own
-                for i in range(j):
-                    series = _of_product(decay[i], decay[j]) / products[i, j]
-                    sums += 2 * amplitude * amplitudes[p][i] * series
-        return sums
+        lengths = self._lengths[:, None, None]
+        decayed = np.expm1(lengths * rates)
+        amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
+        first, second = _pairs(len(rates))
+        series, one = decayed.take(first, axis=1), decayed.take(second, axis=1)
+        series += series * one
+        series += one
+        series = series[1:] / series[0]
+        series *= amplitudes.take(first, axis=1)
+        series *= amplitudes.take(second, axis=1)
+        sums = _sum(series)
+        own = len(rates)
+        sums[own:] *= 2
+        return _sum(sums)
 
-    def _amplitudes(self, rates: Array, weights: Array, decays: Sequence[Array]) -> list[Array]:
+    def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
         """Amplitudes of modes at the first sample of each phase.
 
         Parameters
@@ -189,23 +198,19 @@ class SeriesMisfit:
             Over the sampling rate.
         weights : (n_drives, n_modes, n)
             Of unit steps.
-        decays : n_phases of (n_modes, n)
+        decays : (n_phases, n_modes, n)
             To what share a mode decays within each phase.
 
         Returns
         -------
-        n_phases of (n_modes, n)
+        (n_phases, n_modes, n)
         """
-        amplitudes: list[Array] = []
+        amplitudes = _sum(self._heights[:, :, None, None] * weights[:, None])
         for phase, late in enumerate(self._late):
-            amplitude = np.zeros_like(rates)
-            for height, of_unit in zip(self._heights[:, phase], weights, strict=True):
-                amplitude += height * of_unit
             if late > 0:
-                amplitude *= np.exp(late * rates)
+                amplitudes[phase] *= np.exp(late * rates)
             if phase > 0:
-                amplitude += decays[phase - 1] * amplitudes[-1]
-            amplitudes.append(amplitude)
+                amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
         return amplitudes
 
     def exact_projections(self, rates: Array) -> Array:
@@ -221,21 +226,28 @@ class SeriesMisfit:
         (n_traces * n_drives, n)
         """
         sums = _power_sums(self._traces, self._first_samples, rates)
-        decays = [np.exp(count * rates)[None] for count in self._counts]
-        projections = []
-        for unit in np.eye(len(self._heights)):
-            weights = np.broadcast_to(unit[:, None, None], (len(unit), 1, len(rates)))
-            amplitudes = self._amplitudes(rates[None], weights, decays)
-            projections.append(
-                sum(amplitude * sums[:, p] for p, (amplitude,) in enumerate(amplitudes))
-            )
+        decays = np.exp(self._lengths[1:, None, None] * rates)
+        units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
+        projections = [
+            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1)) for unit in units
+        ]
         return np.stack(projections, axis=1).reshape(-1, len(rates))
 
 
-def _of_product(first: Array, second: Array) -> Array:
-    """z_1 z_2 - 1 of z_1 - 1 and z_2 - 1, both between -1 and 0."""
-    product: Array = first * (1 + second) + second
-    return product
+def _sum(terms: Array) -> Array:
+    """Sum over the first axis, one after the other whatever the shape."""
+    total: Array = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
+
+
+@cache
+def _pairs(modes: int) -> tuple[IntArray, IntArray]:
+    """Indices of all pairs of modes, those of one mode with itself first."""
+    first, second = np.triu_indices(modes, 1)
+    every = np.arange(modes)
+    return np.concatenate((every, first)), np.concatenate((every, second))
 
 
 def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
