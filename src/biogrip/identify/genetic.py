@@ -147,8 +147,9 @@ def evolve_many(
     evaluations = settings.population * len(rngs)
     for generation in range(1, settings.max_generations + 1):
         waited = generation - 1 - improved[running] >= settings.patience
-        if generation > settings.min_generations and np.any(waited):
+        if generation > settings.min_generations and waited.any():
             stalled[running[waited]] = True
+            last[:, running] = survivors.codes
             running, survivors = running[~waited], survivors.only(~waited)
             if not len(running):
                 break
@@ -159,11 +160,11 @@ def evolve_many(
         before = survivors.ranking[:, 0]
         everyone = survivors.joined(_evaluated(children, misfits, genome, running))
         survivors = everyone.best(settings.survivors)
-        last[:, running] = survivors.codes
         improved[running[survivors.ranking[:, 0] < before]] = generation
         course.append(_Generation.of(running, survivors))
         evaluations += children[0].size
         progress(evaluations, float(survivors.ranking[:, 0].min()))
+    last[:, running] = survivors.codes
     identifications = _identifications(course, stalled, genome, settings)
     survived = genome.parameters(first), genome.parameters(last)
     return [Evolution(*each) for each in zip(identifications, *survived, strict=True)]

@@ -110,7 +110,7 @@ class Genome:
         """
         parameters = np.empty((self.genes // _GENES, *codes.shape[1:]))
         rest = codes
-        for parameter, values in enumerate(self._values):
+        for parameter, values in enumerate(self._parameters_of):
             last = _GENES * parameter + _GENES - 1
             word, weight = self._word[last], int(self._weight[last])
             if parameter == 0 or word != self._word[last - _GENES]:
@@ -154,13 +154,13 @@ class Genome:
             which = which + codes.shape[1] * self._word.take(gene)
         before = codes.take(which)
         change = value - self.low.take(gene)
-        change -= before // weight % self._span.take(gene)
+        change -= before // weight % self.values.take(gene)
         change *= weight
         change += before
         codes.put(which, change)
 
     @cached_property
-    def _span(self) -> IntArray:
+    def values(self) -> IntArray:
         """How many values each gene has."""
         return self.high - self.low + 1
 
@@ -168,7 +168,7 @@ class Genome:
     def _word(self) -> IntArray:
         """Word of each gene; the genes of a parameter share one."""
         words, filled = [0], 1
-        for genes in self._span.reshape(-1, _GENES).tolist():
+        for genes in self.values.reshape(-1, _GENES).tolist():
             filled *= prod(genes)
             if filled > 2**WORD_BITS:
                 words.append(words[-1] + 1)
@@ -187,7 +187,7 @@ class Genome:
         weights = np.ones(self.genes, dtype=np.int64)
         for gene in range(self.genes - 2, -1, -1):
             if self._word[gene] == self._word[gene + 1]:
-                weights[gene] = weights[gene + 1] * self._span[gene + 1]
+                weights[gene] = weights[gene + 1] * self.values[gene + 1]
         return weights
 
     @cached_property
@@ -196,13 +196,13 @@ class Genome:
         moduli = np.empty((self._words, self.genes), dtype=np.int64)
         for word in range(self._words):
             own = np.flatnonzero(self._word == word)
-            every = self._weight[own[0]] * self._span[own[0]]
+            every = self._weight[own[0]] * self.values[own[0]]
             moduli[word] = np.where(np.arange(self.genes) < own[0], every, 1)
-            moduli[word, own] = self._weight[own] * self._span[own]
+            moduli[word, own] = self._weight[own] * self.values[own]
         return moduli
 
     @cached_property
-    def _values(self) -> list[Array]:
+    def _parameters_of(self) -> list[Array]:
         """All values of each parameter, by the number that its genes are."""
         ranges = [
             np.arange(low, high + 1) for low, high in zip(self.low, self.high, strict=True)

@@ -14,6 +14,7 @@ from biogrip.arrays import IntArray
 from biogrip.identify.genome import Genome
 
 _WORDS = 2**32
+_WIDEST = 2**31
 
 
 def redraws(
@@ -37,64 +38,68 @@ def redraws(
     (times, 2, n)
         Genes and their values, the chromosomes of all generators side by side.
     """
-    if np.any(genome.low == genome.high):
-        # What cannot vary takes no word.
-        return np.concatenate(
-            [
-                _one_by_one(genome, count, times, _fresh(rng))
-                for count, rng in zip(counts, rngs, strict=True)
-            ],
-            axis=2,
-        )
+    # What cannot vary takes no word, and products must not overflow.
+    usual = 1 < genome.values.min() and genome.values.max() < _WIDEST
+    if len(rngs) == 1 or not usual:
+        drawn_apart = [
+            _by_numpy(genome, count, times, rng) for count, rng in zip(counts, rngs, strict=True)
+        ]
+        return np.concatenate(drawn_apart, axis=2)
     words = [
         rng.integers(_WORDS, size=2 * times * count, dtype=np.uint32).reshape(times, 2, count)
         for count, rng in zip(counts, rngs, strict=True)
     ]
     together = np.concatenate(words, axis=2)
     drawn = np.empty(together.shape, dtype=np.int64)
-    spans = (genome.high - genome.low + 1).astype(np.uint64)
     doubtful = False
     for (of_gene, of_value), (gene, value) in zip(together, drawn, strict=True):
-        doubtful |= _scaled(of_gene, np.uint64(genome.genes), gene)
-        doubtful |= _scaled(of_value, spans.take(gene), value)
+        doubtful |= _scaled(of_gene, genome.genes, gene)
+        doubtful |= _scaled(of_value, genome.values.take(gene), value)
         value += genome.low.take(gene)
     if not doubtful:
         return drawn
     return np.concatenate(
         [
-            _one_by_one(genome, own.shape[2], times, chain(own.ravel().tolist(), _fresh(rng)))
+            _one_by_one(genome, chain(own.ravel().tolist(), _fresh(rng)), own.shape)
             for own, rng in zip(words, rngs, strict=True)
         ],
         axis=2,
     )
 
 
-def _scaled(
-    words: NDArray[np.uint32], spans: NDArray[np.uint64] | np.uint64, numbers: IntArray
-) -> bool:
+def _by_numpy(genome: Genome, count: int, times: int, rng: np.random.Generator) -> IntArray:
+    drawn = np.empty((times, 2, count), dtype=np.int64)
+    for gene, value in drawn:
+        gene[:] = rng.integers(genome.genes, size=count)
+        value[:] = rng.integers(genome.low.take(gene), genome.high.take(gene), endpoint=True)
+    return drawn
+
+
+def _scaled(words: NDArray[np.uint32], spans: IntArray | int, numbers: IntArray) -> bool:
     """Scale words to numbers below the spans; whether any may have to be drawn again."""
-    products = words * spans
-    numbers[:] = products >> np.uint64(32)
-    return bool(np.any(products.astype(np.uint32) < spans))
+    products = words.astype(np.int64)
+    products *= spans
+    np.right_shift(products, 32, out=numbers)
+    products &= _WORDS - 1
+    return bool((products < spans).any())
 
 
 def _fresh(rng: np.random.Generator) -> Iterator[int]:
     return (int(rng.integers(_WORDS, dtype=np.uint32)) for _ in repeat(None))
 
 
-def _one_by_one(genome: Genome, count: int, times: int, words: Iterator[int]) -> IntArray:
-    """Draw for one generator from its words, those again that would favour some numbers."""
-    low, high = genome.low.tolist(), genome.high.tolist()
+def _one_by_one(genome: Genome, words: Iterator[int], shape: tuple[int, ...]) -> IntArray:
+    """Draw from the words of a generator, again where a word would favour some numbers."""
+    low, values = genome.low.tolist(), genome.values.tolist()
 
     def below(span: int) -> int:
-        while span > 1:
+        while True:
             product = next(words) * span
             if product % _WORDS >= _WORDS % span:
                 return product // _WORDS
-        return 0
 
-    drawn = []
-    for _ in range(times):
-        genes = [below(genome.genes) for _ in range(count)]
-        drawn.append((genes, [low[gene] + below(high[gene] - low[gene] + 1) for gene in genes]))
-    return np.array(drawn, dtype=np.int64).reshape(times, 2, count)
+    drawn = np.empty(shape, dtype=np.int64)
+    for genes_and_values in drawn:
+        genes = [below(genome.genes) for _ in range(shape[2])]
+        genes_and_values[:] = genes, [low[gene] + below(values[gene]) for gene in genes]
+    return drawn

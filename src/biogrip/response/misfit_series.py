@@ -13,7 +13,8 @@ in the population, and however many populations are looked at together.
 """
 
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
@@ -25,10 +26,8 @@ from biogrip.response.linear import LEFT, is_symmetric, step_response
 from biogrip.response.two_modes import two_modes
 from biogrip.sample import SampleModel
 
-# Rate of a constant, over the sampling rate: z^n is 1 for any n.
-_NO_DECAY = -1e-100
 # Individuals looked at together: enough to make calls worth their while, and to stay in the cache.
-_AT_ONCE = 2000
+_AT_ONCE = 7000
 # Modes of a closed form; the rates of more are iterated for, until those of all have settled.
 _CLOSED_FORM = 2
 
@@ -57,7 +56,10 @@ class SeriesMisfit:
         self._simulated = (gripper, model, torque, interval_s)
         self._traces = np.atleast_2d(rotation_rad)
         self._samples = self._traces.shape[1]
-        self._heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
+        heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
+        # What a drive does at the start of each phase, and what it has come to.
+        self._heights = heights[:, :, None, None]
+        self._levels = np.cumsum(heights, axis=1)[:, :, None]
         # Times in samples; rounding must not keep a sample from the step that it falls on.
         steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
         steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
@@ -66,7 +68,8 @@ class SeriesMisfit:
         # From a step to the first sample of its phase.
         self._late = np.maximum(starts - steps, 0)
         # One sample, and all of each phase.
-        self._lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
+        lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
+        self._lengths = lengths[:, None, None]
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
 
     @classmethod
@@ -89,8 +92,8 @@ class SeriesMisfit:
 
     @cached_property
     def _closed_form(self) -> bool:
-        rates, _ = self._modes(np.ones((1, len(self._simulated[1].parameters))))
-        return len(rates) <= 1 + _CLOSED_FORM
+        _, rates, _ = self._modes(np.ones((1, len(self._simulated[1].parameters))))
+        return len(rates) <= _CLOSED_FORM
 
     @cached_property
     def projections(self) -> DecayTable:
@@ -137,57 +140,66 @@ class SeriesMisfit:
 
     def _of_some(self, parameters: Array, traces: IntArray) -> Array:
         shape = parameters.shape[:2]
-        rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
+        static, rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
         trace = traces.repeat(shape[1])
-        square = self._square_sums.take(trace) + self._model_square_sums(rates, weights)
-        for drive, of_modes in enumerate(weights):
-            which = trace if len(weights) == 1 else len(weights) * trace + drive
-            square -= 2 * _sum(of_modes * self.projections.of(which, rates))
-        misfit: Array = np.sqrt(np.maximum(square, 0) / self._samples).reshape(shape)
-        return misfit
+        square = self._model_square_sums(static, rates, weights)
+        square += self._square_sums.take(trace)
+        drives = len(weights)
+        for drive, (at_rest, decaying) in enumerate(zip(static, weights, strict=True)):
+            which = trace if drives == 1 else drives * trace + drive
+            product = at_rest * self._projections_of_constant.take(which)
+            product += _sum(decaying * self.projections.of(which, rates))
+            product *= 2
+            square -= product
+        np.maximum(square, 0, out=square)
+        square /= self._samples
+        return np.sqrt(square, out=square).reshape(shape)
 
-    def _modes(self, parameters: Array) -> tuple[Array, Array]:
-        """Rates per sample (n_modes, n), weights (n_drives, n_modes, n); the constant first."""
+    def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
+        """Constants (n_drives, n), rates per sample (n_modes, n), weights (n_drives, n_modes, n)."""
         gripper, model, torque, interval_s = self._simulated
         network = model.network(parameters)
-        static: Array
         if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
             static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
-        else:
-            response = step_response(
-                gripper, network, symmetric=torque.symmetric, inertia=False
-            )
-            rates, static = response.rates.T, response.static[:, LEFT].T
-            weights = response.weights[:, LEFT].transpose(1, 2, 0)
-        modes, individuals = rates.shape
-        all_rates = np.empty((1 + modes, individuals))
-        all_rates[0] = _NO_DECAY
-        np.multiply(rates, interval_s, out=all_rates[1:])
-        all_weights = np.empty((len(self._heights), 1 + modes, individuals))
-        all_weights[:, 0] = static
-        all_weights[:, 1:] = weights
-        return all_rates, all_weights
+            return static[None], rates * interval_s, weights[None]
+        response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
+        return (
+            np.ascontiguousarray(response.static[:, LEFT].T),
+            np.ascontiguousarray(response.rates.T) * interval_s,
+            np.ascontiguousarray(response.weights[:, LEFT].transpose(1, 2, 0)),
+        )
 
-    def _model_square_sums(self, rates: Array, weights: Array) -> Array:
+    @cached_property
+    def _projections_of_constant(self) -> Array:
+        return self.projections(np.zeros(1))[:, 0]
+
+    def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
         """Sums over all samples of squared responses, shape (n,).
 
         In a phase of N samples, ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes.
         Those of products follow from z^N - 1 and z - 1 without cancellation.
         """
-        lengths = self._lengths[:, None, None]
-        decayed = np.expm1(lengths * rates)
+        decayed = np.expm1(self._lengths * rates)
         amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
-        first, second = _pairs(len(rates))
-        series, one = decayed.take(first, axis=1), decayed.take(second, axis=1)
-        series += series * one
-        series += one
-        series = series[1:] / series[0]
-        series *= amplitudes.take(first, axis=1)
-        series *= amplitudes.take(second, axis=1)
-        sums = _sum(series)
-        own = len(rates)
-        sums[own:] *= 2
-        return _sum(sums)
+        constants = _sum(self._levels * static[:, None])[:, None]
+        mixed = decayed[1:] / decayed[0]
+        mixed *= constants
+        for i, j in combinations(range(len(rates)), 2):
+            both = decayed[:, i] * decayed[:, j]
+            both += decayed[:, i]
+            both += decayed[:, j]
+            series = both[1:] / both[0]
+            series *= amplitudes[:, i]
+            mixed[:, j] += series
+        mixed *= 2
+        decayed *= 2 + decayed
+        terms = decayed[1:] / decayed[0]
+        terms *= amplitudes
+        terms += mixed
+        terms *= amplitudes
+        constants *= constants
+        constants *= self._lengths[1:]
+        return _sum(_sum(terms)) + _sum(constants)[0]
 
     def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
         """Amplitudes of modes at the first sample of each phase.
@@ -205,7 +217,7 @@ class SeriesMisfit:
         -------
         (n_phases, n_modes, n)
         """
-        amplitudes = _sum(self._heights[:, :, None, None] * weights[:, None])
+        amplitudes = _sum(self._heights * weights[:, None])
         for phase, late in enumerate(self._late):
             if late > 0:
                 amplitudes[phase] *= np.exp(late * rates)
@@ -226,7 +238,7 @@ class SeriesMisfit:
         (n_traces * n_drives, n)
         """
         sums = _power_sums(self._traces, self._first_samples, rates)
-        decays = np.exp(self._lengths[1:, None, None] * rates)
+        decays = np.exp(self._lengths[1:] * rates)
         units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
         projections = [
             _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1)) for unit in units
@@ -240,14 +252,6 @@ def _sum(terms: Array) -> Array:
     for term in terms[1:]:
         total = total + term
     return total
-
-
-@cache
-def _pairs(modes: int) -> tuple[IntArray, IntArray]:
-    """Indices of all pairs of modes, those of one mode with itself first."""
-    first, second = np.triu_indices(modes, 1)
-    every = np.arange(modes)
-    return np.concatenate((every, first)), np.concatenate((every, second))
 
 
 def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
