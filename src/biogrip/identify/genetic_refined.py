@@ -4,7 +4,7 @@ The last survivors crowd in one basin. The survivors of the initial population
 are still everywhere, so local fits start from the best of both.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,7 +59,39 @@ def identify(
     progress
         Is told after every generation and every fit.
     """
-    evolution = genetic.evolve(problem.misfit, problem.genome, settings.genetic, rng, progress)
+    return identify_many([problem], settings, [rng], progress)[0]
+
+
+def identify_many(
+    problems: Sequence[Problem],
+    settings: RefinedSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify samples whose populations evolve side by side; each answer is that of `identify`.
+
+    Parameters
+    ----------
+    problems
+        What is identified; all have the same genome.
+    settings
+        The budget of each.
+    rngs
+        The only source of randomness of each problem.
+    progress
+        Is told after every generation, of all problems together, and after every fit.
+    """
+    evolutions = genetic.evolve_problems(problems, settings.genetic, rngs, progress)
+    return [
+        _polished(problem, settings, evolution, progress)
+        for problem, evolution in zip(problems, evolutions, strict=True)
+    ]
+
+
+def _polished(
+    problem: Problem, settings: RefinedSettings, evolution: genetic.Evolution, progress: Progress
+) -> Identification:
+    """Fit locally from the survivors."""
     coarse = evolution.identification
     starts = np.concatenate(
         (

@@ -1,7 +1,7 @@
 """The chromosome: three integer genes a parameter (eq. 10, Tables 3 and 4)."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import prod
 
 import numpy as np
@@ -204,14 +204,19 @@ class Genome:
     @cached_property
     def _parameters_of(self) -> list[Array]:
         """All values of each parameter, by the number that its genes are."""
-        ranges = [
-            np.arange(low, high + 1) for low, high in zip(self.low, self.high, strict=True)
-        ]
-        parameters = []
-        for start in range(0, self.genes, _GENES):
-            grid = np.meshgrid(*ranges[start : start + _GENES], indexing="ij")
-            parameters.append(self.decode(np.stack(grid, axis=-1).reshape(-1, _GENES))[:, 0])
-        return parameters
+        bounds = zip(
+            self.low.reshape(-1, _GENES).tolist(), self.high.reshape(-1, _GENES).tolist(), strict=True
+        )
+        return [_all_values(tuple(low), tuple(high)) for low, high in bounds]
+
+
+@lru_cache(maxsize=64)
+def _all_values(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
+    """Values of a parameter in the order of its genes, (n_values,)."""
+    ranges = [np.arange(least, most + 1) for least, most in zip(low, high, strict=True)]
+    genes = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, _GENES)
+    values: Array = Genome(np.array(low), np.array(high)).decode(genes)[:, 0]
+    return values
 
 
 _GENES = 3
