@@ -52,9 +52,7 @@ def identified(
     )
 
 
-def _children(
-    parents: IntArray, settings: GeneticSettings, rng: np.random.Generator
-) -> IntArray:
+def _children(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
     wanted = settings.population - settings.survivors
     pairs = -(-wanted // 2)
     count, genes = parents.shape

@@ -198,9 +198,7 @@ def test_the_best_in_order(words: int, size: int) -> None:
 
 
 @pytest.mark.parametrize("branches", [1, 2, 5])
-def test_codes_stand_for_chromosomes(
-    branches: int, gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: TorqueHistory) -> None:
     (problem,) = posed(gripper, steps, 1, model_named("generalized_maxwell", branches))
     genome = problem.genome
     chromosomes = genome.draw(400, rng(0))
@@ -211,9 +209,7 @@ def test_codes_stand_for_chromosomes(
     np.testing.assert_array_equal(np.lexsort(codes[::-1]), np.lexsort(chromosomes.T[::-1]))
 
 
-def test_a_misfit_does_not_depend_on_its_company(
-    gripper: Gripper, steps: TorqueHistory
-) -> None:
+def test_a_misfit_does_not_depend_on_its_company(gripper: Gripper, steps: TorqueHistory) -> None:
     problems = posed(gripper, steps, 4)
     misfits = together([problem.misfit for problem in problems])
     genome = problems[0].genome

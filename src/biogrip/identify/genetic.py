@@ -153,7 +153,7 @@ def evolve_many(
             running, survivors = running[~waited], survivors.only(~waited)
             if not len(running):
                 break
-        chosen = [rngs[population] for population in running]
+        chosen = [rngs[population] for population in running.tolist()]
         children = cross(survivors.codes, genome, settings, chosen)
         if generation >= settings.mutation_start:
             mutate(children, genome, settings, chosen)
@@ -196,7 +196,9 @@ class _Populations:
         return _Populations(*best(self.codes, self.ranking, count))
 
 
-def _evaluated(codes: IntArray, misfits: Misfits, genome: Genome, running: IntArray) -> _Populations:
+def _evaluated(
+    codes: IntArray, misfits: Misfits, genome: Genome, running: IntArray
+) -> _Populations:
     """Individuals in the order they come in."""
     # A misfit is not negative, but what is not a number has either sign.
     ranking = np.abs(misfits(genome.parameters(codes), running).astype(np.float32))
@@ -226,9 +228,7 @@ class _Generation:
         codes, ranking = survivors.codes, survivors.ranking
         middle = ranking.shape[1] // 2
         # Copies, for a part of an array keeps all of it.
-        return cls(
-            running, codes[:, :, 0].copy(), ranking[:, 0].copy(), ranking[:, middle].copy()
-        )
+        return cls(running, codes[:, :, 0].copy(), ranking[:, 0].copy(), ranking[:, middle].copy())
 
 
 def _identifications(

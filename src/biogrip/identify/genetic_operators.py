@@ -91,7 +91,7 @@ def mutate(
     for own, rng in zip(chance, rngs, strict=True):
         rng.random(out=own)
     mutating = np.flatnonzero(chance < settings.mutation_probability)
-    counts = np.bincount(mutating // chance.shape[1], minlength=len(rngs)).tolist()
+    counts = np.bincount(mutating // children.shape[2], minlength=len(rngs)).tolist()
     flat = children.reshape(len(children), -1)
     for gene, value in redraws(genome, counts, settings.mutated_genes, rngs):
         genome.redraw(flat, mutating, gene, value)

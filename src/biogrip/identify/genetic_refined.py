@@ -12,6 +12,7 @@ import numpy as np
 
 from biogrip.identify import genetic
 from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.multi_start import best_of_starts
 from biogrip.identify.problem import Problem
 
@@ -28,7 +29,7 @@ class RefinedSettings:
         Number of survivors polished of the initial and of the last population.
     """
 
-    genetic: genetic.GeneticSettings
+    genetic: GeneticSettings
     first: int
     last: int
 

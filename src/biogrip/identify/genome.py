@@ -205,7 +205,9 @@ class Genome:
     def _parameters_of(self) -> list[Array]:
         """All values of each parameter, by the number that its genes are."""
         bounds = zip(
-            self.low.reshape(-1, _GENES).tolist(), self.high.reshape(-1, _GENES).tolist(), strict=True
+            self.low.reshape(-1, _GENES).tolist(),
+            self.high.reshape(-1, _GENES).tolist(),
+            strict=True,
         )
         return [_all_values(tuple(low), tuple(high)) for low, high in bounds]
 

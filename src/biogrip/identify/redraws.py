@@ -39,7 +39,7 @@ def redraws(
         Genes and their values, the chromosomes of all generators side by side.
     """
     # What cannot vary takes no word, and products must not overflow.
-    usual = 1 < genome.values.min() and genome.values.max() < _WIDEST
+    usual = genome.values.min() > 1 and genome.values.max() < _WIDEST
     if len(rngs) == 1 or not usual:
         drawn_apart = [
             _by_numpy(genome, count, times, rng) for count, rng in zip(counts, rngs, strict=True)

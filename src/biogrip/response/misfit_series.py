@@ -156,7 +156,7 @@ class SeriesMisfit:
         return np.sqrt(square, out=square).reshape(shape)
 
     def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
-        """Constants (n_drives, n), rates per sample (n_modes, n), weights (n_drives, n_modes, n)."""
+        """Static (n_drives, n), rates a sample (n_modes, n), weights (n_drives, n_modes, n)."""
         gripper, model, torque, interval_s = self._simulated
         network = model.network(parameters)
         if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
@@ -241,7 +241,8 @@ class SeriesMisfit:
         decays = np.exp(self._lengths[1:] * rates)
         units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
         projections = [
-            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1)) for unit in units
+            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1))
+            for unit in units
         ]
         return np.stack(projections, axis=1).reshape(-1, len(rates))
 

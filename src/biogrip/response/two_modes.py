@@ -40,7 +40,9 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     # The denominator Z Q + 2 b^2 P, ascending powers.
     denominator = np.empty((3, len(k_p)))
     denominator[0] = coupling * k_p + stiffness
-    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (stiffness * relaxation_s + damping)
+    denominator[1] = coupling * (k_p * relaxation_s + c_p + c) + (
+        stiffness * relaxation_s + damping
+    )
     denominator[2] = (coupling * c_p + damping) * relaxation_s
     rates = real_quadratic_roots(denominator.T).T
     slope = denominator[2] * (rates[0] - rates[1])

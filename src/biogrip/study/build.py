@@ -11,7 +11,7 @@ from biogrip.actuator import CombDrive, capacitance_slope
 from biogrip.arrays import Array
 from biogrip.contact import Contact, contact
 from biogrip.gripper import Arm, Gripper
-from biogrip.identify.genetic import GeneticSettings
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, sample_times, torque_history
 from biogrip.sample import SampleModel, model_named
