@@ -1,4 +1,4 @@
-"""This project's genetic algorithm on many traces side by side, as the study identifies."""
+"""Our genetic algorithm on many traces side by side, as the study identifies."""
 
 from collections.abc import Sequence
 
