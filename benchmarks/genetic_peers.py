@@ -27,7 +27,7 @@ from pymoo.operators.selection.rnd import RandomSelection
 from pymoo.optimize import minimize
 
 from biogrip.arrays import Array, IntArray
-from biogrip.identify.genetic import GeneticSettings
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import Genome
 
 creator.create("Misfit", base.Fitness, weights=(-1.0,))

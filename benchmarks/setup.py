@@ -10,8 +10,8 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
-from biogrip.identify.genetic import GeneticSettings
 from biogrip.identify.genetic import settings_of as genetic_settings
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
 from biogrip.identify.problem import problem_of

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from benchmarks.batch import in_batch
 from benchmarks.limit import watched
 from benchmarks.misfit import by_lsim, by_radau, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.section import number
 from benchmarks.setup import Problem, problem
 from benchmarks.timing import Timed, alternate, time_to_success
+from biogrip.identify.genetic import evolve
 from biogrip.identify.genome import Genome
 from biogrip.response.nonlinear import nonlinear_rotation
 
@@ -75,6 +77,16 @@ def test_calls_alternate() -> None:
     timed = alternate({name: partial(call, name) for name in "ab"}, rounds=3)
     assert "".join(order) == "ab" + 3 * "ab"
     assert all(np.all(timed.seconds[name] >= 0.05) for name in "ab")
+
+
+def test_traces_side_by_side_reach_what_they_reach_alone(noisy: Problem) -> None:
+    settings = replace(noisy.genetic, population=40, survivors=20, max_generations=8)
+    problems = [noisy, problem(1)]
+    alone = [
+        evolve(p.misfit(), p.genome, settings, np.random.default_rng(seed)).identification
+        for seed, p in enumerate(problems)
+    ]
+    assert in_batch(problems, settings) == [answer.misfit_rad for answer in alone]
 
 
 @pytest.mark.parametrize(

@@ -3,22 +3,38 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
 from biogrip.identify.answer import Identification
-from biogrip.identify.genetic import GeneticSettings, _cross, _mutate, evolve
-from biogrip.identify.genome import GeneRange, genome_of
+from biogrip.identify.genetic import evolve
+from biogrip.identify.genetic_operators import cross, mutate
+from biogrip.identify.genetic_settings import GeneticSettings
+from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.measurement import Noise, add_noise, rms
 from biogrip.protocol import TorqueHistory
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.sample import MODELS
+from tests.identify.plain_genetic import chromosomes_of
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 MODEL = MODELS["generalized_maxwell"]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 GENOME = genome_of(MODEL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
 BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
+
+
+def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+    genes = parents.shape[1]
+    genome = Genome(np.zeros(genes, dtype=np.int64), np.full(genes, parents.max()))
+    children = cross(genome.code(parents)[:, None], genome, settings, [rng])
+    return chromosomes_of(genome, children[:, 0])
+
+
+def mutated(children: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+    codes = GENOME.code(children)[:, None]
+    mutate(codes, GENOME, settings, [rng])
+    return chromosomes_of(GENOME, codes[:, 0])
 
 
 def bowl(parameters: Array) -> Array:
@@ -63,7 +79,7 @@ def test_stops_after_twenty_generations_without_progress_but_not_before_forty() 
 
 def test_children_are_cut_and_swapped_parents() -> None:
     parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
-    children = _cross(parents, PAPER, np.random.default_rng(3))
+    children = crossed(parents, PAPER, np.random.default_rng(3))
     assert children.shape == (250, 12)
     mothers, fathers = children[:, 0], children[:, -1]
     # Disjoint pairs, both children: every parent opens one child and closes one.
@@ -80,7 +96,7 @@ def test_children_are_cut_and_swapped_parents() -> None:
 def test_rank_mating_prefers_the_best() -> None:
     parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
     settings = replace(PAPER, mating="rank", population=20_250)
-    children = _cross(parents, settings, np.random.default_rng(4))
+    children = crossed(parents, settings, np.random.default_rng(4))
     count = np.bincount(children[:, 0], minlength=250)
     expected = 20_000 * np.arange(250, 0, -1) / (250 * 251 / 2)
     assert np.abs(count[:50].sum() - expected[:50].sum()) < 5 * np.sqrt(expected[:50].sum())
@@ -93,7 +109,7 @@ def test_more_children_than_parents() -> None:
 
 def test_half_of_the_children_have_one_gene_redrawn() -> None:
     children = np.tile(GENOME.low, (4000, 1))
-    _mutate(children, GENOME, PAPER, np.random.default_rng(5))
+    children = mutated(children, PAPER, np.random.default_rng(5))
     changed = np.sum(children != GENOME.low, axis=1)
     assert changed.max() == 1
     # A redrawn gene keeps its value with probability 1/values.
@@ -196,7 +212,7 @@ def test_pairs_are_drawn_afresh() -> None:
     parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
     partners = []
     for seed in range(2):
-        children = _cross(parents, PAPER, np.random.default_rng(seed))
+        children = crossed(parents, PAPER, np.random.default_rng(seed))
         partners.append(dict(zip(children[:, 0], children[:, -1], strict=True)))
     same = sum(partners[0][parent] == partners[1][parent] for parent in range(250))
     # Chance makes one in 249 the same: 1 expected.
@@ -207,14 +223,14 @@ def test_pairs_are_drawn_afresh() -> None:
 def test_shorter_chromosomes_are_cut_inside() -> None:
     """Nine genes: both parents give at least one, and every cut occurs."""
     parents = np.repeat(np.arange(250)[:, None], 9, axis=1)
-    children = _cross(parents, PAPER, np.random.default_rng(9))
+    children = crossed(parents, PAPER, np.random.default_rng(9))
     assert set(np.sum(children == children[:, :1], axis=1)) == set(range(1, 9))
 
 
 def test_mutation_reaches_every_value_and_as_many_genes_as_it_says() -> None:
     children = np.tile(GENOME.low, (20_000, 1))
     settings = replace(PAPER, mutation_probability=1.0, mutated_genes=3)
-    _mutate(children, GENOME, settings, np.random.default_rng(10))
+    children = mutated(children, settings, np.random.default_rng(10))
     assert np.array_equal(children.max(axis=0), GENOME.high)
     assert np.sum(children != GENOME.low, axis=1).max() == 3
 

@@ -20,11 +20,11 @@ from biogrip.measurement import Noise, add_noise
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import MODELS, SampleModel, model_named
 from biogrip.study import build
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean
+from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, study_torque
 from tests.response.test_sensitivity import MODEL_PARAMETERS
 
 SETTINGS = least_squares.settings_of(CONFIG)
-GRIPPER, TORQUE = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+GRIPPER, TORQUE = build.gripper(CONFIG["gripper"]), study_torque()
 RANGES = build.gene_ranges(CONFIG["search_range"])
 
 

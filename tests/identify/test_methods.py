@@ -27,9 +27,14 @@ SAMPLES = {name: case["sample"] for name, case in CONFIG["cases"].items()}
 CONTINUOUS = ("genetic_refined", "least_squares")
 
 
+def study_torque() -> TorqueHistory:
+    """The default study's protocol."""
+    return torque_history(build.phases(CONFIG["protocol"], CONFIG["actuator"]))
+
+
 @functools.cache
 def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
-    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
     times = sample_times(400.0, rate_Hz)
     network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
     return times, rotation(step_response(gripper, network), torque, times)[0]
@@ -39,20 +44,20 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
     times, response = clean(case, rate_Hz)
     rng = np.random.default_rng([seed, 7])
     trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
-    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
     ranges = build.gene_ranges(CONFIG["search_range"])
     return problem_of(gripper, MODEL, torque, times, trace, ranges)
 
 
 def run(method: str, posed: Problem, seed: int = 0) -> Identification:
-    return identifier(method, CONFIG)(posed, np.random.default_rng(seed), silent)
+    return identifier(method, method_settings(method, CONFIG))(posed, np.random.default_rng(seed), silent)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_an_answer_is_what_it_says(method: str) -> None:
     posed = problem("liquid_drop_2", 0)
     told: list[tuple[int, float]] = []
-    identify = identifier(method, CONFIG)
+    identify = identifier(method, method_settings(method, CONFIG))
     answer = identify(posed, np.random.default_rng(0), lambda n, misfit: told.append((n, misfit)))
     history = answer.history
     assert posed.misfit(answer.parameters[None])[0] == pytest.approx(answer.misfit_rad, rel=1e-6)
@@ -152,7 +157,7 @@ def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
 
 def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
-    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
     ranges = build.gene_ranges(CONFIG["search_range"])
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise

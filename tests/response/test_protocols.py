@@ -39,7 +39,7 @@ PROTOCOL = {
         {"duration_s": 15.0, "torque_Nm": 0.5e-9},
     ]
 }
-TORQUE = build.torque({"protocol": PROTOCOL, "actuator": ACTUATOR})
+TORQUE = torque_history(build.phases(PROTOCOL, ACTUATOR))
 EDGES = np.array([0.0, 20.0, 50.0, 60.0, 75.0, 90.0])
 
 

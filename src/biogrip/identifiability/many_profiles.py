@@ -45,8 +45,8 @@ def many_profiles(
     grids = [grid_of(likelihood, quantity) for likelihood in likelihoods for quantity in quantities]
     # Profiles side by side, (n_profiles, n_points), short ones filled up.
     values = np.full((len(grids), max(len(grid) for grid in grids)), np.nan)
-    for profile, grid in enumerate(grids):
-        values[profile, : len(grid)] = grid
+    for row, grid in enumerate(grids):
+        values[row, : len(grid)] = grid
     starts = fits.at_best().ravel()
     middle = np.argmax(values == starts[:, None], axis=1)
     done = _Points(fits, trace, which, values)

@@ -1,57 +1,20 @@
 """The paper's genetic algorithm (section 4), every reading of it a setting."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from biogrip.arrays import Array, IntArray
 from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.genetic_operators import cross, mutate
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import Genome
 from biogrip.identify.problem import Problem
-
-
-@dataclass(frozen=True)
-class GeneticSettings:
-    """How the population evolves.
-
-    Parameters
-    ----------
-    population
-        Individuals in a generation.
-    survivors
-        The best so many live on unchanged and are the parents.
-    mating
-        ``"pairs"``: the survivors form random disjoint pairs; ``"rank"``:
-        parents are drawn with a probability proportional to their rank.
-    first_cut, last_cut
-        Crossover point: the number of genes kept from the first parent is drawn
-        uniformly from this range. Negative numbers count from the end: -1 is one
-        less than the chromosome has.
-    mutation_start
-        First generation in which children mutate.
-    mutation_probability
-        Share of children that mutate.
-    mutated_genes
-        Genes redrawn in a child that mutates.
-    patience
-        Stop after so many generations without a better best misfit.
-    min_generations, max_generations
-        Never stop before, always stop at.
-    """
-
-    population: int
-    survivors: int
-    mating: str
-    first_cut: int
-    last_cut: int
-    mutation_start: int
-    mutation_probability: float
-    mutated_genes: int
-    patience: int
-    min_generations: int
-    max_generations: int
+from biogrip.identify.selection import Ranking, best
+from biogrip.response.misfit import Misfit, Misfits, together
 
 
 def identify(
@@ -78,7 +41,30 @@ def identify(
     progress
         Is told after every generation.
     """
-    return evolve(problem.misfit, problem.genome, settings, rng, progress).identification
+    return identify_many([problem], settings, [rng], progress)[0]
+
+
+def identify_many(
+    problems: Sequence[Problem],
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify samples side by side; each answer is, to the bit, that of `identify`.
+
+    Parameters
+    ----------
+    problems
+        What is identified; all have the same genome.
+    settings
+        How each population evolves.
+    rngs
+        The only source of randomness of each problem.
+    progress
+        Is told after every generation, of all problems together.
+    """
+    evolutions = evolve_problems(problems, settings, rngs, progress)
+    return [evolution.identification for evolution in evolutions]
 
 
 def settings_of(blocks: Mapping[str, Any]) -> GeneticSettings:
@@ -103,125 +89,177 @@ class Evolution:
     last_survivors: Array
 
 
+def evolve_problems(
+    problems: Sequence[Problem],
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Evolution]:
+    """Run the algorithm on problems side by side; arguments as of `identify_many`."""
+    misfits = together([problem.misfit for problem in problems])
+    return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
+
+
 def evolve(
-    misfit: Callable[[Array], Array],
+    misfit: Misfit,
     genome: Genome,
     settings: GeneticSettings,
     rng: np.random.Generator,
     progress: Progress = silent,
 ) -> Evolution:
     """Run the algorithm on any misfit of parameters of shape (n, n_parameters)."""
-    drawn = _evaluated(genome.draw(settings.population, rng), misfit, genome)
-    first = survivors = drawn.best(settings.survivors)
-    evaluations = settings.population
-    rows = [_record(survivors, evaluations)]
-    generation = improved = 0
-    while True:
-        if generation >= settings.max_generations:
-            reason = "generation limit"
-            break
-        if generation >= settings.min_generations and generation - improved >= settings.patience:
-            reason = "stalled"
-            break
-        generation += 1
-        children = _cross(survivors.chromosomes, settings, rng)
+    return evolve_many(together([misfit]), genome, settings, [rng], progress)[0]
+
+
+def evolve_many(
+    misfits: Misfits,
+    genome: Genome,
+    settings: GeneticSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Evolution]:
+    """Run the algorithm with a population for each generator.
+
+    Populations evolve side by side as arrays and know nothing of each other; those
+    that have stopped are left out.
+
+    Parameters
+    ----------
+    misfits
+        Of parameters of shape (n_populations, n, n_parameters), and of the indices of
+        those populations, (n_populations,).
+    genome
+        What a chromosome may be.
+    settings
+        How each population evolves.
+    rngs
+        The only source of randomness of each population.
+    progress
+        Is told after every generation, of all populations together.
+    """
+    running = np.arange(len(rngs))
+    drawn = [genome.code(genome.draw(settings.population, rng)) for rng in rngs]
+    survivors = _evaluated(np.stack(drawn, axis=1), misfits, genome, running)
+    survivors = survivors.best(settings.survivors)
+    first, last = survivors.codes, survivors.codes.copy()
+    course = [_Generation.of(running, survivors)]
+    improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
+    evaluations = settings.population * len(rngs)
+    for generation in range(1, settings.max_generations + 1):
+        waited = generation - 1 - improved[running] >= settings.patience
+        if generation > settings.min_generations and waited.any():
+            stalled[running[waited]] = True
+            last[:, running] = survivors.codes
+            running, survivors = running[~waited], survivors.only(~waited)
+            if not len(running):
+                break
+        chosen = [rngs[population] for population in running.tolist()]
+        children = cross(survivors.codes, genome, settings, chosen)
         if generation >= settings.mutation_start:
-            _mutate(children, genome, settings, rng)
-        evaluations += len(children)
-        best = survivors.ranking[0]
-        everyone = survivors.joined(_evaluated(children, misfit, genome))
+            mutate(children, genome, settings, chosen)
+        before = survivors.ranking[:, 0]
+        everyone = survivors.joined(_evaluated(children, misfits, genome, running))
         survivors = everyone.best(settings.survivors)
-        if survivors.ranking[0] < best:
-            improved = generation
-        rows.append(_record(survivors, evaluations))
-        progress(evaluations, float(survivors.ranking[0]))
-    chromosomes, best_misfit, median_misfit, counts = zip(*rows, strict=True)
-    history = History(
-        np.array(best_misfit),
-        np.array(median_misfit),
-        genome.decode(np.array(chromosomes)),
-        np.array(counts, dtype=np.int64),
-    )
-    answer = Identification(
-        history.best_parameters[-1],
-        float(history.best_misfit[-1]),
-        generation,
-        evaluations,
-        reason,
-        history,
-    )
-    return Evolution(answer, genome.decode(first.chromosomes), genome.decode(survivors.chromosomes))
+        improved[running[survivors.ranking[:, 0] < before]] = generation
+        course.append(_Generation.of(running, survivors))
+        evaluations += children[0].size
+        progress(evaluations, float(survivors.ranking[:, 0].min()))
+    last[:, running] = survivors.codes
+    identifications = _identifications(course, stalled, genome, settings)
+    survived = genome.parameters(first), genome.parameters(last)
+    return [Evolution(*each) for each in zip(identifications, *survived, strict=True)]
 
 
 @dataclass(frozen=True)
-class _Population:
-    """Individuals with what they are ranked on."""
+class _Populations:
+    """Individuals with what they are ranked on.
 
-    chromosomes: IntArray
+    Parameters
+    ----------
+    codes : (n_words, n_populations, n)
+    ranking : (n_populations, n)
+    """
+
     codes: IntArray
-    ranking: np.ndarray[tuple[int], np.dtype[np.float32]]
+    ranking: Ranking
 
-    def joined(self, other: "_Population") -> "_Population":
-        return _Population(
-            np.concatenate((self.chromosomes, other.chromosomes)),
-            np.concatenate((self.codes, other.codes), axis=1),
-            np.concatenate((self.ranking, other.ranking)),
+    def joined(self, other: "_Populations") -> "_Populations":
+        return _Populations(
+            np.concatenate((self.codes, other.codes), axis=2),
+            np.concatenate((self.ranking, other.ranking), axis=1),
         )
 
-    def best(self, count: int) -> "_Population":
-        """Best first; ties in the order of the chromosomes' codes."""
-        order = np.lexsort((*self.codes[::-1], self.ranking))[:count]
-        return _Population(
-            self.chromosomes.take(order, axis=0),
-            self.codes.take(order, axis=1),
-            self.ranking[order],
-        )
+    def only(self, which: NDArray[np.bool_]) -> "_Populations":
+        return _Populations(self.codes[:, which], self.ranking[which])
+
+    def best(self, count: int) -> "_Populations":
+        return _Populations(*best(self.codes, self.ranking, count))
 
 
 def _evaluated(
-    chromosomes: IntArray, misfit: Callable[[Array], Array], genome: Genome
-) -> _Population:
+    codes: IntArray, misfits: Misfits, genome: Genome, running: IntArray
+) -> _Populations:
     """Individuals in the order they come in."""
-    ranking = misfit(genome.decode(chromosomes)).astype(np.float32)
-    return _Population(chromosomes, genome.code(chromosomes), ranking)
+    # A misfit is not negative, but what is not a number has either sign.
+    ranking = np.abs(misfits(genome.parameters(codes), running).astype(np.float32))
+    return _Populations(codes, ranking)
 
 
-def _record(survivors: _Population, evaluations: int) -> tuple[IntArray, float, float, int]:
-    ranking = survivors.ranking
-    median = float(ranking[len(ranking) // 2])
-    return survivors.chromosomes[0], float(ranking[0]), median, evaluations
+@dataclass(frozen=True)
+class _Generation:
+    """What is kept of a generation.
+
+    Parameters
+    ----------
+    running : (n_populations,)
+        Indices of those that have not stopped.
+    best_codes : (n_words, n_populations)
+    best_misfit, median_misfit : (n_populations,)
+        Of the survivors.
+    """
+
+    running: IntArray
+    best_codes: IntArray
+    best_misfit: Ranking
+    median_misfit: Ranking
+
+    @classmethod
+    def of(cls, running: IntArray, survivors: _Populations) -> "_Generation":
+        codes, ranking = survivors.codes, survivors.ranking
+        middle = ranking.shape[1] // 2
+        # Copies, for a part of an array keeps all of it.
+        return cls(running, codes[:, :, 0].copy(), ranking[:, 0].copy(), ranking[:, middle].copy())
 
 
-def _cross(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
-    """Single-point crossover; both children of a pair are kept."""
-    wanted = settings.population - settings.survivors
-    pairs = -(-wanted // 2)
-    if settings.mating == "rank":
-        rank = np.arange(len(parents), 0, -1)
-        drawn = rng.choice(len(parents), size=(pairs, 2), p=rank / rank.sum())
-    else:
-        rounds = -(-2 * pairs // (len(parents) // 2 * 2))
-        shuffled = [rng.permutation(len(parents))[: len(parents) // 2 * 2] for _ in range(rounds)]
-        drawn = np.concatenate(shuffled)[: 2 * pairs].reshape(pairs, 2)
-    genes = parents.shape[1]
-    first, last = (
-        min(cut if cut > 0 else genes + cut, genes - 1)
-        for cut in (settings.first_cut, settings.last_cut)
-    )
-    cut = rng.integers(min(first, last), last, size=(pairs, 1), endpoint=True)
-    mated = parents.take(drawn.T, axis=0)
-    children = np.where(np.arange(genes) < cut, mated, mated[::-1])
-    return children.reshape(2 * pairs, genes)[:wanted]
-
-
-def _mutate(
-    children: IntArray,
+def _identifications(
+    course: Sequence[_Generation],
+    stalled: NDArray[np.bool_],
     genome: Genome,
     settings: GeneticSettings,
-    rng: np.random.Generator,
-) -> None:
-    """Redraw genes of some children in place."""
-    chosen = np.flatnonzero(rng.random(len(children)) < settings.mutation_probability)
-    for _ in range(settings.mutated_genes):
-        gene = rng.integers(genome.genes, size=len(chosen))
-        children[chosen, gene] = rng.integers(genome.low[gene], genome.high[gene], endpoint=True)
+) -> list[Identification]:
+    """Sort the generations of all populations into what each of them went through."""
+    running = np.concatenate([generation.running for generation in course])
+    codes = np.concatenate([generation.best_codes for generation in course], axis=1)
+    best_misfit = np.concatenate([generation.best_misfit for generation in course])
+    median_misfit = np.concatenate([generation.median_misfit for generation in course])
+    children = settings.population - settings.survivors
+    found = []
+    for population, has_stalled in enumerate(stalled):
+        own = np.flatnonzero(running == population)
+        history = History(
+            best_misfit[own].astype(float),
+            median_misfit[own].astype(float),
+            genome.parameters(codes[:, own]),
+            settings.population + children * np.arange(len(own)),
+        )
+        found.append(
+            Identification(
+                history.best_parameters[-1],
+                float(history.best_misfit[-1]),
+                len(own) - 1,
+                int(history.evaluations[-1]),
+                "stalled" if has_stalled else "generation limit",
+                history,
+            )
+        )
+    return found

@@ -13,8 +13,9 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identify import genetic
 from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.many_starts import best_of_many_starts
-from biogrip.identify.multi_start import Row, best_of_starts
+from biogrip.identify.multi_start import Row
 from biogrip.identify.problem import Problem
 
 
@@ -30,7 +31,7 @@ class RefinedSettings:
         Number of survivors polished of the initial and of the last population.
     """
 
-    genetic: genetic.GeneticSettings
+    genetic: GeneticSettings
     first: int
     last: int
 
@@ -61,8 +62,7 @@ def identify(
     progress
         Is told after every generation and every fit.
     """
-    coarse, starts, before = _evolved(problem, settings, rng, progress)
-    return _polished(coarse, best_of_starts(problem, starts, before, progress))
+    return identify_many([problem], settings, [rng], progress)[0]
 
 
 def identify_many(
@@ -71,36 +71,28 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
-    """Identify many traces, each as if it were alone; all are polished at once.
+    """Identify samples whose populations evolve side by side; each answer is that of `identify`.
 
     Parameters
     ----------
     problems
-        What is identified, one a trace.
+        What is identified; all have the same genome.
     settings
         The budget of each.
     rngs
-        A source of randomness for each.
+        The only source of randomness of each problem.
     progress
-        Is told after every generation, and in the end once for every trace.
+        Is told after every generation, of all problems together, and in the end once for each.
     """
-    evolved = [
-        _evolved(problem, settings, rng, progress)
-        for problem, rng in zip(problems, rngs, strict=True)
-    ]
-    coarse, starts, before = zip(*evolved, strict=True)
+    evolutions = genetic.evolve_problems(problems, settings.genetic, rngs, progress)
+    starts, before = zip(*(_survivors(each, settings) for each in evolutions), strict=True)
     fine = best_of_many_starts(problems, starts, before, progress)
+    coarse = [evolution.identification for evolution in evolutions]
     return [_polished(*both) for both in zip(coarse, fine, strict=True)]
 
 
-def _evolved(
-    problem: Problem,
-    settings: RefinedSettings,
-    rng: np.random.Generator,
-    progress: Progress,
-) -> tuple[Identification, Array, Row]:
-    """Return what the genetic algorithm finds, the fits' starts, and their history's first row."""
-    evolution = genetic.evolve(problem.misfit, problem.genome, settings.genetic, rng, progress)
+def _survivors(evolution: genetic.Evolution, settings: RefinedSettings) -> tuple[Array, Row]:
+    """Return the fits' starts, log-parameters, and the first row of their history."""
     coarse = evolution.identification
     starts = np.concatenate(
         (
@@ -110,7 +102,7 @@ def _evolved(
     )
     median = float(coarse.history.median_misfit[-1])
     before = coarse.parameters, coarse.misfit_rad, median, coarse.evaluations
-    return coarse, np.log(starts), before
+    return np.log(starts), before
 
 
 def _polished(coarse: Identification, fine: Identification) -> Identification:

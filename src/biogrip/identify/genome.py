@@ -1,7 +1,8 @@
 """The chromosome: three integer genes a parameter (eq. 10, Tables 3 and 4)."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
+from math import prod
 
 import numpy as np
 
@@ -77,29 +78,155 @@ class Genome:
         return parameters
 
     def code(self, chromosomes: IntArray) -> IntArray:
-        """Number chromosomes so that different ones have different numbers.
+        """Number chromosomes in the order of their genes; different ones differ.
+
+        Each word is a number whose digits are genes, counted from their smallest
+        values. So crossover and mutation are arithmetic on codes.
+
+        Parameters
+        ----------
+        chromosomes : (n, n_genes)
 
         Returns
         -------
         (n_words, n)
-            Fifteen genes a word, for sorting and comparing.
         """
         shifted = chromosomes - self.low
-        return np.array([shifted[:, genes] @ weights for genes, weights in self._words])
+        codes = np.zeros((self._words, len(chromosomes)), dtype=np.int64)
+        for gene, (word, weight) in enumerate(zip(self._word, self._weight, strict=True)):
+            codes[word] += shifted[:, gene] * weight
+        return codes
+
+    def parameters(self, codes: IntArray) -> Array:
+        """Parameters of chromosomes from their codes, as `decode` has them.
+
+        Parameters
+        ----------
+        codes : (n_words, ...)
+
+        Returns
+        -------
+        (..., n_parameters)
+        """
+        parameters = np.empty((self.genes // _GENES, *codes.shape[1:]))
+        rest = codes
+        for parameter, values in enumerate(self._parameters_of):
+            last = _GENES * parameter + _GENES - 1
+            word, weight = self._word[last], int(self._weight[last])
+            if parameter == 0 or word != self._word[last - _GENES]:
+                rest = codes[word]
+            which = rest // weight if weight > 1 else rest
+            if weight > 1:
+                rest = rest - which * weight
+            values.take(which, out=parameters[parameter], mode="clip")
+        return np.moveaxis(parameters, 0, -1)
+
+    def crossed(self, parents: IntArray, cut: IntArray) -> IntArray:
+        """Both children of each pair: all genes from the cut on are swapped.
+
+        Parameters
+        ----------
+        parents : (n_words, ..., 2, n_pairs)
+            Codes of mothers and fathers.
+        cut : (..., n_pairs)
+            Number of genes before the cut.
+
+        Returns
+        -------
+        Codes like the parents', the children that begin like their mothers first.
+        """
+        tails = parents % self._modulus.take(cut, axis=1)[..., None, :]
+        children: IntArray = parents - tails
+        children += tails[..., ::-1, :]
+        return children
+
+    def redraw(self, codes: IntArray, which: IntArray, gene: IntArray, value: IntArray) -> None:
+        """Give genes of some chromosomes another value, in place.
+
+        Parameters
+        ----------
+        codes : (n_words, n)
+        which, gene, value : (n_redrawn,)
+            Index of the chromosome, none twice; index of its gene; the gene's new value.
+        """
+        weight = self._weight.take(gene)
+        if self._words > 1:
+            which = which + codes.shape[1] * self._word.take(gene)
+        before = codes.take(which)
+        change = value - self.low.take(gene)
+        change -= before // weight % self.values.take(gene)
+        change *= weight
+        change += before
+        codes.put(which, change)
 
     @cached_property
-    def _words(self) -> list[tuple[slice, IntArray]]:
-        """Genes of each word, and what a step of each of them counts."""
-        words = []
-        for start in range(0, self.genes, _GENES_A_WORD):
-            genes = slice(start, start + _GENES_A_WORD)
-            span = (self.high - self.low + 1)[genes]
-            words.append((genes, np.concatenate((np.cumprod(span[:0:-1])[::-1], [1]))))
-        return words
+    def values(self) -> IntArray:
+        """How many values each gene has."""
+        return self.high - self.low + 1
+
+    @cached_property
+    def _word(self) -> IntArray:
+        """Word of each gene; the genes of a parameter share one."""
+        words, filled = [0], 1
+        for genes in self.values.reshape(-1, _GENES).tolist():
+            filled *= prod(genes)
+            if filled > 2**WORD_BITS:
+                words.append(words[-1] + 1)
+                filled = prod(genes)
+            else:
+                words.append(words[-1])
+        return np.repeat(words[1:], _GENES)
+
+    @cached_property
+    def _words(self) -> int:
+        return int(self._word[-1]) + 1
+
+    @cached_property
+    def _weight(self) -> IntArray:
+        """What a step of each gene counts in its word."""
+        weights = np.ones(self.genes, dtype=np.int64)
+        for gene in range(self.genes - 2, -1, -1):
+            if self._word[gene] == self._word[gene + 1]:
+                weights[gene] = weights[gene + 1] * self.values[gene + 1]
+        return weights
+
+    @cached_property
+    def _modulus(self) -> IntArray:
+        """What is left of a word, modulo this, are the genes from a cut on; (n_words, n_genes)."""
+        moduli = np.empty((self._words, self.genes), dtype=np.int64)
+        for word in range(self._words):
+            own = np.flatnonzero(self._word == word)
+            every = self._weight[own[0]] * self.values[own[0]]
+            moduli[word] = np.where(np.arange(self.genes) < own[0], every, 1)
+            moduli[word, own] = self._weight[own] * self.values[own]
+        return moduli
+
+    @cached_property
+    def _parameters_of(self) -> list[Array]:
+        """All values of each parameter, by the number that its genes are."""
+        bounds = zip(
+            self.low.reshape(-1, _GENES).tolist(),
+            self.high.reshape(-1, _GENES).tolist(),
+            strict=True,
+        )
+        return [_all_values(tuple(low), tuple(high)) for low, high in bounds]
 
 
-# Five parameters of the widest range, (37 * 9 * 9)^5, stay below 2^63.
-_GENES_A_WORD = 15
+@lru_cache(maxsize=64)
+def _all_values(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
+    """Values of a parameter in the order of its genes, (n_values,)."""
+    ranges = [np.arange(least, most + 1) for least, most in zip(low, high, strict=True)]
+    genes = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, _GENES)
+    values: Array = Genome(np.array(low), np.array(high)).decode(genes)[:, 0]
+    return values
+
+
+_GENES = 3
+"""Genes of a parameter."""
+
+WORD_BITS = 48
+"""A word of a code is below two to this power."""
+
 # The largest power of ten that is an exact double.
 _LARGEST_POWER = 22
 _POWERS = range(-_LARGEST_POWER, _LARGEST_POWER + 1)

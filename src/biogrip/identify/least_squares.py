@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.many_starts import best_of_many_starts
-from biogrip.identify.multi_start import Row, best_of_starts, screened
+from biogrip.identify.multi_start import Row, screened
 from biogrip.identify.problem import Problem
 
 
@@ -52,15 +52,14 @@ def identify(
     rng
         The only source of randomness.
     progress
-        Is told after every fit.
+        Is told in the end.
 
     Raises
     ------
     BiogripError
         If the model has no answer at any of the points.
     """
-    starts, before = _screened(problem, settings, rng)
-    return best_of_starts(problem, starts, before, progress)
+    return identify_many([problem], settings, [rng], progress)[0]
 
 
 def identify_many(

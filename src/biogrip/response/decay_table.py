@@ -22,7 +22,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, Polynomial, chebyshev
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 
 WIDTH, DEGREE = 0.25, 11
 SHORTER, SHORT_DEGREE = 32, 5
@@ -54,14 +54,30 @@ class DecayTable:
 
     def __call__(self, rates: Array) -> Array:
         """Sums at rates of any shape, shape (n_sums, ...)."""
+        every = np.arange(self._powers.shape[1]).reshape(-1, *np.ones(rates.ndim, dtype=int))
+        return self.of(every, rates)
+
+    def of(self, which: IntArray, rates: Array) -> Array:
+        """Some of the sums.
+
+        Each depends on its own rate alone, not on what else is asked for.
+
+        Parameters
+        ----------
+        which
+            Indices of sums, of a shape that broadcasts with that of the rates.
+        rates
+            At which rates.
+        """
         place = np.fmin(np.log(1 - self._longest * rates) / (WIDTH / SHORTER), self._end)
         piece = place.astype(np.intp)
         place -= piece
-        powers = self._powers.take(piece, axis=2)
-        sums: Array = powers[-1]
+        piece = piece + which * self._powers.shape[2]
+        powers = self._powers.reshape(SHORT_DEGREE + 1, -1)
+        sums: Array = powers[-1].take(piece)
         for power in powers[-2::-1]:
             sums *= place
-            sums += power
+            sums += power.take(piece)
         return sums
 
 

@@ -1,15 +1,21 @@
-"""The misfit of a population against a trace, in whichever way is fastest."""
+"""The misfit of populations against traces, in whichever way is fastest."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.sample import SampleModel
+
+Misfit = Callable[[Array], Array]
+"""Of parameters of shape (n, n_parameters), the RMS misfit in rad, (n,)."""
+
+Misfits = Callable[[Array, IntArray], Array]
+"""Of (n_populations, n, n_parameters), and of which trace each is for, (n_populations, n)."""
 
 
 def misfit_of(
@@ -21,7 +27,7 @@ def misfit_of(
     *,
     nonlinear: bool = False,
     nuisance: Array | None = None,
-) -> Callable[[Array], Array]:
+) -> Misfit:
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
 
     Parameters
@@ -50,3 +56,20 @@ def misfit_of(
         nonlinear=nonlinear,
         nuisance=np.zeros((0, len(time_s))) if nuisance is None else nuisance,
     )
+
+
+def together(misfits: Sequence[Misfit]) -> Misfits:
+    """Return the misfits of one trace each as one function of a population for each trace.
+
+    It has the same bits as the misfits by themselves.
+    """
+    series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
+    if len(series) == len(misfits) and all(map(series[0].joins, series)):
+        return SeriesMisfit.joined(series).of_each
+
+    def one_by_one(parameters: Array, traces: IntArray) -> Array:
+        return np.stack(
+            [misfits[trace](own) for own, trace in zip(parameters, traces, strict=True)]
+        )
+
+    return one_by_one

@@ -1,14 +1,20 @@
-"""RMS misfit of a whole population against one trace, without forming a response.
+"""RMS misfit of whole populations against traces, without forming a response.
 
 Between two torque steps the inertia-free response is a constant plus
-exponentials, so at uniform sampling it is sum_j a_j z_j^n, the constant a mode
-that does not decay. Its squared distance from the samples y_n expands into
-geometric series in z_i z_j, and into the projections of the trace on the
-response of each mode. Those are long sums, but functions of the mode's rate
-alone: computed once at some hundred rates, they are interpolated for all others.
+exponentials, so at uniform sampling it is sum_j a_j z_j^n. Its squared distance
+from the samples y_n expands into geometric series in z_i z_j, and into the
+projections of the trace on the response of each mode. Those are long sums, but
+functions of the mode's rate alone: computed once at some hundred rates, they are
+interpolated for all others.
+
+What concerns one individual is arithmetic element by element, in an order that is
+written out, and no reduction of an array: the same to the last bit whoever else is
+in the population, and however many populations are looked at together.
 """
 
-from functools import cache
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
@@ -16,15 +22,18 @@ from biogrip.arrays import Array, IntArray
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory, drives
 from biogrip.response.decay_table import DecayTable
-from biogrip.response.linear import LEFT, StepResponse, step_response
+from biogrip.response.linear import LEFT, is_symmetric, step_response
+from biogrip.response.two_modes import two_modes
 from biogrip.sample import SampleModel
 
-# Rate of a constant, over the sampling rate: z^n is 1 for any n.
-_NO_DECAY = -1e-100
+# Individuals looked at together: enough to make calls worth their while, and to stay in the cache.
+_AT_ONCE = 7000
+# Modes of a closed form; the rates of more are iterated for, until those of all have settled.
+_CLOSED_FORM = 2
 
 
 class SeriesMisfit:
-    """RMS difference between the model's rotation and a uniformly sampled trace.
+    """RMS difference between the model's rotation and uniformly sampled traces.
 
     Parameters
     ----------
@@ -32,7 +41,7 @@ class SeriesMisfit:
         What is simulated: the linear model without inertia, under torque steps.
     interval_s
         Sampling interval; the first sample is at t = 0.
-    rotation_rad : (n_samples,)
+    rotation_rad : (n_samples,) or (n_traces, n_samples)
         The measured closing rotation of the left arm.
     """
 
@@ -44,27 +53,56 @@ class SeriesMisfit:
         interval_s: float,
         rotation_rad: Array,
     ) -> None:
-        self._gripper = gripper
-        self._model = model
-        self._symmetric = torque.symmetric
-        self._interval_s = interval_s
-        self._samples = len(rotation_rad)
-        self._heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
+        self._simulated = (gripper, model, torque, interval_s)
+        self._traces = np.atleast_2d(rotation_rad)
+        self._samples = self._traces.shape[1]
+        heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
+        # What a drive does at the start of each phase, and what it has come to.
+        self._heights = heights[:, :, None, None]
+        self._levels = np.cumsum(heights, axis=1)[:, :, None]
         # Times in samples; rounding must not keep a sample from the step that it falls on.
         steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
         steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
         starts = np.minimum(np.ceil(steps), self._samples)
-        # Until a phase's first sample: from its step, and from the first sample of the last phase.
+        self._first_samples = starts.astype(np.int64)
+        # From a step to the first sample of its phase.
         self._late = np.maximum(starts - steps, 0)
-        self._gaps = np.diff(starts, prepend=0)
-        self._counts = np.diff(starts, append=self._samples)
-        self._phases = np.split(rotation_rad, starts[1:].astype(np.int64))
-        self._square_sum = float(np.dot(rotation_rad, rotation_rad))
+        # One sample, and all of each phase.
+        lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
+        self._lengths = lengths[:, None, None]
+        self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
+
+    @classmethod
+    def joined(cls, misfits: Sequence["SeriesMisfit"]) -> "SeriesMisfit":
+        """Take the traces of several that agree in all else, see `joins`, together."""
+        return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
+
+    def joins(self, other: "SeriesMisfit") -> bool:
+        """Whether populations against traces of both give the same bits together as apart."""
+        (gripper, *same, interval_s), (others_gripper, *others, others_interval_s) = (
+            self._simulated,
+            other._simulated,
+        )
+        return (
+            all(one is another for one, another in zip(same, others, strict=True))
+            and (gripper, interval_s) == (others_gripper, others_interval_s)
+            and self._samples == other._samples
+            and self._closed_form
+        )
+
+    @cached_property
+    def _closed_form(self) -> bool:
+        _, rates, _ = self._modes(np.ones((1, len(self._simulated[1].parameters))))
+        return len(rates) <= _CLOSED_FORM
+
+    @cached_property
+    def projections(self) -> DecayTable:
+        """What `exact_projections` has, interpolated; made when it is first needed."""
         shortest = float(np.min(self._late, where=self._late > 0, initial=1.0))
-        self.projections = DecayTable(self.exact_projections, self._samples, shortest)
+        return DecayTable(self.exact_projections, self._samples, shortest)
 
     def __call__(self, parameters: Array) -> Array:
-        """Misfit in rad of each individual.
+        """Misfit in rad of each individual against the only trace, or the first.
 
         Parameters
         ----------
@@ -75,52 +113,120 @@ class SeriesMisfit:
         -------
         (n_individuals,)
         """
-        response = step_response(
-            self._gripper,
-            self._model.network(parameters),
-            symmetric=self._symmetric,
-            inertia=False,
-        )
-        rates, weights = self._modes(response)
-        square = self._square_sum + self._square_sums(rates, self._amplitudes(rates, weights))
-        square -= 2 * np.einsum("djn,djn->n", weights, self.projections(rates))
-        misfit: Array = np.sqrt(np.maximum(square, 0) / self._samples)
+        misfit: Array = self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
         return misfit
 
-    def _modes(self, response: StepResponse) -> tuple[Array, Array]:
-        """Rates per sample (n_modes, n), weights (n_drives, n_modes, n); the constant first."""
-        static, weights = response.static[:, LEFT].T, response.weights[:, LEFT]
-        rates = response.rates.T * self._interval_s
+    def of_each(self, parameters: Array, traces: IntArray) -> Array:
+        """Misfit in rad of populations, each against a trace.
+
+        Parameters
+        ----------
+        parameters : (n_populations, n_individuals, n_parameters)
+            Sample parameters in the model's order, SI units.
+        traces : (n_populations,)
+            Indices of the traces.
+
+        Returns
+        -------
+        (n_populations, n_individuals)
+        """
+        populations, size = parameters.shape[:2]
+        some = max(1, _AT_ONCE // size)
+        misfit = np.empty((populations, size))
+        for start in range(0, populations, some):
+            these = slice(start, start + some)
+            misfit[these] = self._of_some(parameters[these], traces[these])
+        return misfit
+
+    def _of_some(self, parameters: Array, traces: IntArray) -> Array:
+        shape = parameters.shape[:2]
+        static, rates, weights = self._modes(parameters.reshape(-1, parameters.shape[2]))
+        trace = traces.repeat(shape[1])
+        square = self._model_square_sums(static, rates, weights)
+        square += self._square_sums.take(trace)
+        drives = len(weights)
+        for drive, (at_rest, decaying) in enumerate(zip(static, weights, strict=True)):
+            which = trace if drives == 1 else drives * trace + drive
+            product = at_rest * self._projections_of_constant.take(which)
+            product += _sum(decaying * self.projections.of(which, rates))
+            product *= 2
+            square -= product
+        np.maximum(square, 0, out=square)
+        square /= self._samples
+        return np.sqrt(square, out=square).reshape(shape)
+
+    def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
+        """Static (n_drives, n), rates a sample (n_modes, n), weights (n_drives, n_modes, n)."""
+        gripper, model, torque, interval_s = self._simulated
+        network = model.network(parameters)
+        if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
+            static, rates, weights = two_modes(gripper.left, gripper.lever_m, network)
+            return static[None], rates * interval_s, weights[None]
+        response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
         return (
-            np.concatenate((np.full_like(rates[:1], _NO_DECAY), rates)),
-            np.concatenate((static[:, None], weights.transpose(1, 2, 0)), axis=1),
+            np.ascontiguousarray(response.static[:, LEFT].T),
+            np.ascontiguousarray(response.rates.T) * interval_s,
+            np.ascontiguousarray(response.weights[:, LEFT].transpose(1, 2, 0)),
         )
 
-    def _amplitudes(self, rates: Array, weights: Array) -> Array:
-        """Amplitudes at the first sample of each phase, shape (n_phases, n_modes, n)."""
-        amplitudes = np.einsum("dp,djn->pjn", self._heights, weights)
-        for phase, (late, gap) in enumerate(zip(self._late, self._gaps, strict=True)):
+    @cached_property
+    def _projections_of_constant(self) -> Array:
+        return self.projections(np.zeros(1))[:, 0]
+
+    def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
+        """Sums over all samples of squared responses, shape (n,).
+
+        In a phase of N samples, ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes.
+        Those of products follow from z^N - 1 and z - 1 without cancellation.
+        """
+        decayed = np.expm1(self._lengths * rates)
+        amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
+        constants = _sum(self._levels * static[:, None])[:, None]
+        mixed = decayed[1:] / decayed[0]
+        mixed *= constants
+        for i, j in combinations(range(len(rates)), 2):
+            both = decayed[:, i] * decayed[:, j]
+            both += decayed[:, i]
+            both += decayed[:, j]
+            series = both[1:] / both[0]
+            series *= amplitudes[:, i]
+            mixed[:, j] += series
+        mixed *= 2
+        decayed *= 2 + decayed
+        terms = decayed[1:] / decayed[0]
+        terms *= amplitudes
+        terms += mixed
+        terms *= amplitudes
+        constants *= constants
+        constants *= self._lengths[1:]
+        return _sum(_sum(terms)) + _sum(constants)[0]
+
+    def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
+        """Amplitudes of modes at the first sample of each phase.
+
+        Parameters
+        ----------
+        rates : (n_modes, n)
+            Over the sampling rate.
+        weights : (n_drives, n_modes, n)
+            Of unit steps.
+        decays : (n_phases, n_modes, n)
+            To what share a mode decays within each phase.
+
+        Returns
+        -------
+        (n_phases, n_modes, n)
+        """
+        amplitudes = _sum(self._heights * weights[:, None])
+        for phase, late in enumerate(self._late):
             if late > 0:
                 amplitudes[phase] *= np.exp(late * rates)
             if phase > 0:
-                amplitudes[phase] += np.exp(gap * rates) * amplitudes[phase - 1]
+                amplitudes[phase] += decays[phase - 1] * amplitudes[phase - 1]
         return amplitudes
 
-    def _square_sums(self, rates: Array, amplitudes: Array) -> Array:
-        """Sum over all samples of the squared response, shape (n,)."""
-        first, second, times = _pairs(len(rates))
-        pair_rates = rates.take(first, axis=0) + rates.take(second, axis=0)
-        # (z_i z_j)^N - 1 over z_i z_j - 1, the sum over a phase of N samples.
-        series = np.expm1(self._counts[:, None, None] * pair_rates)
-        series *= amplitudes.take(first, axis=1)
-        series *= amplitudes.take(second, axis=1)
-        sums: Array = times @ (series.sum(axis=0) / np.expm1(pair_rates))
-        return sums
-
     def exact_projections(self, rates: Array) -> Array:
-        """Projections of the trace on the response of a mode to each drive, summed up.
-
-        `projections` has them interpolated.
+        """Projections of each trace on the response of a mode to each drive, summed up.
 
         Parameters
         ----------
@@ -129,28 +235,47 @@ class SeriesMisfit:
 
         Returns
         -------
-        (n_drives, n)
+        (n_traces * n_drives, n)
         """
-        unit = np.repeat(np.eye(len(self._heights))[:, :, None], len(rates), axis=2)
-        amplitudes = self._amplitudes(rates[None], unit)
-        return np.einsum("pdn,pn->dn", amplitudes, _power_sums(self._phases, rates))
+        sums = _power_sums(self._traces, self._first_samples, rates)
+        decays = np.exp(self._lengths[1:] * rates)
+        units = np.eye(len(self._heights))[:, :, None, None] * np.ones_like(rates)
+        projections = [
+            _sum(self._amplitudes(rates[None], unit, decays) * sums.swapaxes(0, 1))
+            for unit in units
+        ]
+        return np.stack(projections, axis=1).reshape(-1, len(rates))
 
 
-def _power_sums(pieces: list[Array], rates: Array) -> Array:
-    """sum_n exp(rate n) y_n of each piece y, shape (n_pieces, n_rates).
+def _sum(terms: Array) -> Array:
+    """Sum over the first axis, one after the other whatever the shape."""
+    total: Array = terms[0]
+    for term in terms[1:]:
+        total = total + term
+    return total
 
-    In two levels, n = B a + b: one matrix product with the pieces folded to
-    (B, N/B), one weighted sum over rows.
+
+def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
+    """sum_n exp(rate n) y_n of each phase of each trace, shape (n_traces, n_phases, n_rates).
+
+    In two levels, n = B a + b: one matrix product with the phases folded to
+    (B, N/B), one weighted sum over rows. Traces go through it one by one, so that none
+    depends on the others.
     """
-    block = max(1, int(np.sqrt(max(len(piece) for piece in pieces))))
-    folded, columns = _fold(pieces, block)
-    rows = max(stop - start for start, stop in columns)
-    within = np.exp(rates[:, None] * np.arange(block)) @ folded
-    across = np.exp(rates[:, None] * (block * np.arange(rows)))
-    sums = [
-        np.einsum("mr,mr->m", within[:, start:stop], across[:, : stop - start])
-        for start, stop in columns
-    ]
+    longest = int(np.diff(first_samples, append=traces.shape[1]).max())
+    block = max(1, int(np.sqrt(longest)))
+    within = np.exp(rates[:, None] * np.arange(block))
+    across = np.exp(rates[:, None] * (block * np.arange(-(-longest // block))))
+    sums = []
+    for trace in traces:
+        folded, columns = _fold(np.split(trace, first_samples[1:]), block)
+        rows = within @ folded
+        sums.append(
+            [
+                np.einsum("mr,mr->m", rows[:, start:stop], across[:, : stop - start])
+                for start, stop in columns
+            ]
+        )
     return np.array(sums)
 
 
@@ -165,10 +290,3 @@ def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]
         columns.append((start, start + rows))
         start += rows
     return np.ascontiguousarray(np.concatenate(folded, axis=1)), columns
-
-
-@cache
-def _pairs(modes: int) -> tuple[IntArray, IntArray, Array]:
-    """Indices of all pairs of modes, i <= j, and how often each counts in a square."""
-    first, second = np.triu_indices(modes)
-    return first, second, np.where(first == second, 1.0, 2.0)

@@ -68,7 +68,7 @@ class Record:
     noise_rms_rad
         RMS of the noise that the trace really contains; None if nobody knows.
     cpu_s
-        Processor time that it took.
+        Processor time that it took; its share of those identified side by side with it.
     """
 
     case: str

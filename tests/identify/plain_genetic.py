@@ -1,0 +1,87 @@
+"""The genetic algorithm gene by gene, one population at a time: what the codes must do as well."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.identify.answer import History, Identification
+from biogrip.identify.genetic_settings import GeneticSettings
+from biogrip.identify.genome import Genome
+
+
+def chromosomes_of(genome: Genome, codes: IntArray) -> IntArray:
+    """Genes of codes (n_words, n)."""
+    digits = codes[genome._word].T // genome._weight % genome.values
+    return digits + genome.low
+
+
+def identified(
+    misfit: Callable[[Array], Array],
+    genome: Genome,
+    settings: GeneticSettings,
+    rng: np.random.Generator,
+) -> Identification:
+    def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
+        ranking = misfit(genome.decode(everyone)).astype(np.float32)
+        order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]
+        return everyone[order], ranking[order].astype(float)
+
+    survivors, ranking = ranked(genome.draw(settings.population, rng))
+    rows = [(survivors[0], ranking[0], ranking[len(ranking) // 2])]
+    generation = improved = 0
+    reason = "generation limit"
+    while generation < settings.max_generations:
+        if generation >= settings.min_generations and generation - improved >= settings.patience:
+            reason = "stalled"
+            break
+        generation += 1
+        children = _children(survivors, settings, rng)
+        if generation >= settings.mutation_start:
+            _mutate(children, genome, settings, rng)
+        survivors, new = ranked(np.concatenate((survivors, children)))
+        improved = generation if new[0] < ranking[0] else improved
+        ranking = new
+        rows.append((survivors[0], ranking[0], ranking[len(ranking) // 2]))
+    best, lowest, median = map(np.array, zip(*rows, strict=True))
+    offspring = settings.population - settings.survivors
+    counts = settings.population + offspring * np.arange(len(rows))
+    history = History(lowest, median, genome.decode(best), counts)
+    return Identification(
+        history.best_parameters[-1], float(lowest[-1]), generation, int(counts[-1]), reason, history
+    )
+
+
+def _children(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
+    wanted = settings.population - settings.survivors
+    pairs = -(-wanted // 2)
+    count, genes = parents.shape
+    if settings.mating == "rank":
+        rank = np.arange(count, 0, -1)
+        drawn = rng.choice(count, size=(pairs, 2), p=rank / rank.sum())
+    else:
+        even = count // 2 * 2
+        rounds = [rng.permutation(count)[:even] for _ in range(-(-2 * pairs // even))]
+        drawn = np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
+    first, last = (
+        min(cut if cut > 0 else genes + cut, genes - 1)
+        for cut in (settings.first_cut, settings.last_cut)
+    )
+    cuts = rng.integers(min(first, last), last, size=pairs, endpoint=True)
+    heads = [
+        np.concatenate((parents[one][:cut], parents[other][cut:]))
+        for one, other, cut in (
+            *zip(drawn[:, 0], drawn[:, 1], cuts, strict=True),
+            *zip(drawn[:, 1], drawn[:, 0], cuts, strict=True),
+        )
+    ]
+    return np.array(heads)[:wanted]
+
+
+def _mutate(
+    children: IntArray, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> None:
+    chosen = np.flatnonzero(rng.random(len(children)) < settings.mutation_probability)
+    for _ in range(settings.mutated_genes):
+        gene = rng.integers(genome.genes, size=len(chosen))
+        children[chosen, gene] = rng.integers(genome.low[gene], genome.high[gene], endpoint=True)
