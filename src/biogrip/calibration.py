@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.calibrated_gripper import ARM_KEYS, CalibratedArm
@@ -85,6 +84,9 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
     BiogripError
         If the arm does not ring within the record, or no arm fits.
     """
+    # Loaded by nobody who only says what a calibration is to be.
+    from scipy.optimize import least_squares
+
     start = _first_guess(record, step_Nm)
     measured = np.stack((record.step_rad, record.impulse_rad))
 

@@ -12,6 +12,7 @@ from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import (
     EVALUATION,
     FIGURE_KINDS,
+    LIGHT,
     Product,
     Reads,
     Weight,
@@ -32,7 +33,7 @@ def drawing(
     sweeps: bool = False,
     sheet: str = "figures",
     when: Callable[[Study], bool] = lambda _: True,
-    weight: Weight = EVALUATION,
+    weight: Weight | None = None,
 ) -> Product:
     """Declare a figure of the study, or of each of its cases.
 
@@ -59,7 +60,7 @@ def drawing(
     when
         Whether a study has it.
     weight
-        How heavy its job is.
+        How heavy its job is, if not as most.
     """
     whose = "{case}" if cases else "{sweep}" if sweeps else ""
     path = f"results/figures/{file or name}" + (f"_{whose}" if whose else "")
@@ -89,7 +90,7 @@ def drawing(
         jobs,
         message=f"Drawing {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
-        weight=weight,
+        weight=weight or (EVALUATION if cases else LIGHT),
         sheet=sheet,
         category="Figures",
         item=file or name,

@@ -13,7 +13,7 @@ from biogrip.products.figures.profiles import PROFILES
 from biogrip.products.figures.valley import VALLEY
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
+from biogrip.products.product import Product, Reads, the, wildcards_of
 from biogrip.study.study import Study
 
 _TEMPLATE = "summary.html.j2"
@@ -98,7 +98,6 @@ SUMMARY = Product(
     lambda plan: wildcards_of(plan.study.cases),
     message="Writing what a trace of {case} tells on one page",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},
-    weight=JUDGEMENT,
     category="Summaries",
     item="summary",
     caption="What one trace of this case tells, on one page.",
