@@ -128,6 +128,6 @@ CAPTION = (
     "How well every case is identified from point to point of the sweep. First the share of seeds "
     "whose misfit reaches the noise in their trace; then, for the best and for the worst "
     "determined quantity, the median absolute error, beside the standard deviation that noise "
-    "leaves at least (the Cramer-Rao bound, to first order). The gripper's values are reconstructed: the "
-    "paper's are not available to us."
+    "leaves at least (the Cramer-Rao bound, to first order). The gripper's values are "
+    "reconstructed: the paper's are not available to us."
 )

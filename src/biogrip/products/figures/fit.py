@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import best_fit, scale_of
+from biogrip.products.figures.results import Fit, best_fit, scale_of
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
 from biogrip.products.files.identifications import PATH
 from biogrip.products.files.traces import MEASUREMENTS
@@ -47,6 +47,13 @@ def draw(
     """
     problem = settings.problem.calibrated(calibrated)
     fit = best_fit(problem, settings.method, identifications, measurements)
+    step = METHODS[settings.method].step
+    label = f"best fit (seed {fit.seed}, {step} {fit.generations})"
+    return draw_fit(fit, label, settings.title)
+
+
+def draw_fit(fit: Fit, label: str, title: str) -> Figure:
+    """Draw a trace, its fit, and what the fit leaves of it."""
     factor, unit = scale_of(fit.fitted_rad, "rad")
     drawn = figure(COLUMN_IN, 3.4)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
@@ -55,15 +62,13 @@ def draw(
     traces.plot([], [], ".", color=MEASURED, markersize=4, label="noisy measurement")
     if fit.target_rad is not None:
         traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    step = METHODS[settings.method].step
-    label = f"best fit (seed {fit.seed}, {step} {fit.generations})"
     traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
     traces.set_ylabel(f"closing rotation ({unit})")
     # Room for the legend above the data.
     low, high = factor * fit.measured_rad.min(), factor * fit.measured_rad.max()
     traces.set_ylim(low - 0.05 * (high - low), high + 0.38 * (high - low))
     traces.legend(loc="upper right")
-    traces.set_title(settings.title)
+    traces.set_title(title)
     residual = factor * (fit.measured_rad - fit.fitted_rad)
     residuals.plot(fit.time_s, residual, color=MEASURED, **style)
     if fit.target_rad is not None:

@@ -174,8 +174,8 @@ LINKAGE = drawing(
     name="linkage",
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
     "of 120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) the "
-    "constitutive models. Arm length and angle are those of the config; in the default study they are "
-    "reconstructed.",
+    "constitutive models. Arm length and angle are those of the config; in the default study they "
+    "are reconstructed.",
     settings=lambda study: study.gripper,
     sheet="input_figures",
 )

@@ -22,29 +22,39 @@ SHOWN_SEEDS = 100
 
 @dataclass(frozen=True)
 class Fit:
-    """The identification of lowest misfit and what it was made from.
+    """A trace and the response that was fitted to it.
 
     Parameters
     ----------
-    seed, generations
-        Which one it is and when it stopped.
     time_s, measured_rad, fitted_rad : (n_samples,)
         The traces.
     target_rad : (n_samples,) or None
         The trace without noise, unless it was recorded.
     """
 
-    seed: int
-    generations: int
     time_s: Array
     target_rad: Array | None
     measured_rad: Array
     fitted_rad: Array
 
 
+@dataclass(frozen=True)
+class BestFit(Fit):
+    """The identification of lowest misfit.
+
+    Parameters
+    ----------
+    seed, generations
+        Which one it is and when it stopped.
+    """
+
+    seed: int
+    generations: int
+
+
 def best_fit(
     problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
-) -> Fit:
+) -> BestFit:
     """Read the seed of lowest misfit and simulate its answer.
 
     Parameters
@@ -70,13 +80,8 @@ def best_fit(
     measured = recorded.rotation_rad[seed]
     nuisance = nuisance_basis(recorded.time_s, offset=problem.offset, drift=problem.drift)
     fitted = simulated + within(nuisance, measured - simulated)
-    return Fit(
-        seed,
-        int(best["generations"]),
-        recorded.time_s,
-        recorded.target_rad,
-        measured,
-        fitted,
+    return BestFit(
+        recorded.time_s, recorded.target_rad, measured, fitted, seed, int(best["generations"])
     )
 
 

@@ -1,0 +1,166 @@
+"""What a notebook needs: simulate, add noise, identify, judge, plot.
+
+The command and the workflow are made of the same functions.
+"""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.gripper import Arm, Gripper
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.case_problem import CaseProblem, Sample
+from biogrip.identify.genome import GeneRange
+from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
+from biogrip.measurement import Noise, add_noise
+from biogrip.protocol import Phase, held
+from biogrip.response.simulation import simulated_rotation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# As in the default study.
+_RANGES = {
+    "k": GeneRange((-3, 8), (1, 9)),
+    "k_p": GeneRange((-3, 8), (1, 9)),
+    "c": GeneRange((-4, 5), (1, 9)),
+    "c_p": GeneRange((-4, 5), (1, 9)),
+}
+_BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
+
+
+def set_up(
+    gripper: Gripper,
+    protocol: tuple[Phase, ...],
+    sample: Sample,
+    *,
+    ranges: Mapping[str, GeneRange] | None = None,
+    fixed: Mapping[str, float] | None = None,
+    nonlinear: bool = False,
+) -> CaseProblem:
+    """Describe an experiment.
+
+    Parameters
+    ----------
+    gripper, protocol
+        With what, and under which torques.
+    sample
+        The constitutive model.
+    ranges
+        Range that is searched, by the name of the range; by default that of the default study.
+    fixed
+        Parameters that are known, by name, SI units.
+    nonlinear
+        Whether the nonlinear model is solved.
+    """
+    return CaseProblem(
+        gripper, protocol, ranges or _RANGES, sample, dict(fixed or {}), nonlinear=nonlinear
+    )
+
+
+def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> Array:
+    """Simulate the closing rotation of the left arm without noise.
+
+    Parameters
+    ----------
+    experiment
+        From `set_up`.
+    parameters
+        Those of the sample by name, SI units.
+    time_s : (n_samples,)
+        Ascending.
+
+    Returns
+    -------
+    (n_samples,)
+        In rad.
+    """
+    values = np.array([[parameters[name] for name in experiment.model.names]])
+    rotation: Array = simulated_rotation(
+        experiment.gripper,
+        experiment.model.network(values),
+        experiment.torque,
+        time_s,
+        nonlinear=experiment.nonlinear,
+    )[0]
+    return rotation
+
+
+def identify_sample(
+    experiment: CaseProblem, time_s: Array, rotation_rad: Array, seed: int = 0
+) -> Identification:
+    """Identify the sample by least squares from many starting points.
+
+    Parameters
+    ----------
+    experiment
+        From `set_up`.
+    time_s, rotation_rad : (n_samples,)
+        The trace.
+    seed
+        Of the starting points.
+    """
+    problem = experiment.of(time_s, rotation_rad)
+    return identify_many([problem], _BUDGET, [np.random.default_rng(seed)], silent)[0]
+
+
+def judge(
+    experiment: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    found: Identification,
+    confidence: float = 0.95,
+) -> Diagnosis:
+    """Judge what the trace determines, by profile likelihoods.
+
+    Parameters
+    ----------
+    experiment
+        From `set_up`.
+    time_s, rotation_rad : (n_samples,)
+        The trace.
+    found
+        What `identify_sample` found in it.
+    confidence
+        Of the limits.
+    """
+    problem = experiment.of(time_s, rotation_rad)
+    return diagnose(problem, experiment.searched, found, confidence=confidence)
+
+
+def plot(
+    experiment: CaseProblem, time_s: Array, rotation_rad: Array, found: Identification
+) -> "Figure":
+    """Draw a trace, its fit, and what the fit leaves of it."""
+    from biogrip.products.figures.fit import draw_fit
+    from biogrip.products.figures.results import Fit
+    from biogrip.products.figures.style import styled
+
+    names = experiment.searched.names
+    values = {**experiment.fixed, **dict(zip(names, map(float, found.parameters), strict=True))}
+    fitted = simulate(experiment, values, time_s)
+    with styled():
+        return draw_fit(Fit(time_s, None, rotation_rad, fitted), "best fit", "")
+
+
+__all__ = [
+    "Arm",
+    "CaseProblem",
+    "Diagnosis",
+    "GeneRange",
+    "Gripper",
+    "Identification",
+    "Noise",
+    "Phase",
+    "Sample",
+    "add_noise",
+    "held",
+    "identify_sample",
+    "judge",
+    "plot",
+    "set_up",
+    "simulate",
+]

@@ -1,0 +1,30 @@
+import re
+from pathlib import Path
+
+import pytest
+
+import biogrip
+
+DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
+
+
+def test_what_the_documentation_shows_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (code,) = re.findall(r"```python\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), re.DOTALL)
+    names: dict[str, object] = {}
+    exec(compile(code, str(DOCUMENT), "exec"), names)
+    said = dict(line.split(" ", 1) for line in capsys.readouterr().out.splitlines()[:4])
+    # A damper of 1e-3 cannot be told from none; the others stand out of 5 % of noise.
+    assert said["k_p"].startswith("determined: 5.0")
+    assert said["c_p"].startswith("only bounded above")
+    told = names["told"]
+    (k_p,) = (f for f in told.findings if f.quantity.label == "k_p")  # type: ignore[attr-defined]
+    assert k_p.low < 5.0 < k_p.high
+    assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_not_there_is_said_as_everywhere() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        _ = biogrip.nonsense
