@@ -6,8 +6,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-_SMALLEST, _LARGEST = 25, 1000
-_BATCHES = 20
+_SMALLEST, _LARGEST = 50, 1000
+_BATCHES = 8
 
 
 class Batch(NamedTuple):
