@@ -15,12 +15,12 @@ from biogrip.arrays import Array
 from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import silent
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.random_streams import stream
 from biogrip.study import build
 from tests.identifiability.definition import rise_along, rise_at
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run
+from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run, study_torque
 
 ALLOWED = 0.01
 ALIKE = 1e-3
@@ -38,7 +38,7 @@ def likelihood_for(case: str, seed: int) -> Likelihood:
 @functools.cache
 def _example() -> Problem:
     time_s, rotation_rad = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1, unpack=True)
-    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
     ranges = build.gene_ranges(CONFIG["search_range"])
     return problem_of(gripper, MODEL, torque, time_s, rotation_rad, ranges)
 
@@ -46,7 +46,8 @@ def _example() -> Problem:
 def example(name: str) -> Likelihood:
     """Likelihood of the example trace in a file of some name: its random starts follow from it."""
     rng = stream(CONFIG["study_seed"], name, 0, "identifiability")
-    found = identifier("least_squares", CONFIG)(_example(), rng, silent)
+    identify = identifier("least_squares", method_settings("least_squares", CONFIG))
+    (found,) = identify([_example()], [rng], silent)
     return likelihood_of(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
 
 

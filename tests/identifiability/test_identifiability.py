@@ -8,7 +8,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.document import diagnosis_data
 from biogrip.identifiability.fisher import bound, covariance
 from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
 from biogrip.identifiability.quantities import (
@@ -24,10 +23,11 @@ from biogrip.identifiability.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.identify.problem import Problem, problem_of
+from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import MODELS, SampleModel, model_named
 from biogrip.study import build
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, problem, run
+from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, problem, run, study_torque
 
 DAMPER = MODELS["damper"]
 
@@ -37,7 +37,7 @@ def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
     return problem_of(
         build.gripper(CONFIG["gripper"]),
         model,
-        build.torque(CONFIG),
+        study_torque(),
         times,
         trace,
         build.gene_ranges(CONFIG["search_range"]),
@@ -185,7 +185,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     """A stiff Maxwell liquid, seen slowly: its damper is determined, its spring bounded below."""
 
     times, _ = clean("liquid_drop_1")
-    gripper, torque = build.gripper(CONFIG["gripper"]), build.torque(CONFIG)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
     response = rotation(step_response(gripper, DAMPER.network([[10.0]])), torque, times)[0]
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     maxwell = MODELS["maxwell"]

@@ -14,6 +14,7 @@ from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identify.local_fit import FINE, local_fit
 from biogrip.sample import MODELS, model_named, with_fixed
+from tests.identifiability.definition import Held
 from tests.identify.test_many_fits import identified, of_case
 from tests.identify.test_methods import MODEL
 
@@ -98,28 +99,20 @@ def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
         assert rise == pytest.approx(alone, abs=2e-3, rel=1e-5)
 
 
-def test_a_sum_is_held_as_by_a_stiffer_row() -> None:
-    """The penalty of a residual a thousand times as stiff as the profile's leaves no choice."""
+def test_a_sum_is_held_as_by_leaving_it_out() -> None:
+    """SciPy's fit over what is left free, which is the definition of a held sum."""
     (likelihood,) = likelihoods("liquid_drop_2", 1)
     (total,) = labelled("c + c_p")
     plain = replace(total, branches=())
     fits = HeldFits([likelihood], [plain])
     for shift in (-0.05, 0.02):
         target = total.log(likelihood.best) + shift
-
-        def held(x: Array, target: float = target) -> tuple[Array, Array]:
-            stiffness = 1e5 / likelihood.deviation(total)
-            return (
-                np.array([stiffness * (total.log(x) - target)]),
-                stiffness * total.gradient(x)[None],
-            )
-
         one = np.zeros(1, dtype=np.int64)
         rises, _ = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
         starts = [total.moved(likelihood.best, target)]
         starts.append(fits.at(one, one, np.array([target]), starts[0][None], FINE)[1][0])
-        alone = min(local_fit(likelihood.problem, start, held=held).misfit_rad for start in starts)
-        assert rises[0] == pytest.approx(likelihood.rise(alone), rel=1e-3, abs=5e-3)
+        alone = min(Held(likelihood, plain, target).fitted(start)[0] for start in starts)
+        assert rises[0] == pytest.approx(alone, rel=1e-3, abs=5e-3)
 
 
 def test_limits_are_where_the_rise_equals_the_threshold() -> None:

@@ -11,11 +11,12 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.methods import METHODS, identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.measurement import Noise, add_noise, rms
-from biogrip.protocol import sample_times
+from biogrip.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.response.linear import rotation, step_response
+from biogrip.response.residuals import Residuals
 from biogrip.sample import MODELS
 from biogrip.study import build
 
@@ -50,7 +51,9 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
 
 
 def run(method: str, posed: Problem, seed: int = 0) -> Identification:
-    return identifier(method, method_settings(method, CONFIG))(posed, np.random.default_rng(seed), silent)
+    identify = identifier(method, method_settings(method, CONFIG))
+    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
+    return answer
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -58,7 +61,8 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     posed = problem("liquid_drop_2", 0)
     told: list[tuple[int, float]] = []
     identify = identifier(method, method_settings(method, CONFIG))
-    answer = identify(posed, np.random.default_rng(0), lambda n, misfit: told.append((n, misfit)))
+    rng = np.random.default_rng(0)
+    (answer,) = identify([posed], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history
     assert posed.misfit(answer.parameters[None])[0] == pytest.approx(answer.misfit_rad, rel=1e-6)
     assert len(history.best_misfit) == answer.generations + 1
@@ -74,8 +78,9 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     np.testing.assert_array_equal(again.parameters, answer.parameters)
 
 
+@pytest.mark.parametrize("together", [True, False], ids=["many at once", "one by one"])
 @pytest.mark.parametrize("method", METHODS)
-def test_evaluations_are_counted(method: str) -> None:
+def test_evaluations_are_counted(method: str, together: bool) -> None:
     posed = problem("liquid_drop_2", 1)
     counted = [0]
 
@@ -83,21 +88,27 @@ def test_evaluations_are_counted(method: str) -> None:
         counted[0] += len(parameters)
         return posed.misfit(parameters)
 
-    residuals = posed.residuals
+    class Counting(Residuals):
+        def __init__(self) -> None:
+            self.__dict__.update(posed.residuals.__dict__)
 
-    class Counting:
-        samples, free = residuals.samples, residuals.free
-        noise_scale_rad, duration_s = residuals.noise_scale_rad, residuals.duration_s
+        @property
+        def condensable(self) -> bool:
+            return together
 
         def __call__(self, x: Array) -> tuple[Array, Array]:
             counted[0] += 1
-            return residuals(x)
+            return super().__call__(x)
 
         def condensed(self, x: Array) -> tuple[Array, Array]:
-            counted[0] += 1
-            return residuals.condensed(x)
+            counted[0] += self.condensable
+            return super().condensed(x)
 
-    watched: Any = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)  # type: ignore[arg-type]
+        def condensed_responses(self, x: Array) -> Array:
+            counted[0] += len(x)
+            return super().condensed_responses(x)
+
+    watched = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)  # type: ignore[arg-type]
     assert run(method, watched).evaluations == counted[0]
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.study.modules import fingerprint, source_files
+from biogrip.running.source_files import fingerprint, source_files
 
 
 def stems(module: str) -> set[str]:
@@ -16,28 +16,55 @@ def stems(module: str) -> set[str]:
 
 
 def test_a_stage_names_what_it_imports_and_nothing_else() -> None:
-    files = stems("biogrip.stages.measurement")
-    assert {"stages/measurement.py", "measurement.py", "random_streams.py", "traces.py"} <= files
+    files = stems("biogrip.products.stages.measurement")
+    wanted = {"products/stages/measurement.py", "measurement.py", "random_streams.py"}
+    assert wanted | {"products/files/traces.py"} <= files
     assert not {file for file in files if "identify" in file or "response" in file}
+
+
+# In the place of what only says what there is to do, something that loads nothing.
+STUBS = """
+import importlib, importlib.abc, importlib.machinery, sys, types
+from unittest.mock import MagicMock
+from biogrip.running.source_files import _SAYING
+
+class Stub(types.ModuleType):
+    __path__ = []
+    def __getattr__(self, name):
+        return MagicMock()
+
+class Finder(importlib.abc.MetaPathFinder, importlib.abc.Loader):
+    def find_spec(self, name, *_):
+        said = any(name == s or name.startswith(f"{s}.") for s in _SAYING)
+        return importlib.machinery.ModuleSpec(name, self) if said else None
+    def create_module(self, spec):
+        return Stub(spec.name)
+    def exec_module(self, module):
+        pass
+
+before = set(sys.modules)
+sys.meta_path.insert(0, Finder())
+importlib.import_module(sys.argv[1])
+loaded = [m for n, m in sys.modules.items() if n.startswith("biogrip") and n not in before]
+print(*(m.__file__ for m in loaded if not isinstance(m, Stub)), sep="\\n")
+"""
+STAGES = ("target", "measurement", "identification", "identifications", "sweep_points")
 
 
 @pytest.mark.parametrize(
     "module",
     [
-        *(f"biogrip.stages.{s}" for s in ("target", "measurement", "identification", "collection")),
-        "biogrip.tables.evidence",
-        "biogrip.stages.robustness",
-        "biogrip.figures.fit",
-        "biogrip.figures.robustness",
+        *(f"biogrip.products.stages.{s}" for s in STAGES),
+        "biogrip.products.tables.evidence",
+        "biogrip.products.figures.fit",
+        "biogrip.products.figures.robustness",
     ],
 )
 def test_no_module_that_python_loads_is_forgotten(module: str) -> None:
     """What an interpreter really imports is the independent count."""
-    code = (
-        f"import {module}, sys; "
-        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('biogrip')), sep='\\n')"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    command = [sys.executable, "-c", STUBS, module]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert f"{module.replace('.', '/')}.py" in run.stdout
     # Packages on the way are loaded too, but hold nothing that could matter.
     loaded = {
         file
@@ -56,23 +83,25 @@ def loaded_by(statement: str) -> set[str]:
 def test_what_starts_often_loads_no_library_that_it_does_not_use() -> None:
     """Start-up is what a job costs beyond its work."""
     heavy = {"matplotlib", "pandas", "scipy", "snakemake", "jinja2"}
-    identification = "import biogrip.stages.identification, biogrip.identify.genetic"
+    identification = "import biogrip.products.stages.identification, biogrip.identify.genetic"
     assert not heavy & loaded_by(identification)
-    assert not heavy & loaded_by("import biogrip.stages.measurement, biogrip.stages.collection")
+    stages = "biogrip.products.stages"
+    assert not heavy & loaded_by(f"import {stages}.measurement, {stages}.identifications")
     assert not {*heavy, "numpy", "pyarrow"} & loaded_by("import biogrip.cli; biogrip.cli._parser()")
 
 
 def test_a_fingerprint_changes_with_what_a_module_imports(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    package = Path(source_files("biogrip.stages.export")[0]).parent
+    module = "biogrip.products.stages.single_trace"
+    package = Path(source_files(module)[0]).parent
     while package.name != "biogrip":
         package = package.parent
     shutil.copytree(package, tmp_path / "biogrip")
-    of_original = fingerprint.__wrapped__("biogrip.stages.export")
-    monkeypatch.setattr("biogrip.study.modules._PACKAGE", tmp_path / "biogrip")
-    assert fingerprint.__wrapped__("biogrip.stages.export") == of_original
-    for file, same in (("gripper.py", True), ("traces.py", False)):
+    of_original = fingerprint.__wrapped__(module)
+    monkeypatch.setattr("biogrip.running.source_files._PACKAGE", tmp_path / "biogrip")
+    assert fingerprint.__wrapped__(module) == of_original
+    for file, same in (("gripper.py", True), ("products/files/traces.py", False)):
         with (tmp_path / "biogrip" / file).open("a") as stream:
             stream.write("# edited\n")
-        assert (fingerprint.__wrapped__("biogrip.stages.export") == of_original) is same
+        assert (fingerprint.__wrapped__(module) == of_original) is same

@@ -1,5 +1,4 @@
 import copy
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -7,9 +6,12 @@ from typing import Any
 import pytest
 import yaml
 
+from biogrip.actuator import torque
 from biogrip.errors import BiogripError
-from biogrip.study.config import Study, load_study
-from biogrip.study.plan import Plan
+from biogrip.products.digest import digest
+from biogrip.products.tables import coverage
+from biogrip.study.load import load_study
+from biogrip.study.study import Study
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
 DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
@@ -37,7 +39,7 @@ def test_the_default_study_holds_the_papers_targets() -> None:
         "liquid_drop_1": {"k": 9.5, "k_p": 1e-4, "c": 10.0, "c_p": 1e-4},
         "liquid_drop_2": {"k": 1.0, "k_p": 1e-4, "c": 10.0, "c_p": 1e-3},
     }
-    assert study.seeds == 50
+    assert [case.seeds for case in study.cases.values()] == [50, 50, 50]
 
 
 def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) -> None:
@@ -54,11 +56,14 @@ def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) ->
     case = study.cases["my_cell"]
     assert case.parameters["c_p"] == 0.001
     assert case.title == "my_cell"
-    assert case.blocks == study.cases["endothelial_cell"].blocks
+    other = study.cases["endothelial_cell"]
+    own = ("sample", "title", "published")
+    blocks = [{k: v for k, v in c.block.items() if k not in own} for c in (case, other)]
+    assert blocks[0] == blocks[1]
 
 
 def test_text_numbers_work_for_whole_numbers_too(tmp_path: Path) -> None:
-    assert load(tmp_path, "seeds: 1e2").seeds == 100
+    assert load(tmp_path, "seeds: 1e2").cases["endothelial_cell"].seeds == 100
 
 
 def test_a_case_may_change_a_block_for_itself(tmp_path: Path) -> None:
@@ -66,10 +71,10 @@ def test_a_case_may_change_a_block_for_itself(tmp_path: Path) -> None:
         tmp_path,
         f"cases: {{soft: {{{DROP}, gripper: {{left: {{stiffness_Nm_per_rad: 1.0e-7}}}}}}}}",
     )
-    arms = study.cases["soft"].blocks["gripper"]
+    arms = study.cases["soft"].block["gripper"]
     assert arms["left"]["stiffness_Nm_per_rad"] == 1e-7
     assert arms["right"]["stiffness_Nm_per_rad"] == 4.4e-7
-    other = study.cases["endothelial_cell"].blocks["gripper"]
+    other = study.cases["endothelial_cell"].block["gripper"]
     assert other["left"]["stiffness_Nm_per_rad"] == 4.4e-7
 
 
@@ -79,8 +84,6 @@ def test_a_case_set_to_nothing_is_dropped(tmp_path: Path) -> None:
 
 
 BAD = {
-    "seeds: 10000\nbatch_size: 25": r"my.yaml, line 2: batch_size: found 25, which makes too many "
-    r"files for one command; allowed is at least 80 with 10000 seeds, 4 methods",
     "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
     "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",
     "seeds: 0": r"my.yaml, line 1: seeds: found 0, allowed is at least 1",
@@ -186,8 +189,19 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     """What only some cases have is not taken for what all have."""
     volts = "protocol: {phases: [{duration_s: 100.0, voltage_V: 10.0}]}"
     study = load(tmp_path, f"cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}")
-    settings = json.loads(Plan(study, tmp_path).coverage_table())
-    whole = {name: {**settings, **case} for name, case in settings["cases"].items()}
-    assert whole["endothelial_cell"]["protocol"]["phases"][0]["voltage_V"] == 10.0
-    assert "actuator" in whole["endothelial_cell"]
-    assert "actuator" not in whole["my_drop"]
+    settings = coverage.settings(study)
+    (phase,) = settings["endothelial_cell"].problem.phases
+    actuator = study.actuator
+    assert phase.duration_s == 100.0
+    assert phase.left.value_Nm == pytest.approx(float(torque(actuator, 10.0)))
+    # What a volt is worth is in the settings of the one, and not in those of the other.
+    wider = load(
+        tmp_path,
+        f"""
+        actuator: {{thickness_m: {2 * actuator.thickness_m}}}
+        cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}
+    """,
+    )
+    changed = coverage.settings(wider)
+    assert digest(changed["endothelial_cell"]) != digest(settings["endothelial_cell"])
+    assert digest(changed["my_drop"]) == digest(settings["my_drop"])

@@ -9,9 +9,12 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.study.config import Study, load_study
-from biogrip.study.plan import Plan
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.sheet import sheets_of
+from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config, read_places
+from biogrip.study.study import Study
 from biogrip.study.yaml_text import LARGEST_BYTES
 from tests.workflow.conftest import ROOT
 
@@ -278,7 +281,7 @@ def test_the_paper_s_errors_are_signed_numbers(tmp_path: Path, error: str, works
     case["published"] = {"table": 5, "identified": {}, "error_percent": {"k": error}}
     file = written(tmp_path, yaml.safe_dump({"cases": {"x": case}}))
     if works:
-        assert load(file).cases["x"].published["error_percent"]["k"] == error
+        assert load(file).cases["x"].published.error_percent["k"] == error
     else:
         said = refusal(file)
         assert "published.error_percent.k: found" in said
@@ -301,7 +304,8 @@ USABLE = {
 
 @pytest.mark.parametrize("name", USABLE)
 def test_what_is_unusual_but_clear_works(tmp_path: Path, name: str) -> None:
-    assert load(written(tmp_path, USABLE[name])).seeds == 90
+    study = load(written(tmp_path, USABLE[name]))
+    assert {case.seeds for case in study.cases.values()} == {90}
 
 
 @pytest.mark.parametrize("name", ["calibration", "recorded", "robustness"])
@@ -319,10 +323,11 @@ def test_two_thousand_cases_are_planned(tmp_path: Path) -> None:
     file = written(tmp_path, f"cases:\n{cases}\n")
     start = time.process_time()
     plan = Plan(load(file), tmp_path)
-    settings = [
-        plan.target(case) + plan.identification(case, "genetic") for case in plan.study.cases
-    ]
-    assert len(settings) == 2000
+    sheets = {sheet.name: sheet for sheet in sheets_of(products().values(), plan)}
+    jobs = [{**job, "method": "genetic"} for job in sheets["target"].jobs]
+    names = ("target", "identification")
+    digests = [tuple(sheets[name].digest(job) for name in names) for job in jobs]
+    assert len(digests) == 2000
     assert time.process_time() - start < 30
 
 
@@ -332,12 +337,13 @@ def test_more_cases_are_too_many(tmp_path: Path) -> None:
         load(written(tmp_path, f"cases:\n{cases}\n"))
 
 
-def test_the_most_times_fit_into_a_command(tmp_path: Path) -> None:
+def test_the_most_times_fit_into_a_parameter_of_a_job(tmp_path: Path) -> None:
     rng = random.Random(1)
     times = sorted(rng.uniform(1e-5, 9.9e-5) for _ in range(5000))
     case = {"sample": yaml.safe_load(DROP)["sample"], "measurement": {"times_s": times}}
     plan = Plan(load(written(tmp_path, yaml.safe_dump({"cases": {"x": case}}))), tmp_path)
-    assert len(plan.target("x")) < 128 * 1024
+    (target,) = sheets_of([products()["target"]], plan)
+    assert len(target.digest({"case": "x"})) + len(target.command({"case": "x"})) < 128
 
 
 @pytest.mark.parametrize("name", ["a{b}.csv", "a<b>.csv", "{}.csv", "<results>/a.csv"])

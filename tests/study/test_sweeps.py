@@ -1,5 +1,4 @@
 import copy
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -8,8 +7,13 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.study.config import Study, load_study
-from biogrip.study.plan import Plan
+from biogrip.products.digest import digest
+from biogrip.products.heat_maps import ShownAxis, heat_maps
+from biogrip.products.stages.identification import IDENTIFICATION
+from biogrip.products.stages.measurement import MEASUREMENT
+from biogrip.products.stages.target import TARGET
+from biogrip.study.load import load_study
+from biogrip.study.study import Study
 
 ROOT = Path(__file__).parents[2]
 DEFAULT = ROOT / "config" / "config.yaml"
@@ -36,12 +40,15 @@ def load(tmp_path: Path, text: str) -> Study:
 
 def settings(study: Study) -> dict[str, str]:
     """Everything that decides a point's results, by its name."""
-    plan = Plan(study, Path("nowhere"))
-    methods = study.methods
+    stages = (TARGET, MEASUREMENT, IDENTIFICATION)
     return {
-        name: plan.target(name)
-        + plan.measurement(name)
-        + "".join(plan.identification(name, method) for method in methods)
+        name: digest(
+            [
+                stage.settings(study, {"case": name, "method": method})
+                for stage in stages
+                for method in study.methods
+            ]
+        )
         for name in study.points
     }
 
@@ -56,18 +63,18 @@ def test_points_are_the_base_case_with_two_values_changed(tmp_path: Path) -> Non
     ]
     base = study.cases["liquid_drop_2"]
     point = study.points["liquid_drop_2--noise--0_02--uniform-peak"]
-    wanted = copy.deepcopy(base.blocks)
+    wanted = copy.deepcopy(dict(base.block))
     wanted["measurement"]["noise"] = {"kind": "uniform", "level": 0.02, "reference": "peak"}
-    assert point.blocks == wanted
-    assert (point.parameters, point.model) == (base.parameters, base.model)
-    assert base.blocks["measurement"]["noise"]["level"] == 0.1
+    assert point.block == wanted
+    assert (point.parameters, point.sample) == (base.parameters, base.sample)
+    assert base.block["measurement"]["noise"]["level"] == 0.1
     assert not set(study.points) & set(study.cases)
 
 
 def test_a_list_of_keys_changes_all_of_them(tmp_path: Path) -> None:
     text = SWEEP.replace("key: measurement.noise.level", f"key: [{', '.join(ARMS)}]")
     study = load(tmp_path, text.replace("[0.1, 2e-2]", "[2.2e-7]"))
-    arms = study.points["endothelial_cell--noise--2_2e-07--uniform-peak"].blocks["gripper"]
+    arms = study.points["endothelial_cell--noise--2_2e-07--uniform-peak"].block["gripper"]
     assert [arms[arm]["stiffness_Nm_per_rad"] for arm in ("left", "right")] == [2.2e-7] * 2
 
 
@@ -98,15 +105,12 @@ def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) 
 
 def test_heat_maps_have_values_in_the_axis_unit(tmp_path: Path) -> None:
     text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
-    shown = json.loads(Plan(load(tmp_path, text), Path("nowhere")).heat_maps("noise"))
-    assert shown["rows"] == {
-        "label": "level (%)",
-        "values": {"0.1": "10", "0.02": "2"},
-        "reconstructed": False,
-    }
-    assert shown["columns"]["values"] == {"a": "a", "b": "b"}
+    study = load(tmp_path, text)
+    shown = heat_maps(study, study.sweeps["noise"])
+    assert shown.rows == ShownAxis("level (%)", {"0.1": "10", "0.02": "2"}, reconstructed=False)
+    assert shown.columns.values == {"a": "a", "b": "b"}
     # Kind and reference are reconstructed by the default study.
-    assert shown["columns"]["reconstructed"]
+    assert shown.columns.reconstructed
 
 
 LEVEL = "key: measurement.noise.level"

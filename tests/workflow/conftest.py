@@ -78,6 +78,33 @@ def snakemake(
     return Run(done.returncode, done.stdout)
 
 
+@dataclass(frozen=True)
+class Tree:
+    """A copy of the repository that may be edited, and a study in it."""
+
+    root: Path
+    study: Path
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """In which Python finds the copy."""
+        return {**os.environ, "PYTHONPATH": str(self.root / "src")}
+
+    def run(self, *arguments: str, config: str = SMALL) -> Run:
+        """Run the copy's workflow in its study."""
+        return snakemake(
+            self.study, *arguments, root=self.root, environment=self.environment, config=config
+        )
+
+
+def copied_tree(folder: Path) -> Tree:
+    """Copy what a study runs by, but no study."""
+    for name in ("src", "workflow", "config", "profiles"):
+        shutil.copytree(ROOT / name, folder / name)
+    shutil.copy(ROOT / "Snakefile", folder)
+    return Tree(folder, folder / "study")
+
+
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
     """A finished small study, one for all workers; copy it before changing anything."""

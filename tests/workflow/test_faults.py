@@ -142,7 +142,7 @@ def is_identification(process: psutil.Process) -> bool:
         command = process.cmdline()
     except psutil.Error:
         return False
-    return "identification" in command[2:3]
+    return command[2:4] == ["make", "identification"]
 
 
 def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Path) -> None:

@@ -7,11 +7,10 @@ import sys
 from pathlib import Path
 
 import pytest
-import yaml
 
 from biogrip.identify.methods import METHODS
-from biogrip.study.config import load_study
-from biogrip.study.plan import Plan
+from biogrip.running.resolved import write_study
+from tests.products.default import study_of
 from tests.workflow.conftest import ROOT
 
 CASES = ("endothelial_cell", "liquid_drop_1", "liquid_drop_2")
@@ -37,10 +36,13 @@ print(hashlib.sha256((a @ b.T).tobytes()).hexdigest())
 """
 
 
-def in_process(environment: dict[str, str], *arguments: str, given: str = "") -> str:
+def in_process(
+    environment: dict[str, str], *arguments: str, given: str = "", folder: Path = ROOT
+) -> str:
     done = subprocess.run(
         [sys.executable, *arguments],
         env={**os.environ, "OPENBLAS_NUM_THREADS": "2", **environment},
+        cwd=folder,
         input=given,
         capture_output=True,
         text=True,
@@ -58,41 +60,25 @@ sys.exit(max(map(main, json.load(sys.stdin))))
 
 def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
     """Targets to error tables, through the command line's commands in one process."""
-    config = ROOT / "config" / "config.yaml"
-    plan = Plan(load_study(yaml.safe_load(config.read_text()), [config]), folder)
-    calls: list[list[object]] = []
+    results = folder / "results"
+    write_study(study_of("seeds: 3"), results)
+    calls = []
     for case in CASES:
-        target, noisy = folder / f"{case}.csv", folder / f"{case}.parquet"
-        calls += [
-            ["target", "--settings", plan.target(case), "--output", target],
-            [
-                *("measurement", "--settings", plan.measurement(case), "--seeds", SEEDS),
-                *("--target", target, "--output", noisy),
-            ],
-        ]
-        aside = folder.parent / f"{folder.name}_aside"
-        for method in METHODS:
-            # The way to an optimum may differ in its last digits; its end may not.
-            end = folder if method == "genetic" else aside
-            files = [folder / f"{case}_{method}.csv", end / f"{case}_{method}.parquet"]
-            calls.append(
-                [
-                    *("identification", "--settings", plan.identification(case, method)),
-                    *("--seeds", SEEDS, "--measurements", noisy),
-                    *("--output", files[0], "--history", files[1]),
-                    *("--timing", aside / files[0].name),
-                ]
-            )
-        calls.append(
-            [
-                *("table", "errors", "--settings", plan.errors(case)),
-                *("--inputs", folder / f"{case}_genetic.csv"),
-                *("--output", folder / f"errors_{case}.csv"),
-            ]
-        )
-    words = [[str(word) for word in arguments] for arguments in calls]
-    in_process(environment, "-c", COMMANDS, given=json.dumps(words))
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+        batch = ["--case", case, "--batch", SEEDS]
+        calls += [["make", "target", "--case", case], ["make", "measurement", *batch]]
+        calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
+        calls.append(["make", "identifications", "errors", "--case", case])
+    in_process(environment, "-c", COMMANDS, given=json.dumps(calls), folder=folder)
+    found = [
+        *(results / "targets").glob("*.csv"),
+        *(results / "measurements").glob("*/*.parquet"),
+        *(results / "identifications").glob("**/*.csv"),
+        # The way to an optimum may differ in its last digits; its end may not.
+        *(results / "histories").glob("*/genetic/*.parquet"),
+        *(results / "tables").glob("errors_*.*"),
+    ]
+    assert len(found) == len(CASES) * (1 + 1 + 1 + len(METHODS) + 1 + 4)
+    return {str(path.relative_to(results)): path.read_bytes() for path in found}
 
 
 @pytest.fixture(scope="module")

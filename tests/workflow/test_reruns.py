@@ -4,12 +4,11 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import ROOT, SMALL, Run, snakemake, tables
+from tests.workflow.conftest import SMALL, Tree, copied_tree, snakemake, tables
 
 NEW_CASE = """  my_cell:
     sample: {model: liquid_drop, k: 20.0, k_p: 5.0, c: 8e1}
@@ -85,84 +84,65 @@ def test_a_setting_reruns_what_depends_on_it(
     assert run.status == 0, run.output
     stages = {"target", "measurement", "identification"}
     assert {stage for stage in stages if run.jobs(stage)} == rerun
-    assert run.jobs("error_table") == 2
+    assert run.jobs("case_tables") == 2
 
 
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(study: Path) -> None:
     run = snakemake(study, "-n", config=SMALL + NEW_CASE)
     assert run.status == 0, run.output
-    together = {"all_errors_table", "linearisation", "linearisation_table", "linearisation_figure"}
-    together |= {"methods_table", "models_table", "coverage_table", "timings_table"}
-    together |= {"overview_figure"}
+    together = {"tables", "model_difference", "linearisation_map", "overview"}
     jobs = run.all_jobs()
     assert together <= set(jobs)
     assert {rule: jobs.pop(rule) for rule in together} == dict.fromkeys(together, 1)
     # Two batches of seeds, three methods; what is left is done once for the case.
-    batches = {"measurement": 2, "identification": 6, "selection": 2, "coverage": 3, "joined": 3}
+    batches = {"measurement": 2, "identification": 6, "model_fits": 2, "intervals": 3}
     assert {rule: jobs.pop(rule) for rule in batches} == batches
-    assert set(jobs.values()) == {1}
+    once = {"target", "identifications", "all_times", "all_intervals", "all_model_fits"}
+    once |= {"judgement", "expectation", "summary", "case_tables", "judgement_tables"}
+    once |= {"case_figures", "simulated_figures", "judgement_figures"}
+    assert jobs == dict.fromkeys(once, 1)
 
 
 def test_a_setting_of_the_genetic_algorithm_leaves_other_methods_alone(study: Path) -> None:
     run = snakemake(study, "-n", config=SMALL.replace("population: 60", "population: 62"))
     assert run.status == 0, run.output
     assert run.jobs("identification") == 4
-    assert not {"target", "measurement", "selection", "coverage"} & set(run.all_jobs())
+    assert not {"target", "measurement", "model_fits", "intervals"} & set(run.all_jobs())
     assert run.output.count(" by genetic, ") == run.output.count("Identifying ") == 4
-
-
-@dataclass(frozen=True)
-class Tree:
-    """A copy of the repository that may be edited, and a study that it finished."""
-
-    root: Path
-    study: Path
-
-    def plan(self, *arguments: str) -> Run:
-        return snakemake(
-            self.study,
-            *arguments,
-            root=self.root,
-            environment={"PYTHONPATH": str(self.root / "src")},
-        )
 
 
 @pytest.fixture(scope="module")
 def tree(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
-    folder = tmp_path_factory.mktemp("tree")
-    for name in ("src", "workflow", "config", "profiles"):
-        shutil.copytree(ROOT / name, folder / name)
-    shutil.copy(ROOT / "Snakefile", folder)
-    shutil.copytree(finished, folder / "study")
-    copied = Tree(folder, folder / "study")
-    # As if this copy of the code had made the results.
-    assert copied.plan("--touch").status == 0
-    assert "Nothing to be done" in copied.plan("-n").output
+    """A copy of the repository, and the study finished as if by it."""
+    copied = copied_tree(tmp_path_factory.mktemp("tree"))
+    shutil.copytree(finished, copied.study)
+    assert copied.run("--touch").status == 0
+    assert "Nothing to be done" in copied.run("-n").output
     return copied
 
 
 @pytest.mark.parametrize(
     ("file", "jobs"),
     [
-        ("workflow/report/errors.rst", {}),
-        ("src/biogrip/figures/fit.py", {"fit_figure": 2, "summary": 2}),
-        ("src/biogrip/tables/models.py", {"models_table": 1}),
+        ("workflow/report/product.rst", {}),
+        ("src/biogrip/products/figures/fit.py", {"case_figures": 2, "summary": 2}),
+        ("src/biogrip/products/tables/models.py", {"tables": 1}),
     ],
 )
 def test_an_edit_reruns_exactly_what_it_is_used_in(
     tree: Tree, file: str, jobs: dict[str, int]
 ) -> None:
     with edited(tree.root / file):
-        assert tree.plan("-n").all_jobs() == jobs
+        assert tree.run("-n").all_jobs() == jobs
 
 
 def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree) -> None:
     with edited(tree.root / "src/biogrip/identify/differential_evolution.py"):
-        run = tree.plan("-n")
+        run = tree.run("-n")
     jobs = run.all_jobs()
-    assert (jobs["identification"], jobs["collection"], jobs["error_table"]) == (4, 2, 2)
-    untouched = {"target", "measurement", "identifiability", "expected_identifiability"}
-    untouched |= {"selection", "coverage", "linearisation", "input_table", "input_figure"}
+    assert (jobs["identification"], jobs["identifications"], jobs["case_tables"]) == (4, 2, 2)
+    untouched = {"target", "measurement", "judgement", "expectation", "model_fits", "intervals"}
+    untouched |= {"model_difference", "input_tables", "input_figures"}
     assert not untouched & set(jobs)
 
 

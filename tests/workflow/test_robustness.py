@@ -58,11 +58,11 @@ def test_a_sweep_has_its_results(study: Path) -> None:
 def test_all_asks_for_heat_maps_but_for_no_figure_of_a_point(study: Path) -> None:
     run = snakemake(study, "-n", config=SWEEP)
     assert run.status == 0, run.output
-    assert run.jobs("fit_figure") == run.jobs("error_table") == 1
+    assert run.jobs("case_figures") == run.jobs("case_tables") == 1
     assert run.jobs("identification") == 2
     fresh = snakemake(study, "-n", "--forceall", config=SWEEP)
-    assert fresh.jobs("robustness_figure") == fresh.jobs("robustness_table") == 1
-    assert fresh.jobs("fit_figure") == 1
+    assert fresh.jobs("robustness_map") == fresh.jobs("robustness") == 1
+    assert fresh.jobs("case_figures") == 1
     assert fresh.jobs("identification") == 2 * (4 + 1)
 
 
@@ -72,7 +72,7 @@ def test_a_value_more_runs_its_own_points_alone(study: Path, tmp_path: Path) -> 
     more = SWEEP.replace("values: [0.0, 0.1]", "values: [0.3, 0.1, 0.0]")
     run = snakemake(study, *WANTED, config=more)
     assert run.status == 0, run.output
-    assert (run.jobs("target"), run.jobs("identification"), run.jobs("robustness")) == (2, 4, 1)
+    assert (run.jobs("target"), run.jobs("identification"), run.jobs("sweep_points")) == (2, 4, 1)
     after = tables(study)
     assert [
         name for name in before if before[name] != after[name] and not name.startswith("tables/")

@@ -134,7 +134,7 @@ def test_what_is_asked_for_is_everything_that_is_made(tiny: Path) -> None:
         for path in results.rglob("*.*")
         if path.is_file() and path.relative_to(results).parts[0] not in ("logs", ".manifest")
     }
-    assert made - {"results/manifest.jsonl"} == asked
+    assert made - {"results/manifest.jsonl", "results/study.json"} == asked
 
 
 @pytest.fixture

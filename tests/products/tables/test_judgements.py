@@ -1,6 +1,7 @@
 """Tables of methods, models, coverage and verdicts, recomputed by hand."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,18 +10,27 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.identify.records import columns
+from biogrip.identify.case_problem import Sample
+from biogrip.products.files.identifications import columns
+from biogrip.products.tables import verdicts as verdicts_table
+from biogrip.products.tables.layout import Table
+from biogrip.products.tables.methods import Settings, methods
+from biogrip.products.tables.models import models
+from biogrip.products.tables.timings import timings
+from biogrip.products.tables.verdicts import verdicts
 from biogrip.sample import MODELS
-from biogrip.tables.layout import Table
-from biogrip.tables.methods import methods
-from biogrip.tables.models import models
-from biogrip.tables.timings import timings
-from biogrip.tables.verdicts import verdicts
+from biogrip.study.study import Published, Truth
 
 
 def rows(table: Table) -> list[dict[str, Any]]:
     names = [column.name for column in table.columns]
     return [dict(zip(names, row, strict=True)) for row in table.rows]
+
+
+def settings(parameters: dict[str, float], samples: int) -> Settings:
+    """Of one case, a drop."""
+    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
+    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, noise_floor_tolerance=0.02)
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -34,18 +44,8 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
         ):
             lines.append(["drop", method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, 5, n, "stalled"])
     pd.DataFrame(lines, columns=head).to_csv(path, index=False)
-    case = {
-        "model": "generalized_maxwell",
-        "parameters": {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0},
-        "samples": 1000,
-    }
-    made = rows(
-        methods(
-            {"cases": {"drop": case}, "optimum_tolerance": 1.0, "noise_floor_tolerance": 0.02},
-            [path],
-        )
-    )
-    first, second = made
+    parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
+    first, second = rows(methods(settings(parameters, 1000), [path]))
     # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
     assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
     assert second["optimum_share"] == 1.0
@@ -59,13 +59,9 @@ def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
     path = tmp_path / "drop.csv"
     line = ["drop", "genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 5, 100, "stalled"]
     pd.DataFrame([line], columns=list(columns(MODELS["generalized_maxwell"]))).to_csv(path)
-    case = {
-        "model": "generalized_maxwell",
-        "parameters": dict.fromkeys(["k", "k_p", "c", "c_p"], 1.0),
-    }
-    settings = {"optimum_tolerance": 1.0, "noise_floor_tolerance": 0.02}
-    made = rows(methods({"cases": {"drop": {**case, "samples": 100}}, **settings}, [path]))
-    assert made[0]["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
+    parameters = dict.fromkeys(["k", "k_p", "c", "c_p"], 1.0)
+    (made,) = rows(methods(settings(parameters, 100), [path]))
+    assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 
 
 def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
@@ -81,7 +77,7 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
             fits.append(["drop", model, seed, count, n, misfit])
     names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
-    damper, maxwell = rows(models({"cases": {"drop": "maxwell"}}, [path]))
+    damper, maxwell = rows(models({"drop": "maxwell"}, [path]))
     # A parameter costs 2 by AIC, ln 1000 = 6.9 by BIC.
     assert (damper["chosen_by_aic"], maxwell["chosen_by_aic"]) == (1, 2)
     assert (damper["chosen_by_bic"], maxwell["chosen_by_bic"]) == (2, 1)
@@ -104,21 +100,21 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     files = [tmp_path / "a.json", tmp_path / "b.json"]
     for file, content in zip(files, (measured, expected), strict=True):
         file.write_text(json.dumps(content))
-    settings = {"case": "x", "title": "X", "parameters": {"k": 2.5, "c": 1.0, "c_p": 0.5}}
-    table = verdicts(settings, files)
+    known = verdicts_table.Settings("x", "X", {"k": 2.5, "c": 1.0, "c_p": 0.5})
+    table = verdicts(known, files[0], files[1:])
     k, total = rows(table)
     assert (k["target"], k["value"], k["low"], k["expected_high"]) == (2.5, 2.0, 1.0, 4.0)
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
-    assert rows(verdicts({**settings, "parameters": {}}, files[:1]))[0]["target"] is None
+    assert rows(verdicts(replace(known, parameters={}), files[0], []))[0]["target"] is None
     files[0].write_text("{}")
     with pytest.raises(BiogripError, match=r"a\.json: holds no verdicts"):
-        verdicts(settings, files)
+        verdicts(known, files[0], files[1:])
 
 
 def test_timings_are_summed(tmp_path: Path) -> None:
     path = tmp_path / "times.csv"
     path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = rows(timings({}, [path]))
+    (row,) = rows(timings(None, [path]))
     assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

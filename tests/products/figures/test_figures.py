@@ -7,20 +7,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 from matplotlib.figure import Figure
 
-from biogrip.figures import comb, convergence, linkage, torque
-from biogrip.figures.results import scale_of
-from biogrip.figures.style import ALL_SEEDS, FITTED, save, styled
-
-CONFIG = Path(__file__).parents[2] / "config" / "config.yaml"
-SETTINGS: dict[str, Any] = yaml.safe_load(CONFIG.read_text())
+from biogrip.products.figures import comb, convergence, linkage, torque
+from biogrip.products.figures.results import scale_of
+from biogrip.products.figures.style import ALL_SEEDS, FITTED, save, styled
+from biogrip.products.product import Product
+from tests.products.default import STUDY
 
 
 def drawn(module: Any) -> Figure:
+    """A figure of the default study's inputs."""
+    (product,) = (value for value in vars(module).values() if isinstance(value, Product))
     with styled():
-        figure: Figure = module.draw(SETTINGS, [])
+        figure: Figure = module.draw(product.settings(STUDY, {}))
     return figure
 
 
@@ -51,7 +51,7 @@ def test_comb_has_every_finger_where_it_is() -> None:
 def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
     for name in ("a", "b"):
         with styled():
-            save(torque.draw(SETTINGS, []), tmp_path / f"{name}.png")
+            save(torque.draw(torque.settings(STUDY)), tmp_path / f"{name}.png")
     for suffix in (".png", ".pdf"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
@@ -77,14 +77,9 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit_rad"] = np.repeat(misfit, 2)
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
-    settings = {
-        "title": "A cell",
-        "method": "genetic",
-        "step": "generation",
-        "noise_floor_tolerance": 0.02,
-        "mutation_start": 20,
-    }
-    axes = convergence.draw(settings, [tmp_path / "found.csv", tmp_path / "history.parquet"]).axes
+    settings = convergence.Settings("A cell", "genetic", 20, noise_floor_tolerance=0.02)
+    files = (tmp_path / "found.csv", tmp_path / "history.parquet")
+    axes = convergence.draw(settings, *files).axes
     filled = [line for line in axes[0].lines if len(np.asarray(line.get_xdata()))]
     assert sum(line.get_color() == ALL_SEEDS for line in filled) == others
     assert sum(line.get_color() == FITTED for line in filled) == 1

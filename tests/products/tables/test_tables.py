@@ -6,26 +6,30 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.identify.records import columns
+from biogrip.identify.case_problem import Sample
+from biogrip.products.catalogue import chosen
+from biogrip.products.files.identifications import columns
+from biogrip.products.tables.errors import ERRORS, Settings, errors
+from biogrip.products.tables.layout import Column, Table, inert, write
 from biogrip.sample import MODELS
-from biogrip.stages import table
-from biogrip.tables.errors import errors
-from biogrip.tables.layout import Column, Table, inert, write
+from biogrip.study.study import Published, Truth
 from tests.workflow.conftest import ROOT
 
-SETTINGS = {
-    "case": "drop",
-    "title": "A drop",
-    "method": "genetic",
-    "model": "generalized_maxwell",
-    "parameters": {"k": 10.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0},
-    "published": {
-        "table": 9,
-        "identified": {"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
-        "error_percent": {"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
-    },
-    "noise_floor_tolerance": 0.02,
-}
+SETTINGS = Settings(
+    "drop",
+    Truth(
+        "A drop",
+        Sample("generalized_maxwell"),
+        {"k": 10.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0},
+        Published(
+            table=9,
+            identified={"k": 9.0, "k_p": 1.0, "c": 3.0, "c_p": 2.0},
+            error_percent={"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
+        ),
+    ),
+    "genetic",
+    noise_floor_tolerance=0.02,
+)
 
 
 @pytest.fixture
@@ -43,7 +47,7 @@ def identifications(tmp_path: Path) -> Path:
 
 
 def test_error_table_is_the_arithmetic_it_says(identifications: Path) -> None:
-    made = errors(SETTINGS, [identifications])
+    made = errors(SETTINGS, identifications)
     names = [column.name for column in made.columns]
     rows = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
     assert list(rows) == ["k", "k_p", "c", "c_p", "c + c_p"]
@@ -77,14 +81,15 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
 
 
 def test_unknown_tables_and_files_are_explained(tmp_path: Path) -> None:
+    files = {kind: tmp_path / f"t.{kind}" for kind in ERRORS.writes}
     with pytest.raises(BiogripError, match="Did you mean 'errors'"):
-        table.run("erors", {}, [], tmp_path / "t.csv")
+        chosen(["erors"])
     with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
-        table.run("errors", SETTINGS, [tmp_path / "gone.csv"], tmp_path / "t.csv")
+        ERRORS.make(SETTINGS, identifications=tmp_path / "gone.csv", **files)
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
-        table.run("errors", SETTINGS, [tmp_path / "other.csv"], tmp_path / "t.csv")
-    assert not (tmp_path / "t.csv").exists()
+        ERRORS.make(SETTINGS, identifications=tmp_path / "other.csv", **files)
+    assert not any(file.exists() for file in files.values())
 
 
 HOSTILE = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "=cmd|'/C calc'!A0", "\t=1+1")

@@ -1,29 +1,26 @@
 """The robustness stage, its table and its heat maps: numbers recomputed by hand."""
 
 import csv
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.figures import robustness as figure
-from biogrip.figures.style import styled
 from biogrip.gripper import Arm, Gripper
-from biogrip.identify.records import columns
+from biogrip.products.figures import robustness as figure
+from biogrip.products.figures.style import styled
+from biogrip.products.files.identifications import columns
+from biogrip.products.heat_maps import HeatMaps, headlines, heat_maps
+from biogrip.products.stages import sweep_points as stage
+from biogrip.products.tables.robustness import robustness
 from biogrip.protocol import held, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.sample import MODELS, generalized_maxwell
-from biogrip.stages import robustness as stage
-from biogrip.study.config import load_study
-from biogrip.study.plan import Plan
-from biogrip.tables.robustness import headlines, robustness
+from biogrip.study.study import Study
+from tests.products.default import study_of
 
-CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
 SWEEPS = """
@@ -45,16 +42,24 @@ TIME_S = np.arange(4001) / 10.0
 
 
 @pytest.fixture
-def plan() -> Plan:
-    config = yaml.safe_load(CONFIG.read_text()) | yaml.safe_load(SWEEPS)
-    return Plan(load_study(config, [CONFIG]), Path("nowhere"))
+def study() -> Study:
+    return study_of(SWEEPS)
 
 
 @pytest.fixture
-def identifications(plan: Plan, tmp_path: Path) -> list[Path]:
+def maps(study: Study) -> HeatMaps:
+    return heat_maps(study, study.sweeps["both"])
+
+
+def settings(study: Study) -> stage.Settings:
+    return stage.settings(study, {"sweep": "both", "case": CASE})
+
+
+@pytest.fixture
+def identifications(study: Study, tmp_path: Path) -> list[Path]:
     """Five seeds: k = 25, 30, ... 45 and c = 330, c_p = 1; misfits 1 to 1.04 times the noise."""
     files = []
-    for name in plan.points("both", CASE):
+    for name in study.points:
         files.append(tmp_path / f"{name}.csv")
         noise = 0.0 if "--0--" in name else 1e-6
         with files[-1].open("w", newline="") as stream:
@@ -72,9 +77,9 @@ def identifications(plan: Plan, tmp_path: Path) -> list[Path]:
 
 
 @pytest.fixture
-def judged(plan: Plan, identifications: list[Path], tmp_path: Path) -> Path:
+def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     output = tmp_path / "judged" / f"{CASE}.csv"
-    stage.run(json.loads(plan.robustness("both", CASE)), identifications, output)
+    stage.judge(settings(study), identifications, output)
     return output
 
 
@@ -108,7 +113,7 @@ def _by_hand(relative_sigma: np.ndarray) -> np.ndarray:
 
 def test_judged_points_are_the_arithmetic_they_say(judged: Path) -> None:
     rows = pd.read_csv(judged, dtype={"row": str, "column": str})
-    assert tuple(rows.columns) == stage.COLUMNS
+    assert tuple(rows.columns) == stage.POINTS.columns
     assert len(rows) == 4 * 2 * 5
     index = rows.set_index(["row", "column", "method", "quantity"]).sort_index()
     noisy = index.loc[("0.2", "additive, any", "genetic")]
@@ -146,21 +151,19 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
     text = SWEEPS.replace("values: [0, 0.2]", "values: [0.2]")
     text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
-    config = yaml.safe_load(CONFIG.read_text()) | yaml.safe_load(text)
-    settings = Plan(load_study(config, [CONFIG]), Path("nowhere")).robustness("both", CASE)
-    stage.run(json.loads(settings), identifications, tmp_path / "x.csv")
+    stage.judge(settings(study_of(text)), identifications, tmp_path / "x.csv")
     assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
 
 
-def test_a_missing_point_is_named(plan: Plan, identifications: list[Path], tmp_path: Path) -> None:
+def test_a_missing_point_is_named(
+    study: Study, identifications: list[Path], tmp_path: Path
+) -> None:
     with pytest.raises(BiogripError, match=r"cell--both--0--gaussian-peak: no file of identific"):
-        stage.run(
-            json.loads(plan.robustness("both", CASE)), identifications[1:], tmp_path / "x.csv"
-        )
+        stage.judge(settings(study), identifications[1:], tmp_path / "x.csv")
 
 
-def test_the_table_has_the_best_and_the_worst_determined(plan: Plan, judged: Path) -> None:
-    table = robustness(json.loads(plan.heat_maps("both")), [judged])
+def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
+    table = robustness(maps, [judged])
     names = [column.name for column in table.columns]
     rows = [dict(zip(names, row, strict=True)) for row in table.rows]
     assert [(row["quantity"], row["row"], row["column"]) for row in rows] == [
@@ -191,10 +194,9 @@ def test_headlines_follow_from_the_bounds() -> None:
     assert headlines(_bounds(k=[400.0])) == []
 
 
-def test_heat_maps_show_the_numbers_they_are_given(plan: Plan, judged: Path) -> None:
-    settings: dict[str, Any] = json.loads(plan.heat_maps("both"))
+def test_heat_maps_show_the_numbers_they_are_given(maps: HeatMaps, judged: Path) -> None:
     with styled():
-        drawn = figure.draw(settings, [judged])
+        drawn = figure.draw(maps, [judged])
     shares, best, worst = drawn.axes[:3]
     texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
     assert texts[0] == ["60\n(100)"] * 4
@@ -209,10 +211,9 @@ def test_heat_maps_show_the_numbers_they_are_given(plan: Plan, judged: Path) -> 
     assert best.get_title(loc="left").startswith("$k_{p}$: error")
 
 
-def test_a_damaged_sweep_is_named(plan: Plan, tmp_path: Path) -> None:
-    settings = json.loads(plan.heat_maps("both"))
+def test_a_damaged_sweep_is_named(maps: HeatMaps, tmp_path: Path) -> None:
     (tmp_path / f"{CASE}.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"endothelial_cell.csv, line 1: wanted the columns"):
-        robustness(settings, [tmp_path / f"{CASE}.csv"])
+        robustness(maps, [tmp_path / f"{CASE}.csv"])
     with pytest.raises(BiogripError, match="endothelial_cell: no file of its points is given"):
-        robustness(settings, [])
+        robustness(maps, [])

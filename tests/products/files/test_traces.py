@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.traces import read_target, write_target
+from biogrip.products.files.traces import read_target, write_target
 
 TIMES = np.arange(5.0)
 

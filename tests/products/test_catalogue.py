@@ -1,0 +1,218 @@
+"""What is declared: every product once, told apart by its settings, in commands of any length."""
+
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import biogrip.products
+from biogrip.errors import BiogripError
+from biogrip.products.catalogue import chosen, products
+from biogrip.products.digest import digest
+from biogrip.products.product import Product
+from biogrip.running.sheet import Sheet, files_of, sheets_of
+from tests.products.default import ROOT, plan_of
+
+EVERYTHING = """
+cases:
+  sized: {sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0, size_m: 60e-6}}
+  uneven:
+    sample: {model: burgers, k_s: 3.0, c_s: 200.0, k_v: 2.0, c_v: 40.0}
+    measurement: {times_s: [0.1, 0.3, 1, 3, 9, 20, 50, 100, 200, 201, 220, 250, 400]}
+    fixed: {c_s: 200.0}
+  calibrated:
+    sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0}
+    assumed_gripper: calibrated
+  recorded:
+    sample: {model: generalized_maxwell}
+    measurement: {file: data/example_trace.csv, time: time_s, rotation: rotation_rad}
+"""
+ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
+
+
+@pytest.fixture
+def everything(monkeypatch: pytest.MonkeyPatch) -> list[Sheet]:
+    """Sheets of the default study, its sweeps, and a case of every kind."""
+    monkeypatch.chdir(ROOT)
+    return sheets_of(products().values(), plan_of(ROBUSTNESS + EVERYTHING))
+
+
+def test_every_module_that_declares_something_is_found() -> None:
+    """Its source is the independent count."""
+    (folder,) = map(Path, biogrip.products.__path__)
+    declare = re.compile(r"\b(Product|table|drawing)\(\n")
+    declared = {
+        ".".join((biogrip.products.__name__, *file.relative_to(folder).with_suffix("").parts))
+        for file in folder.rglob("*.py")
+        if file.name != "declared.py" and declare.search(file.read_text(encoding="utf-8"))
+    }
+    assert len(declared) > 25
+    assert {product.module for product in products().values()} == declared
+    assert [name for name, product in products().items() if name != product.name] == []
+
+
+def test_every_product_is_found_by_its_name_alone() -> None:
+    for name, product in products().items():
+        assert chosen([name]) == [product]
+    with pytest.raises(BiogripError, match=r"no product 'fti'\. Did you mean 'fit'\? Allowed: "):
+        chosen(["fit", "fti"])
+
+
+def test_every_file_is_written_by_one_product_only(everything: list[Sheet]) -> None:
+    patterns = Counter(p for product in products().values() for p in product.writes.values())
+    assert [pattern for pattern, count in patterns.items() if count > 1] == []
+    files = Counter(files_of(everything))
+    assert [file for file, count in files.items() if count > 1] == []
+    # And no pattern could be filled in to be another's file.
+    for sheet in everything:
+        for pattern in sheet.outputs.values():
+            parts = re.split(r"{(\w+)}", pattern)
+            filled = [
+                f"({sheet.constraints[part]})" if odd % 2 else re.escape(part)
+                for odd, part in enumerate(parts)
+            ]
+            own = set(files_of([sheet]))
+            fits = {file for file in files if re.fullmatch("".join(filled), file)}
+            assert fits <= own, pattern
+
+
+def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[Sheet]) -> None:
+    written = set(files_of(everything))
+    for sheet in everything:
+        for product in sheet.products:
+            for job in product.jobs(sheet.plan):
+                for read in product.inputs(sheet.plan, job).values():
+                    assert set(read) - written <= {"data/example_trace.csv"}, (product.name, job)
+
+
+def test_products_of_a_sheet_have_the_same_jobs(everything: list[Sheet]) -> None:
+    """One command makes them, for one of the sheet's jobs."""
+    for sheet in everything:
+        for product in sheet.products:
+            assert list(product.jobs(sheet.plan)) == sheet.jobs, (sheet.name, product.name)
+
+
+def test_no_command_nor_parameter_is_long(everything: list[Sheet]) -> None:
+    """However many cases, seeds and points there are."""
+    for sheet in everything:
+        for job in sheet.jobs:
+            assert len(f"biogrip make {sheet.command(job)} 2> {sheet.log.format(**job)}") <= 300
+            assert len(sheet.digest(job)) <= 300
+
+
+def changed(value: Any) -> Iterator[Any]:
+    """The same with one thing in it changed, for everything in it."""
+    if is_dataclass(value) and not isinstance(value, type):
+        for field in fields(value):
+            if field.init:
+                for other in changed(getattr(value, field.name)):
+                    yield replace(value, **{field.name: other})
+    elif isinstance(value, Mapping):
+        # Where there are many they are all alike.
+        for key, inner in islice(value.items(), 5):
+            yield {k: v for k, v in value.items() if k != key}
+            for other in changed(inner):
+                yield {**value, key: other}
+    elif isinstance(value, list | tuple):
+        for index, inner in enumerate(value[:5]):
+            for other in changed(inner):
+                yield type(value)([*value[:index], other, *value[index + 1 :]])
+        if value:
+            yield type(value)(value[:-1])
+    elif isinstance(value, bool):
+        yield not value
+    elif isinstance(value, int):
+        yield value + 1
+    elif isinstance(value, float):
+        yield value * (1 + 1e-6) if value else 1e-300
+    elif isinstance(value, str):
+        yield f"{value}_"
+    elif value is None:
+        yield 0.0
+    elif not callable(value):
+        raise AssertionError(f"{value!r}")
+
+
+def test_a_digest_changes_with_every_setting(everything: list[Sheet]) -> None:
+    """Of one job of each product: with each field, item and key."""
+    for sheet in everything:
+        for product in sheet.products:
+            for job in islice(product.jobs(sheet.plan), 1):
+                settings = product.settings(sheet.plan.study, job)
+                ours = digest(settings)
+                assert ours == digest(product.settings(sheet.plan.study, job))
+                others = [digest(other) for other in changed(settings)]
+                assert ours not in others, product.name
+                assert len(others) >= (settings is not None)
+
+
+@dataclass(frozen=True)
+class Settings:
+    held: object
+
+
+@pytest.mark.parametrize("wrapped", [float, lambda x: [x], lambda x: {"a": x}, np.array])
+def test_a_digest_has_twelve_digits(wrapped: Callable[[float], object]) -> None:
+    """What is computed may differ beyond them from one processor to another."""
+    ours = digest(Settings(wrapped(1.5)))
+    for digits in (3, 6, 9, 11):
+        assert digest(Settings(wrapped(1.5 * (1 + 10.0**-digits)))) != ours
+    for beyond in (1e-13, -1e-13, 3e-14):
+        assert digest(Settings(wrapped(1.5 * (1 + beyond)))) == ours
+
+
+DIGESTS = """
+from biogrip.products.catalogue import products
+from biogrip.running.sheet import sheets_of
+from tests.products.default import plan_of
+for sheet in sheets_of(products().values(), plan_of()):
+    print(sheet.name, *map(sheet.digest, sheet.jobs))
+"""
+
+
+def test_a_digest_is_the_same_in_every_process() -> None:
+    """Whatever order Python keeps sets of text in."""
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", DIGESTS],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "2", "3")
+    }
+    assert len(found) == 1
+    assert "target" in found.pop()
+
+
+@pytest.mark.parametrize("value", [b"bytes", object(), iter([1])], ids=lambda v: str(type(v)))
+def test_a_digest_refuses_what_it_does_not_know(value: object) -> None:
+    for settings in (value, [value], {"key": value}, Settings(value)):
+        with pytest.raises(TypeError, match="settings cannot hold"):
+            digest(settings)
+
+
+def test_a_name_can_be_declared_once_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    from biogrip.products.figures import fit
+    from biogrip.products.tables import errors
+
+    def draw() -> None:
+        """Draw nothing."""
+
+    draw.__module__ = fit.__name__
+    second = replace(errors.ERRORS, make=draw)
+    monkeypatch.setattr(fit, "SECOND", second, raising=False)
+    with pytest.raises(BiogripError, match=r"declares errors a second time"):
+        products.__wrapped__()
+    assert isinstance(second, Product)

@@ -1,0 +1,141 @@
+"""A figure more is a module more: nothing else has to know of it."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.workflow.conftest import Tree, copied_tree
+from tests.workflow.test_wholeness import TINY
+
+HEIGHTS = '''
+"""How high the sample's response rises."""
+
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.style import COLUMN_IN, figure
+from biogrip.products.files.traces import TARGETS, read_target
+from biogrip.products.product import Weight, of_cases, the
+
+
+def draw(settings: None, targets: list[Path]) -> Figure:
+    """Draw the largest rotation of every case."""
+    drawn = figure(COLUMN_IN, 2)
+    highest = [read_target(target)[2].max() for target in targets]
+    drawn.subplots().bar([target.stem for target in targets], highest)
+    return drawn
+
+
+def draw_case(title: str, target: Path) -> Figure:
+    """Draw the response of a case."""
+    time_s, _, rotation = read_target(target)
+    drawn = figure(COLUMN_IN, 2)
+    axes = drawn.subplots()
+    axes.plot(time_s, rotation)
+    axes.set_title(title)
+    return drawn
+
+
+HEIGHTS = drawing(
+    draw,
+    name="heights",
+    caption="How high every case rises, side by side.",
+    settings=lambda study: None,
+    reads={"targets": of_cases(TARGETS, lambda study: study.simulated)},
+    weight=Weight(7, 1234),
+)
+HEIGHT = drawing(
+    draw_case,
+    name="height",
+    caption="How high one case rises, on its own.",
+    settings=lambda study, case: case.title,
+    reads={"target": the(TARGETS)},
+    cases=lambda study: study.simulated,
+    weight=Weight(8, 2345),
+)
+'''
+WANTED = ["results/figures/heights.png", "results/figures/height_liquid_drop_2.png"]
+FILES = [*WANTED, *(file.replace(".png", ".pdf") for file in WANTED)]
+# What the executor for Slurm gets.
+RESOURCES = """
+import json
+from pathlib import Path
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.resolved import read_study
+from biogrip.running.sheet import sheets_of
+plan = Plan(read_study(Path("results")), Path("results"))
+found = {
+    product.name: [sheet.runtime({}, attempt=2), sheet.megabytes({}, attempt=2), sheet.weight.local]
+    for sheet in sheets_of(products().values(), plan)
+    for product in sheet.products
+}
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> Tree:
+    copied = copied_tree(tmp_path_factory.mktemp("tree"))
+    figures = copied.root / "src" / "biogrip" / "products" / "figures"
+    (figures / "heights.py").write_text(HEIGHTS)
+    copied.study.mkdir()
+    run = copied.run(*WANTED, config=TINY)
+    assert run.status == 0, run.output
+    return copied
+
+
+def test_a_new_figure_is_drawn(tree: Tree) -> None:
+    for file in FILES:
+        content = (tree.study / file).read_bytes()
+        assert content.startswith(b"\x89PNG" if file.endswith(".png") else b"%PDF")
+        assert len(content) > 2000
+
+
+def test_a_new_figure_is_planned_without_being_asked_for(tree: Tree) -> None:
+    run = tree.run("-n", "--forceall", config=TINY)
+    assert run.status == 0, run.output
+    for file in FILES:
+        assert file in run.output
+    # Each job that draws says what it takes.
+    drawing = [text for text in run.output.split("\n\n") if "figures/height" in text]
+    drawing = [text for text in drawing if "    output: " in text]
+    assert len(drawing) == 2
+    for runtime, memory in ((7, 1234), (8, 2345)):
+        (block,) = (text for text in drawing if f"runtime={runtime}" in text)
+        assert f"mem_mb={memory}" in block
+
+
+def test_a_new_figure_gets_resources_on_slurm(tree: Tree) -> None:
+    command = [sys.executable, "-c", RESOURCES]
+    done = subprocess.run(
+        command, cwd=tree.study, env=tree.environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["heights"] == [2 * 7, 2 * 1234, False]
+    assert found["height"] == [2 * 8, 2 * 2345, False]
+
+
+def test_a_new_figure_is_captioned_in_the_report(tree: Tree, tmp_path: Path) -> None:
+    report = tmp_path / "report.html"
+    run = tree.run("--report", str(report), *WANTED, config=TINY)
+    assert run.status == 0, run.output
+    page = report.read_text()
+    for text in ("How high every case rises, side by side.", "How high one case rises, on its own"):
+        assert text in page
+
+
+def test_an_edit_of_a_new_figure_draws_it_again_alone(tree: Tree) -> None:
+    file = tree.root / "src" / "biogrip" / "products" / "figures" / "heights.py"
+    file.write_text(HEIGHTS.replace("COLUMN_IN, 2)", "COLUMN_IN, 3)"))
+    jobs = tree.run("-n", *WANTED, config=TINY).all_jobs()
+    file.write_text(HEIGHTS)
+    assert jobs
+    assert set(jobs.values()) == {1}
+    assert "target" not in jobs
