@@ -16,7 +16,7 @@ from biogrip.arrays import Array
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identifiability.quantities import Quantity
 
-CANDIDATES, BEST, ANY = 400, 8, 16
+CANDIDATES = 400
 ROUGH, TIGHT = 1e-6, 1e-11
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
@@ -109,15 +109,18 @@ class Held:
         least = residuals.samples * (self._likelihood.misfit_rad / self._likelihood.noise_rad) ** 2
         return 2 * float(found.cost) - least, self.log_parameters(found.x)
 
-    def rise(self, rng: np.random.Generator, starts: Iterable[Array] = ()) -> float:
-        """Lowest rise of chi^2 from many starts."""
+    def rise(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
+        """Lowest rise of chi^2 from so many random starts, and some more."""
         points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
         many = np.array([self.log_parameters(point) for point in points])
         misfit = self._likelihood.problem.misfit(np.exp(many))
         late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
         rises = np.array([self._likelihood.rise(float(u)) for u in misfit]) + HINGE**2 * late
         order = np.argsort(rises)
-        first = np.concatenate((many[order[:BEST]], many[order[BEST :: len(order) // ANY]]))
+        good = count // 3
+        first = np.concatenate(
+            (many[order[:good]], many[rng.permutation(order[good:])[good:count]])
+        )
         found = sorted((self.fitted(x, ROUGH) for x in (*first, *starts)), key=lambda fit: fit[0])
         return min(self.fitted(x)[0] for _, x in found[:3])
 
@@ -129,7 +132,11 @@ def ratio(log_member: float, log_sum: float) -> float:
 
 
 def rise_at(
-    likelihood: Likelihood, quantity: Quantity, limit: float, rng: np.random.Generator
+    likelihood: Likelihood,
+    quantity: Quantity,
+    limit: float,
+    rng: np.random.Generator,
+    count: int,
 ) -> float:
     """Rise at a limit: lowest over random starts, from the best fit, and from the other basin.
 
@@ -138,11 +145,16 @@ def rise_at(
     held = Held(likelihood, quantity, limit)
     other = likelihood.best.copy()
     other[[-2, -1]] = other[[-1, -2]]
-    return held.rise(rng, (likelihood.best, other))
+    return held.rise(rng, count, (likelihood.best, other))
 
 
-def rise_along(likelihood: Likelihood, quantity: Quantity, limit: float, steps: int = 24) -> float:
-    """Rise at a limit, followed in small steps from the optimum, or back from beyond the limit."""
+def rises_along(
+    likelihood: Likelihood, quantity: Quantity, limit: float, steps: int
+) -> tuple[float, float]:
+    """Rise at a limit, followed in small steps from the optimum, and back from beyond the limit.
+
+    They differ where the optimum's basin ends, or is no longer the lowest, close to the limit.
+    """
     x, rises = likelihood.best, []
     start = quantity.log(x)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
@@ -153,4 +165,4 @@ def rise_along(likelihood: Likelihood, quantity: Quantity, limit: float, steps: 
         rise, x = Held(likelihood, quantity, float(target)).fitted(x)
         if target == limit:
             rises.append(rise)
-    return min(rises)
+    return rises[0], rises[-1]
