@@ -38,6 +38,7 @@ class Held:
     def __init__(self, likelihood: Likelihood, quantity: Quantity, target: float) -> None:
         self._likelihood, self._quantity, self._target = likelihood, quantity, target
         problem = likelihood.problem
+        self._last: tuple[Array, Array, Array] | None = None
         self._first = quantity.members[0]
         low, high = problem.low, problem.high
         if len(quantity.members) == 1:
@@ -74,31 +75,35 @@ class Held:
         return np.clip(free, self.low + inside, self.high - inside)
 
     def _rows(self, point: Array) -> Array:
-        x = self.log_parameters(point)
-        rows = self._likelihood.problem.residuals(x)[0] / self._likelihood.noise_rad
-        return np.append(rows, [HINGE * max(late, 0.0) for late in self._late(x)])
+        return self._both(point)[0]
+
+    def _slopes(self, point: Array) -> Array:
+        return self._both(point)[1]
+
+    def _both(self, point: Array) -> tuple[Array, Array]:
+        """Rows and their slopes; the last are kept, for both are asked for in turn."""
+        if self._last is None or not np.array_equal(self._last[0], point):
+            x = self.log_parameters(point)
+            residual, sensitivity = self._likelihood.problem.residuals(x)
+            late = self._late(x)
+            hinge = np.zeros((len(late), len(x)))
+            for row, (k, c), beyond in zip(hinge, self._quantity.branches, late, strict=True):
+                if beyond > 0:
+                    row[c], row[k] = HINGE, -HINGE
+            noise = self._likelihood.noise_rad
+            rows = np.append(residual / noise, [HINGE * max(beyond, 0.0) for beyond in late])
+            slopes = np.vstack((sensitivity.T / noise, hinge))
+            turned = slopes[:, self._rest]
+            if len(self._quantity.members) == 2:
+                first, second = slopes[:, self._quantity.members].T
+                along = first * expit(-point[-1]) - second * expit(point[-1])
+                turned = np.column_stack((turned, along))
+            self._last = point.copy(), rows, turned
+        return self._last[1], self._last[2]
 
     def _late(self, x: Array) -> list[float]:
         longest = np.log(self._likelihood.problem.residuals.duration_s)
         return [float(x[c] - x[k] - longest) for k, c in self._quantity.branches]
-
-    def _slopes(self, point: Array) -> Array:
-        x = self.log_parameters(point)
-        problem = self._likelihood.problem
-        slopes = problem.residuals(x)[1].T / self._likelihood.noise_rad
-        for (k, c), late in zip(self._quantity.branches, self._late(x), strict=True):
-            row = np.zeros(len(x))
-            if late > 0:
-                row[c], row[k] = HINGE, -HINGE
-            slopes = np.vstack((slopes, row))
-        turned = slopes[:, self._rest]
-        if len(self._quantity.members) == 2:
-            second = self._quantity.members[1]
-            along = slopes[:, self._first] * expit(-point[-1]) - slopes[:, second] * expit(
-                point[-1]
-            )
-            turned = np.column_stack((turned, along))
-        return turned
 
     def fitted(self, x: Array, tolerance: float = TIGHT) -> tuple[float, Array]:
         """Rise of chi^2 of a fit from log-parameters, and where it ends."""
@@ -140,12 +145,17 @@ def rise_at(
 ) -> float:
     """Rise at a limit: lowest over random starts, from the best fit, and from the other basin.
 
-    In the other basin exchangeable members have changed places.
+    In the other basin the parallel damper is the large one, beside a branch of any stiffness.
     """
+    k, k_p, c, c_p = likelihood.best
+    total = np.logaddexp(c, c_p)
+    others = [
+        np.array((k - softer, k_p, total - small, total))
+        for softer in (0.0, 3.0, 6.0)
+        for small in (1.0, 2.5, 5.0)
+    ]
     held = Held(likelihood, quantity, limit)
-    other = likelihood.best.copy()
-    other[[-2, -1]] = other[[-1, -2]]
-    return held.rise(rng, count, (likelihood.best, other))
+    return held.rise(rng, count, (likelihood.best, *others))
 
 
 def rises_along(

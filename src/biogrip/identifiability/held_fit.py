@@ -169,7 +169,7 @@ def _step(
             break
         free[np.argmax(np.where(blocked, np.abs(push), 0.0))] = True
     along = _tangents(slope)
-    bends, axes = np.linalg.eigh(along.T @ curvature[np.ix_(free, free)] @ along)
+    bends, axes = np.linalg.eigh(along.T @ curvature[free][:, free] @ along)
     axes = along @ axes
     # Where it curves down, as far downhill as a mirrored curve would lead.
     bends, uphill = np.maximum(np.abs(bends), 1e-12), axes.T @ gradient[free]
@@ -181,9 +181,16 @@ def _step(
 
 def _tangents(slope: Array) -> Array:
     """Orthonormal directions, as columns, in which a quantity of a given slope is constant."""
-    if not np.any(slope):
+    length = float(np.sqrt(slope @ slope))
+    if length == 0:
         return np.eye(len(slope))
-    return np.linalg.qr(slope[:, None], mode="complete")[0][:, 1:]
+    # Householder's reflection of the slope onto the axis that it is closest to.
+    mirror = slope / length
+    axis = int(np.argmax(np.abs(mirror)))
+    most = mirror[axis]
+    mirror[axis] += np.copysign(1.0, most)
+    turned = np.eye(len(slope)) - np.outer(mirror, mirror / (1 + abs(most)))
+    return np.concatenate((turned[:, :axis], turned[:, axis + 1 :]), axis=1)
 
 
 def _told(bend: Array, here: _Here, there: _Here, price: float) -> Array:
