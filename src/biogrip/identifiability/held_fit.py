@@ -33,7 +33,7 @@ class HeldFit:
     log_parameters : (n_parameters,)
         Where it is.
     chi2
-        Sum of squares there, in units of the noise.
+        Sum of squares there, in units of the noise; infinite where the model has no answer.
     bend : (n_parameters, n_parameters)
         What second derivatives of residuals and quantity add to the curvature
         there, as far as the steps have told. A fit nearby is the faster for it.
@@ -96,6 +96,8 @@ def held_fit(
 
     here, longest, nothing = at(start), _LONGEST_STEP, np.zeros_like(bend)
     told, doubted = bend, False
+    if not np.isfinite(here.cost):
+        return HeldFit(here.x, np.inf, bend)
     for _ in range(_MOST_STEPS):
         step, price, expected = _step(here, told, longest, low, high)
         if not expected > tolerance * here.cost or longest < _SHORTEST_STEP:
