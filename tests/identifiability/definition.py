@@ -16,7 +16,7 @@ from biogrip.arrays import Array
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identifiability.quantities import Quantity
 
-CANDIDATES, BEST, ANY = 400, 8, 16
+CANDIDATES = 400
 ROUGH, TIGHT = 1e-6, 1e-11
 # What the project says of branches that do not relax within the experiment.
 HINGE = 10.0
@@ -38,6 +38,7 @@ class Held:
     def __init__(self, likelihood: Likelihood, quantity: Quantity, target: float) -> None:
         self._likelihood, self._quantity, self._target = likelihood, quantity, target
         problem = likelihood.problem
+        self._last: tuple[Array, Array, Array] | None = None
         self._first = quantity.members[0]
         low, high = problem.low, problem.high
         if len(quantity.members) == 1:
@@ -74,31 +75,35 @@ class Held:
         return np.clip(free, self.low + inside, self.high - inside)
 
     def _rows(self, point: Array) -> Array:
-        x = self.log_parameters(point)
-        rows = self._likelihood.problem.residuals(x)[0] / self._likelihood.noise_rad
-        return np.append(rows, [HINGE * max(late, 0.0) for late in self._late(x)])
+        return self._both(point)[0]
+
+    def _slopes(self, point: Array) -> Array:
+        return self._both(point)[1]
+
+    def _both(self, point: Array) -> tuple[Array, Array]:
+        """Rows and their slopes; the last are kept, for both are asked for in turn."""
+        if self._last is None or not np.array_equal(self._last[0], point):
+            x = self.log_parameters(point)
+            residual, sensitivity = self._likelihood.problem.residuals(x)
+            late = self._late(x)
+            hinge = np.zeros((len(late), len(x)))
+            for row, (k, c), beyond in zip(hinge, self._quantity.branches, late, strict=True):
+                if beyond > 0:
+                    row[c], row[k] = HINGE, -HINGE
+            noise = self._likelihood.noise_rad
+            rows = np.append(residual / noise, [HINGE * max(beyond, 0.0) for beyond in late])
+            slopes = np.vstack((sensitivity.T / noise, hinge))
+            turned = slopes[:, self._rest]
+            if len(self._quantity.members) == 2:
+                first, second = slopes[:, self._quantity.members].T
+                along = first * expit(-point[-1]) - second * expit(point[-1])
+                turned = np.column_stack((turned, along))
+            self._last = point.copy(), rows, turned
+        return self._last[1], self._last[2]
 
     def _late(self, x: Array) -> list[float]:
         longest = np.log(self._likelihood.problem.residuals.duration_s)
         return [float(x[c] - x[k] - longest) for k, c in self._quantity.branches]
-
-    def _slopes(self, point: Array) -> Array:
-        x = self.log_parameters(point)
-        problem = self._likelihood.problem
-        slopes = problem.residuals(x)[1].T / self._likelihood.noise_rad
-        for (k, c), late in zip(self._quantity.branches, self._late(x), strict=True):
-            row = np.zeros(len(x))
-            if late > 0:
-                row[c], row[k] = HINGE, -HINGE
-            slopes = np.vstack((slopes, row))
-        turned = slopes[:, self._rest]
-        if len(self._quantity.members) == 2:
-            second = self._quantity.members[1]
-            along = slopes[:, self._first] * expit(-point[-1]) - slopes[:, second] * expit(
-                point[-1]
-            )
-            turned = np.column_stack((turned, along))
-        return turned
 
     def fitted(self, x: Array, tolerance: float = TIGHT) -> tuple[float, Array]:
         """Rise of chi^2 of a fit from log-parameters, and where it ends."""
@@ -109,15 +114,18 @@ class Held:
         least = residuals.samples * (self._likelihood.misfit_rad / self._likelihood.noise_rad) ** 2
         return 2 * float(found.cost) - least, self.log_parameters(found.x)
 
-    def rise(self, rng: np.random.Generator, starts: Iterable[Array] = ()) -> float:
-        """Lowest rise of chi^2 from many starts."""
+    def rise(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
+        """Lowest rise of chi^2 from so many random starts, and some more."""
         points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
         many = np.array([self.log_parameters(point) for point in points])
         misfit = self._likelihood.problem.misfit(np.exp(many))
         late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
         rises = np.array([self._likelihood.rise(float(u)) for u in misfit]) + HINGE**2 * late
         order = np.argsort(rises)
-        first = np.concatenate((many[order[:BEST]], many[order[BEST :: len(order) // ANY]]))
+        good = count // 3
+        first = np.concatenate(
+            (many[order[:good]], many[rng.permutation(order[good:])[good:count]])
+        )
         found = sorted((self.fitted(x, ROUGH) for x in (*first, *starts)), key=lambda fit: fit[0])
         return min(self.fitted(x)[0] for _, x in found[:3])
 
@@ -129,20 +137,34 @@ def ratio(log_member: float, log_sum: float) -> float:
 
 
 def rise_at(
-    likelihood: Likelihood, quantity: Quantity, limit: float, rng: np.random.Generator
+    likelihood: Likelihood,
+    quantity: Quantity,
+    limit: float,
+    rng: np.random.Generator,
+    count: int,
 ) -> float:
     """Rise at a limit: lowest over random starts, from the best fit, and from the other basin.
 
-    In the other basin exchangeable members have changed places.
+    In the other basin the parallel damper is the large one, beside a branch of any stiffness.
     """
+    k, k_p, c, c_p = likelihood.best
+    total = np.logaddexp(c, c_p)
+    others = [
+        np.array((k - softer, k_p, total - small, total))
+        for softer in (0.0, 3.0, 6.0)
+        for small in (1.0, 2.5, 5.0)
+    ]
     held = Held(likelihood, quantity, limit)
-    other = likelihood.best.copy()
-    other[[-2, -1]] = other[[-1, -2]]
-    return held.rise(rng, (likelihood.best, other))
+    return held.rise(rng, count, (likelihood.best, *others))
 
 
-def rise_along(likelihood: Likelihood, quantity: Quantity, limit: float, steps: int = 24) -> float:
-    """Rise at a limit, followed in small steps from the optimum, or back from beyond the limit."""
+def rises_along(
+    likelihood: Likelihood, quantity: Quantity, limit: float, steps: int
+) -> tuple[float, float]:
+    """Rise at a limit, followed in small steps from the optimum, and back from beyond the limit.
+
+    They differ where the optimum's basin ends, or is no longer the lowest, close to the limit.
+    """
     x, rises = likelihood.best, []
     start = quantity.log(x)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
@@ -153,4 +175,4 @@ def rise_along(likelihood: Likelihood, quantity: Quantity, limit: float, steps: 
         rise, x = Held(likelihood, quantity, float(target)).fitted(x)
         if target == limit:
             rises.append(rise)
-    return min(rises)
+    return rises[0], rises[-1]

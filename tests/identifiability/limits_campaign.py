@@ -6,23 +6,27 @@
 
 import functools
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
-from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identifiability.many_limits import limits_of as limits_near
+from biogrip.identifiability.many_profiles import profiles_of
+from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.random_streams import stream
 from biogrip.study import build
-from tests.identifiability.definition import rise_along, rise_at
+from tests.identifiability.definition import rise_at, rises_along
 from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run, study_torque
 
 ALLOWED = 0.01
+# Random starts at a limit; steps on the way to one.
+THOROUGH = (24, 24)
 ALIKE = 1e-3
 EXAMPLE = Path(__file__).parents[2] / "data" / "example_trace.csv"
 NAMES = ("example_trace", *(f"trace_{year}" for year in range(2006, 2021)), "a", "b", "zz", "cell")
@@ -51,19 +55,24 @@ def example(name: str) -> Likelihood:
     return likelihood_of(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
 
 
-def misses(likelihood: Likelihood) -> Iterator[tuple[str, str, float, float]]:
+def misses(
+    likelihood: Likelihood, quantities: Sequence[Quantity], effort: tuple[int, int] = THOROUGH
+) -> Iterator[tuple[str, str, float, float]]:
     """Quantity, whose limit, its logarithm, and by what share of the threshold the rise misses."""
     rng = np.random.default_rng(0)
-    for quantity in parameters_and_sum(MODEL):
-        found = profile(likelihood, quantity)
+    starts, steps = effort
+    profiles = profiles_of(likelihood, quantities)
+    near = limits_near([likelihood], quantities)[0]
+    for quantity, found, limits in zip(quantities, profiles, near, strict=True):
         for limit in (found.low, found.high):
             if limit is not None:
-                rise = rise_at(likelihood, quantity, limit, rng)
+                rise = rise_at(likelihood, quantity, limit, rng, starts)
                 yield quantity.label, "profile", limit, rise / likelihood.threshold - 1
-        for limit in limits_near(likelihood, quantity):
-            if limit is not None:
-                rise = rise_along(likelihood, quantity, limit)
-                yield quantity.label, "near", limit, rise / likelihood.threshold - 1
+        for limit in limits:
+            if np.isfinite(limit):
+                rises = np.array(rises_along(likelihood, quantity, limit, steps))
+                miss = min(rises / likelihood.threshold - 1, key=abs)
+                yield quantity.label, "near", limit, float(miss)
 
 
 def differences(limits: Array) -> Array:
@@ -84,9 +93,9 @@ def differences(limits: Array) -> Array:
     return spread / np.where(np.isnan(width), 1.0, width)
 
 
-def limits_of(likelihood: Likelihood) -> list[tuple[float, float]]:
-    """Limits of every quantity's profile, NaN where there is none."""
-    found = [profile(likelihood, quantity) for quantity in parameters_and_sum(MODEL)]
+def limits_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[tuple[float, float]]:
+    """Limits of quantities' profiles, NaN where there is none."""
+    found = profiles_of(likelihood, quantities)
     return [
         (np.nan if p.low is None else p.low, np.nan if p.high is None else p.high) for p in found
     ]
@@ -94,14 +103,15 @@ def limits_of(likelihood: Likelihood) -> list[tuple[float, float]]:
 
 def main(traces: int, cases: list[str]) -> None:
     """Print what misses its definition, and how far the worst of the others are from it."""
+    quantities = parameters_and_sum(MODEL)
     for case in cases:
         if case == "example":
-            apart = differences(np.array([limits_of(example(name)) for name in NAMES]))
+            apart = differences(np.array([limits_of(example(n), quantities) for n in NAMES]))
             print(f"example: {len(NAMES)} names, limits differ by {apart.max():.1e} of the width")
             continue
         limits, failed, worst = 0, 0, 0.0
         for seed in range(traces):
-            for label, whose, limit, miss in misses(likelihood_for(case, seed)):
+            for label, whose, limit, miss in misses(likelihood_for(case, seed), quantities):
                 limits += 1
                 if abs(miss) <= ALLOWED:
                     worst = max(worst, abs(miss))

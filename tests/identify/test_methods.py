@@ -108,7 +108,7 @@ def test_evaluations_are_counted(method: str, together: bool) -> None:
             counted[0] += len(x)
             return super().condensed_responses(x)
 
-    watched = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)  # type: ignore[arg-type]
+    watched = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)
     assert run(method, watched).evaluations == counted[0]
 
 

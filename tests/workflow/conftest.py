@@ -26,6 +26,21 @@ cases:
   liquid_drop_1: null
 """
 
+# Every kind of file, and of each as little as there can be.
+TINY = """
+seeds: 2
+batch_size: 1
+measurement: {rate_Hz: 0.5}
+methods: [least_squares, genetic]
+least_squares: {candidates: 50, starts: 3}
+genetic_algorithm: {population: 20, survivors: 10, min_generations: 2, max_generations: 4}
+identifiability: {coverage_seeds: 2}
+model_selection: {models: [damper, maxwell]}
+cases:
+  endothelial_cell: null
+  liquid_drop_1: null
+"""
+
 
 @dataclass(frozen=True)
 class Run:
@@ -108,13 +123,26 @@ def copied_tree(folder: Path) -> Tree:
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
     """A finished small study, one for all workers; copy it before changing anything."""
+    return built_once("finished", SMALL, tmp_path_factory, worker_id)
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """A finished study of two seeds, one for all workers; copy it before changing anything."""
+    return built_once("tiny", TINY, tmp_path_factory, worker_id)
+
+
+def built_once(
+    name: str, config: str, tmp_path_factory: pytest.TempPathFactory, worker_id: str
+) -> Path:
+    """Run a study unless another worker has."""
     own = tmp_path_factory.getbasetemp()
-    folder = (own if worker_id == "master" else own.parent) / "finished"
+    folder = (own if worker_id == "master" else own.parent) / name
     with folder.with_suffix(".lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not folder.exists():
             building = tmp_path_factory.mktemp("building")
-            run = snakemake(building)
+            run = snakemake(building, config=config)
             assert run.status == 0, run.output
             shutil.copytree(building, folder)
     return folder
@@ -127,4 +155,17 @@ def tables(folder: Path) -> dict[str, bytes]:
         str(path.relative_to(results)): path.read_bytes()
         for kind in ("tables", "targets", "identifications")
         for path in sorted((results / kind).glob("*.*"))
+    }
+
+
+def results_of(folder: Path) -> dict[str, bytes]:
+    """Every result by name, but for what tells times, and for logs and records."""
+    results = folder / "results"
+    found = (path.relative_to(results) for path in sorted(results.rglob("*.*")))
+    return {
+        str(name): (results / name).read_bytes()
+        for name in found
+        if (results / name).is_file()
+        and name.parts[0] not in ("logs", "timings", ".manifest", "manifest.jsonl")
+        and not name.name.startswith("timings.")
     }

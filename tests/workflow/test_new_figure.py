@@ -1,14 +1,14 @@
 """A figure more is a module more: nothing else has to know of it."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import Tree, copied_tree
-from tests.workflow.test_wholeness import TINY
+from tests.workflow.conftest import TINY, Tree, copied_tree
 
 HEIGHTS = '''
 """How high the sample's response rises."""
@@ -100,15 +100,10 @@ def test_a_new_figure_is_drawn(tree: Tree) -> None:
 def test_a_new_figure_is_planned_without_being_asked_for(tree: Tree) -> None:
     run = tree.run("-n", "--forceall", config=TINY)
     assert run.status == 0, run.output
+    (block,) = (text for text in run.output.split("\n\n") if "rule all:" in text)
     for file in FILES:
-        assert file in run.output
-    # Each job that draws says what it takes.
-    drawing = [text for text in run.output.split("\n\n") if "figures/height" in text]
-    drawing = [text for text in drawing if "    output: " in text]
-    assert len(drawing) == 2
-    for runtime, memory in ((7, 1234), (8, 2345)):
-        (block,) = (text for text in drawing if f"runtime={runtime}" in text)
-        assert f"mem_mb={memory}" in block
+        assert file in block
+    assert re.search(r"(Drawing|Making) .*heights", run.output)
 
 
 def test_a_new_figure_gets_resources_on_slurm(tree: Tree) -> None:

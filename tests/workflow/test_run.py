@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tests.workflow.test_wholeness import TINY
+from tests.workflow.conftest import TINY
 
 BAD = {
     "missing": (None, r"my.yaml: cannot be read: No such file"),

@@ -1,43 +1,12 @@
 """Whatever becomes of results between two runs: the next ends with the same ones, or says so."""
 
-import fcntl
 import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import snakemake
-
-# Every kind of file, and of each as little as there can be.
-TINY = """
-seeds: 2
-batch_size: 1
-measurement: {rate_Hz: 0.5}
-methods: [least_squares, genetic]
-least_squares: {candidates: 50, starts: 3}
-genetic_algorithm: {population: 20, survivors: 10, min_generations: 2, max_generations: 4}
-identifiability: {coverage_seeds: 2}
-model_selection: {models: [damper, maxwell]}
-cases:
-  endothelial_cell: null
-  liquid_drop_1: null
-"""
-
-
-@pytest.fixture(scope="session")
-def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """A finished study of two seeds, one for all workers; copy it before changing anything."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own if worker_id == "master" else own.parent) / "tiny"
-    with folder.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not folder.exists():
-            building = tmp_path_factory.mktemp("building")
-            run = snakemake(building, config=TINY)
-            assert run.status == 0, run.output
-            shutil.copytree(building, folder)
-    return folder
+from tests.workflow.conftest import TINY, results_of, snakemake
 
 
 @pytest.fixture
@@ -45,19 +14,6 @@ def study(tiny: Path, tmp_path: Path) -> Path:
     copied = tmp_path / "study"
     shutil.copytree(tiny, copied)
     return copied
-
-
-def results_of(folder: Path) -> dict[str, bytes]:
-    """Every result by name, but for what tells times, and for logs and records."""
-    results = folder / "results"
-    found = (path.relative_to(results) for path in sorted(results.rglob("*.*")))
-    return {
-        str(name): (results / name).read_bytes()
-        for name in found
-        if (results / name).is_file()
-        and name.parts[0] not in ("logs", "timings", ".manifest", "manifest.jsonl")
-        and not name.name.startswith("timings.")
-    }
 
 
 def one_of_each_kind(folder: Path) -> list[Path]:

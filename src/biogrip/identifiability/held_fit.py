@@ -33,7 +33,7 @@ class HeldFit:
     log_parameters : (n_parameters,)
         Where it is.
     chi2
-        Sum of squares there, in units of the noise.
+        Sum of squares there, in units of the noise; infinite where the model has no answer.
     bend : (n_parameters, n_parameters)
         What second derivatives of residuals and quantity add to the curvature
         there, as far as the steps have told. A fit nearby is the faster for it.
@@ -96,6 +96,8 @@ def held_fit(
 
     here, longest, nothing = at(start), _LONGEST_STEP, np.zeros_like(bend)
     told, doubted = bend, False
+    if not np.isfinite(here.cost):
+        return HeldFit(here.x, np.inf, bend)
     for _ in range(_MOST_STEPS):
         step, price, expected = _step(here, told, longest, low, high)
         if not expected > tolerance * here.cost or longest < _SHORTEST_STEP:
@@ -169,7 +171,7 @@ def _step(
             break
         free[np.argmax(np.where(blocked, np.abs(push), 0.0))] = True
     along = _tangents(slope)
-    bends, axes = np.linalg.eigh(along.T @ curvature[np.ix_(free, free)] @ along)
+    bends, axes = np.linalg.eigh(along.T @ curvature[free][:, free] @ along)
     axes = along @ axes
     # Where it curves down, as far downhill as a mirrored curve would lead.
     bends, uphill = np.maximum(np.abs(bends), 1e-12), axes.T @ gradient[free]
@@ -181,9 +183,16 @@ def _step(
 
 def _tangents(slope: Array) -> Array:
     """Orthonormal directions, as columns, in which a quantity of a given slope is constant."""
-    if not np.any(slope):
+    length = float(np.sqrt(slope @ slope))
+    if length == 0:
         return np.eye(len(slope))
-    return np.linalg.qr(slope[:, None], mode="complete")[0][:, 1:]
+    # Householder's reflection of the slope onto the axis that it is closest to.
+    mirror = slope / length
+    axis = int(np.argmax(np.abs(mirror)))
+    most = mirror[axis]
+    mirror[axis] += np.copysign(1.0, most)
+    turned = np.eye(len(slope)) - np.outer(mirror, mirror / (1 + abs(most)))
+    return np.concatenate((turned[:, :axis], turned[:, axis + 1 :]), axis=1)
 
 
 def _told(bend: Array, here: _Here, there: _Here, price: float) -> Array:

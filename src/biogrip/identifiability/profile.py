@@ -24,6 +24,8 @@ _CERTAIN = 0.999
 _HINGE = 10.0
 _MOST_DOUBLINGS = 12
 _MOST_HALVINGS = 60
+# A guess in a bracket keeps away from its ends, so that a jump is soon enclosed.
+_LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,8 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     """Follow a quantity over its whole range, and find its confidence limits.
 
     Each point is fitted from its neighbour's fit, outwards from the optimum and
-    back again, so that a basin which is lower further out is followed inwards.
+    back again, so that a basin which is lower further out is followed inwards. The
+    limits are the outermost: what is between them need not all be within confidence.
     """
     fits = _Held(likelihood, quantity, _EXACT)
     start, grid = quantity.log(likelihood.best), grid_of(likelihood, quantity)
@@ -185,7 +188,10 @@ def grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
 
 
 def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | None, float | None]:
-    """Confidence limits of the optimum's own basin, much faster than a whole profile."""
+    """Confidence limits of the optimum's own basin, much faster than a whole profile.
+
+    Where that basin leads over into a lower one, they are the limits of both.
+    """
     fits = _Held(likelihood, quantity, _FAST)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start, step = quantity.log(likelihood.best), likelihood.deviation(quantity)
@@ -281,7 +287,8 @@ class _Held:
             # The square root of the rise is nearly linear.
             roots = np.sqrt(np.maximum([inside.rise, outside.rise], 0.0)) - np.sqrt(threshold)
             short, beyond = np.abs(roots) * weights
-            share = min(max(float(short / (short + beyond)), 1e-3), 1 - 1e-3)
+            share = float(short / (short + beyond)) if np.isfinite(beyond) else 0.5
+            share = min(max(share, _LEAST_SHARE), 1 - _LEAST_SHARE)
             target = inside.target + share * (outside.target - inside.target)
             near, far = self.at(target, inside), self.at(target, outside)
             if far.rise - near.rise > allowed:
@@ -300,7 +307,10 @@ class _Held:
         return inside.target, outside
 
     def _unrelaxed(self, x: Array) -> tuple[Array, Array]:
-        """Rows, and slopes, that are zero as long as branches relax within the experiment."""
+        """Rows, and slopes, that are zero as long as branches relax within the experiment.
+
+        Their squares are a price in chi^2, and part of the rise.
+        """
         values, slopes = [], []
         for spring, damper in self._quantity.branches:
             beyond = x[damper] - x[spring] - self._longest

@@ -196,7 +196,11 @@ def _newton(curvature: Array, downhill: Array) -> Array:
 
 
 def _curvature(objective: Objective, x: Array) -> Array:
-    """Second derivatives of half the sum of squares, from differences of its gradient."""
-    here = objective.gradient(x)
-    rows = [(objective.gradient(x + step) - here) / _STEP for step in _STEP * np.eye(len(x))]
-    return 0.5 * (np.array(rows) + np.array(rows).T)
+    """Second derivatives of half the sum of squares.
+
+    What Gauss and Newton leave out are residuals times their second derivatives.
+    Only these are differenced, so that where the residuals vanish, rounding does too.
+    """
+    rows, jacobian = objective.both(x)
+    bend = [(objective.jacobian(x + step) - jacobian).T @ rows for step in _STEP * np.eye(len(x))]
+    return jacobian.T @ jacobian + 0.5 * (np.array(bend) + np.array(bend).T) / _STEP
