@@ -1,4 +1,4 @@
-"""A job's command typed by hand: it finds its settings among the results, and says what is wrong."""
+"""A job's command typed by hand: its settings are among the results, and it says what is wrong."""
 
 import json
 import os
