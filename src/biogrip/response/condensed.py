@@ -5,7 +5,8 @@ under the protocol, g(t; r), and all of these, over all rates r, nearly span a
 space of some fifty dimensions only. In it a function is known from its values
 at as many well-chosen times. So a response is simulated at those, and a square
 matrix turns what it is there into rows whose sum of squares, gradients and all,
-is that of the residuals at every sample.
+is that of the residuals at every sample. Where samples are dense, that space is
+found on nodes that stand for them (`biogrip.response.dense_samples`).
 """
 
 from functools import cached_property
@@ -14,12 +15,13 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.protocol import TorqueHistory
+from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
 
-MOST_SAMPLES = 100_000
-"""Of more samples, finding those that stand for all would take gigabytes."""
+MOST_NODES = 50_000
+"""With more, finding the times that stand for all would take gigabytes."""
 
 # Neighbouring rates, in log(1 - T r), T the last time: far closer than modes can be told apart.
 _SPACING = 0.25
@@ -47,6 +49,11 @@ class Condensed:
         self._torque = torque
         self._all_s = time_s
 
+    @property
+    def possible(self) -> bool:
+        """Whether few enough nodes stand for the samples."""
+        return len(self._dense.time_s) <= MOST_NODES
+
     def of_trace(self, rotation_rad: Array) -> Array:
         """Rows of a trace less nuisance.
 
@@ -59,19 +66,21 @@ class Condensed:
         (n_rows,)
             The last is what no response can reach.
         """
-        rows = rotation_rad @ self._basis
-        return np.append(rows, np.linalg.norm(rotation_rad - self._basis @ rows))
+        seen, rest = self._dense.rows_of_samples(rotation_rad)
+        rows = seen @ self._basis
+        return np.append(rows, np.hypot(np.linalg.norm(seen - self._basis @ rows), rest))
 
     @cached_property
     def time_s(self) -> Array:
         """Times that stand for all, (n_times,)."""
-        return self._all_s[self._chosen]
+        return self._dense.time_s[self._chosen]
 
     @cached_property
     def to_rows(self) -> Array:
         """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
+        values = self._dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
-            self._span[self._chosen].T, (without(self.nuisance, self._span.T) @ self._basis)
+            values[:, self._chosen], without(self._seen_nuisance, self._span.T) @ self._basis
         )
         return np.pad(matrix, ((0, 0), (0, 1)))
 
@@ -84,33 +93,45 @@ class Condensed:
         return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
+    def _dense(self) -> DenseSamples:
+        return DenseSamples(self._torque, self._all_s)
+
+    @cached_property
+    def _seen_nuisance(self) -> Array:
+        """The nuisance as rows of the nodes, (n_functions, n_nodes)."""
+        rows = [self._dense.rows_of_samples(function)[0] for function in self.nuisance]
+        return np.reshape(rows, (len(rows), len(self._dense.time_s)))
+
+    @cached_property
     def _span(self) -> Array:
-        """Orthonormal functions that span all responses, (n_samples, n_rows)."""
-        end_s = self._all_s[-1]
+        """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
+        end_s, time_s = self._all_s[-1], self._dense.time_s
         shortest_s = np.diff(self._all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
-        growth, slope = responses_of_modes(rates, self._torque, self._all_s)
+        growth, slope = map(
+            self._dense.rows_of_values, responses_of_modes(rates, self._torque, time_s)
+        )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        basis, triangle = np.linalg.qr(family.reshape(-1, len(self._all_s)).T)
+        basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
         turned, share, _ = np.linalg.svd(triangle)
         span: Array = basis @ turned[:, share > _RANK * share[0]]
         return span
 
     @cached_property
     def _chosen(self) -> IntArray:
-        """Samples at which the functions of the span differ most."""
+        """Nodes at which the functions of the span differ most."""
         # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
         from scipy.linalg import qr
 
-        span = self._span
-        _, order = qr(span.T, mode="r", pivoting=True)
-        chosen: IntArray = np.sort(order[: span.shape[1]])
+        span = self._dense.values_of_rows(self._span.T)
+        _, order = qr(span, mode="r", pivoting=True)
+        chosen: IntArray = np.sort(order[: span.shape[0]])
         return chosen
 
     @cached_property
     def _basis(self) -> Array:
-        """Orthonormal functions that span all responses less nuisance, (n_samples, n_rows - 1)."""
-        return np.linalg.qr(without(self.nuisance, self._span.T).T)[0]
+        """Orthonormal rows that span all responses less nuisance, (n_nodes, n_rows - 1)."""
+        return np.linalg.qr(without(self._seen_nuisance, self._span.T).T)[0]

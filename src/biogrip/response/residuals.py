@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
-from biogrip.response.condensed import MOST_SAMPLES, Condensed
+from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import modes_of, rotation_and_sensitivity
 from biogrip.sample import SampleModel
@@ -90,7 +90,7 @@ class Residuals:
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
 
-        On the nonlinear model, or with very many samples, these are the residuals themselves.
+        On the nonlinear model, or where samples are many and not dense, these are the residuals themselves.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Residuals:
     @property
     def condensable(self) -> bool:
         """Whether few rows may stand for all samples."""
-        return not self._nonlinear and self.samples <= MOST_SAMPLES
+        return not self._nonlinear and self._condensed.possible
 
     @cached_property
     def condensed_trace(self) -> Array:
