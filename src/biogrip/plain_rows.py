@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-from pyarrow import csv
+from pyarrow import compute, csv
 
 from biogrip.arrays import Array
 
@@ -86,7 +86,9 @@ def _parsed(
     rows = np.empty((len(table), len(chosen)))
     for place, name in enumerate(chosen):
         column = table[name]
-        rows[:, place] = column.to_numpy()
+        # Arrow's own conversion loads pandas first.
+        filled = compute.fill_null(column, float("nan")).combine_chunks()
+        rows[:, place] = np.frombuffer(filled.buffers()[1])[filled.offset :][: len(filled)]
         # Infinity, or not a number in some other spelling.
         if np.count_nonzero(np.isfinite(rows[:, place])) != len(table) - column.null_count:
             return None

@@ -13,6 +13,9 @@ from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import modes_of, rotation_and_sensitivity
 from biogrip.sample import SampleModel
 
+# Samples whose rows are formed at once.
+_AT_ONCE = 1000
+
 
 class Residuals:
     """Simulated minus measured rotation as a function of log-parameters.
@@ -135,6 +138,26 @@ class Residuals:
         """
         modes = modes_of(self._gripper, self._model, self._torque, np.exp(log_parameters))
         return self._condensed.of_modes(modes)
+
+    def condensed_misfit(self, parameters: Array) -> Array:
+        """RMS misfit of a population; a sample's does not depend on the others.
+
+        Parameters
+        ----------
+        parameters : (n, n_parameters)
+            Sample parameters in the model's order, SI units.
+
+        Returns
+        -------
+        (n,)
+            In rad.
+        """
+        misfit = np.empty(len(parameters))
+        for start in range(0, len(parameters), _AT_ONCE):
+            some = slice(start, start + _AT_ONCE)
+            rows = self.condensed_responses(np.log(parameters[some]))[:, 0] - self.condensed_trace
+            misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
+        return misfit
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Whether only the trace, and its noise, tell this from others."""
