@@ -76,7 +76,9 @@ def problem_of(
     condensed
         What `condensed_of` gives for the same times, if there is one already.
     """
-    condensed = condensed or condensed_of(torque, time_s, offset=offset, drift=drift)
+    condensed = condensed or condensed_of(
+        torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear
+    )
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     residuals = Residuals(
         gripper,
@@ -109,6 +111,9 @@ def problem_of(
     )
 
 
-def condensed_of(torque: TorqueHistory, time_s: Array, *, offset: bool, drift: bool) -> Condensed:
+def condensed_of(
+    torque: TorqueHistory, time_s: Array, *, offset: bool, drift: bool, nonlinear: bool = False
+) -> Condensed:
     """Condense the residuals of all traces that are sampled at the same times."""
-    return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))
+    nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
+    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear)

@@ -17,6 +17,7 @@ from biogrip.arrays import Array, IntArray
 from biogrip.protocol import TorqueHistory
 from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.mode_rows import ModeRows
+from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
 
@@ -27,6 +28,8 @@ MOST_NODES = 50_000
 _SPACING = 0.25
 # Rates go from next to nothing to where only what has not begun to decay is left.
 _SLOWEST, _FASTEST = 1e-6, 1e3
+# A correction on a mesh that follows a sinusoid of the torque may have thousands of values.
+_MOST_FUNCTIONS = 1000
 # Directions that matter less than this are rounding.
 _RANK = 1e-14
 
@@ -42,17 +45,23 @@ class Condensed:
         Ascending sampling times.
     nuisance : (n_functions, n_samples)
         What is taken out of trace and responses, see `nuisance_basis`.
+    nonlinear
+        Whether rows must also do for what the nonlinear model has over the linear one.
     """
 
-    def __init__(self, torque: TorqueHistory, time_s: Array, nuisance: Array) -> None:
+    def __init__(
+        self, torque: TorqueHistory, time_s: Array, nuisance: Array, *, nonlinear: bool = False
+    ) -> None:
         self.nuisance = nuisance
+        self._nonlinear = nonlinear
         self._torque = torque
         self._all_s = time_s
 
     @property
     def possible(self) -> bool:
         """Whether few enough nodes stand for the samples."""
-        return len(self._dense.time_s) <= MOST_NODES
+        functions = len(self._edges_s) * (STAGES + 1)
+        return len(self._dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Rows of a trace less nuisance.
@@ -94,7 +103,26 @@ class Condensed:
 
     @cached_property
     def _dense(self) -> DenseSamples:
-        return DenseSamples(self._torque, self._all_s)
+        return DenseSamples(self._torque, self._all_s, self._edges_s)
+
+    @cached_property
+    def _edges_s(self) -> Array:
+        """Edges of the mesh of a correction, if there is one."""
+        return mesh(self._torque, COARSE) if self._nonlinear else np.zeros(0)
+
+    @cached_property
+    def _corrections(self) -> Array:
+        """Rows of the nodes of what corrections are a sum of, (n_functions, n_nodes)."""
+        if not self._nonlinear:
+            return np.zeros((0, len(self._dense.time_s)))
+        functions = mesh_functions(self._edges_s, self._dense.time_s)
+        return self._dense.rows_of_values(functions)
+
+    @cached_property
+    def of_corrections(self) -> Array:
+        """Matrix that turns values of a `Correction`, from its left, into rows."""
+        rows = without(self._seen_nuisance, self._corrections) @ self._basis
+        return np.pad(rows, ((0, 0), (0, 1)))
 
     @cached_property
     def _seen_nuisance(self) -> Array:
@@ -115,7 +143,10 @@ class Condensed:
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        basis, triangle = np.linalg.qr(family.reshape(-1, len(time_s)).T)
+        weights = np.linalg.norm(self._corrections, axis=1)
+        seen = self._corrections[weights > 0] / weights[weights > 0, None]
+        family = np.concatenate((family.reshape(-1, len(time_s)), seen))
+        basis, triangle = np.linalg.qr(family.T)
         turned, share, _ = np.linalg.svd(triangle)
         span: Array = basis @ turned[:, share > _RANK * share[0]]
         return span
