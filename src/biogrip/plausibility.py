@@ -250,12 +250,12 @@ def _left_over(trace: Array, responses: Array) -> float:
     """Sum of squares that no sum of the responses with weights of at least 0 explains."""
     scale = np.linalg.norm(responses, axis=1)
     count = np.count_nonzero(scale)
-    triangle = np.zeros((0, count + 1))
+    triangle: Array = np.zeros((0, count + 1))
     # In pieces: of a million samples, all at once would be as much memory as all else.
     for start in range(0, len(trace), _AT_ONCE):
         some = slice(start, start + _AT_ONCE)
         columns = np.vstack((responses[scale > 0, some] / scale[scale > 0, None], trace[some]))
-        triangle = np.linalg.qr(np.vstack((triangle, columns.T)), mode="r")
+        triangle = np.asarray(np.linalg.qr(np.vstack((triangle, columns.T)), mode="r"))
     _, distance = nnls(triangle[:count, :count], triangle[:count, count])
     return float(distance**2 + np.sum(triangle[count:, count] ** 2))
 

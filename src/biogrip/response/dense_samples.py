@@ -41,7 +41,7 @@ class _Piece:
     first, stop
         Indices of samples.
     triangle : (n_nodes, n_nodes) or None
-        R^T of the samples' polynomials Q R, Q orthonormal; None where samples are nodes.
+        R^T of the samples' Legendre polynomials Q R, Q orthonormal; None where samples are nodes.
     """
 
     first: int
@@ -127,7 +127,8 @@ class DenseSamples:
         rest
             Norm of what no smooth function has a part in.
         """
-        parts, rest = [], 0.0
+        parts: list[Array] = []
+        rest = 0.0
         for piece in self._pieces:
             own = samples[piece.first : piece.stop]
             if piece.triangle is None:
@@ -136,7 +137,7 @@ class DenseSamples:
             seen = np.zeros(_NODES)
             for block, series in self._blocks(piece.first, piece.stop):
                 seen += samples[block] @ series
-            part = np.linalg.solve(piece.triangle, seen)
+            part: Array = np.linalg.solve(piece.triangle, seen)
             smooth = np.linalg.solve(piece.triangle.T, part)
             for block, series in self._blocks(piece.first, piece.stop):
                 rest += float(np.sum((samples[block] - series @ smooth) ** 2))
@@ -157,7 +158,8 @@ class DenseSamples:
             size = np.sqrt(np.diagonal(gram))
             shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
             if shares[-1] <= _LARGEST_CONDITION * shares[0]:
-                yield _Piece(first, stop, np.linalg.cholesky(gram))
+                triangle: Array = np.linalg.cholesky(gram)
+                yield _Piece(first, stop, triangle)
                 return
         half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
         yield from self._divided(first, half)
