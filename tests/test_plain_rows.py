@@ -1,4 +1,4 @@
-"""Reading plain tables in bulk: the numbers of the careful reader, and nothing that is not plain."""
+"""Plain tables in bulk: the numbers of the careful reader, and nothing that is not plain."""
 
 from pathlib import Path
 

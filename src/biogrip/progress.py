@@ -43,4 +43,6 @@ class Progress:
         if now - self._said >= _EVERY_S:
             self._said = now
             # Past the job's log, to whoever waits at the terminal.
-            print(f"{self._what}: {self._done} of {self._total} done{self._phase}{more}", flush=True)
+            print(
+                f"{self._what}: {self._done} of {self._total} done{self._phase}{more}", flush=True
+            )

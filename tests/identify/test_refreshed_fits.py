@@ -90,7 +90,6 @@ def test_fits_do_not_depend_on_the_batch(gripper: Gripper) -> None:
 
 def test_where_the_model_has_no_answer_no_fit_ends(gripper: Gripper) -> None:
     """A start that the torque closes beyond what the model describes stays, infinitely bad."""
-    (problem,) = posed(gripper, TORQUES["the paper's"], 1)
     torque = torque_history((held(200.0, 1e-6), held(200.0, 1e-7)))
     time_s = np.linspace(0.0, 400.0, 801)
     trace = 0.3 * np.ones(len(time_s))

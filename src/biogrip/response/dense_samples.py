@@ -137,7 +137,7 @@ class DenseSamples:
             seen = np.zeros(_NODES)
             for block, series in self._blocks(piece.first, piece.stop):
                 seen += samples[block] @ series
-            part: Array = np.linalg.solve(piece.triangle, seen)
+            part = np.asarray(np.linalg.solve(piece.triangle, seen), np.float64)
             smooth = np.linalg.solve(piece.triangle.T, part)
             for block, series in self._blocks(piece.first, piece.stop):
                 rest += float(np.sum((samples[block] - series @ smooth) ** 2))
@@ -158,7 +158,7 @@ class DenseSamples:
             size = np.sqrt(np.diagonal(gram))
             shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
             if shares[-1] <= _LARGEST_CONDITION * shares[0]:
-                triangle: Array = np.linalg.cholesky(gram)
+                triangle = np.asarray(np.linalg.cholesky(gram), np.float64)
                 yield _Piece(first, stop, triangle)
                 return
         half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
