@@ -119,13 +119,17 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     """
     study = _study(wanted)
     (case,) = study.cases.values()
+    progress = Progress(str(wanted.trace), 3)
     recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
+    progress.done()
+    progress.doing(f"fitting {len(recorded.time_s)} samples")
     settings, posed = judgement.settings_of(study, case), case.problem
     problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
-    progress = Progress(str(wanted.trace), 1)
     rng = stream(study.study_seed, case.name, 0, "identifiability")
     identify = identifier("least_squares", settings.least_squares)
     (found,) = identify([problem], [rng], progress.within)
+    progress.done()
+    progress.doing("finding confidence limits")
     confidence = case.confidence
     told = diagnose(
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad

@@ -56,6 +56,7 @@ _LAG_SHARES = (1e-6, 0.1, 10.0)
 _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
 # Share of a constant that offset and drift leave over, from which on it is one.
 _NO_CONSTANT = 1e-6
+_AT_ONCE = 65_536
 
 
 @dataclass(frozen=True)
@@ -248,11 +249,15 @@ def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
 def _left_over(trace: Array, responses: Array) -> float:
     """Sum of squares that no sum of the responses with weights of at least 0 explains."""
     scale = np.linalg.norm(responses, axis=1)
-    used = responses[scale > 0] / scale[scale > 0, None]
-    along, triangle = np.linalg.qr(used.T)
-    seen = along.T @ trace
-    _, distance = nnls(triangle, seen)
-    return float(max(np.sum(trace**2) - np.sum(seen**2), 0.0) + distance**2)
+    count = np.count_nonzero(scale)
+    triangle: Array = np.zeros((0, count + 1))
+    # In pieces: of a million samples, all at once would be as much memory as all else.
+    for start in range(0, len(trace), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        columns = np.vstack((responses[scale > 0, some] / scale[scale > 0, None], trace[some]))
+        triangle = np.asarray(np.linalg.qr(np.vstack((triangle, columns.T)), mode="r"))
+    _, distance = nnls(triangle[:count, :count], triangle[:count, count])
+    return float(distance**2 + np.sum(triangle[count:, count] ** 2))
 
 
 def _check_turn(

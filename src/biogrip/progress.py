@@ -20,11 +20,18 @@ class Progress:
         self._what = what
         self._total = total
         self._done = 0
+        self._phase = ""
         self._said = time.monotonic()
 
     def done(self, pieces: int = 1) -> None:
         """Count what is done."""
         self._done += pieces
+        self._phase = ""
+        self._say("")
+
+    def doing(self, phase: str) -> None:
+        """Name what comes next, until it is done."""
+        self._phase = f", {phase}"
         self._say("")
 
     def within(self, evaluations: int, misfit_rad: float) -> None:
@@ -36,4 +43,6 @@ class Progress:
         if now - self._said >= _EVERY_S:
             self._said = now
             # Past the job's log, to whoever waits at the terminal.
-            print(f"{self._what}: {self._done} of {self._total} done{more}", flush=True)
+            print(
+                f"{self._what}: {self._done} of {self._total} done{self._phase}{more}", flush=True
+            )

@@ -13,6 +13,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError, nearest
+from biogrip.plain_rows import plain_rows
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
@@ -239,6 +240,9 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
     time_unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
     rotation_unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
     sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
+    plain = plain_rows(path, at[0], layout.width, [*layout.indices.values()], layout.separator)
+    if plain is not None and len(plain) <= MOST_ROWS:
+        return sizes, plain, at[0] + 1 + np.arange(len(plain))
     values, row_lines = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
     for rows in _blocks(path, lines, layout.separator, at):
         _check_rows(path, at, rows, layout)

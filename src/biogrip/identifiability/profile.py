@@ -83,7 +83,7 @@ class Likelihood:
         straight line says nothing of it, nor of what it does to others. Unlike a
         `bound`, this has no threshold that a parameter's information may pass.
         """
-        _, sensitivity = self.problem.residuals(self.best)
+        _, sensitivity = self.problem.residuals.condensed(self.best)
         relative = sensitivity / self.noise_rad
         slope = quantity.gradient(self.best)
         information = relative @ relative.T + np.eye(len(slope))

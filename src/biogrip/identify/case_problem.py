@@ -119,7 +119,11 @@ class CaseProblem:
         sampled = time_s.tobytes()
         if sampled not in self._condensed:
             self._condensed[sampled] = condensed_of(
-                self.torque, time_s, offset=self.offset, drift=self.drift
+                self.torque,
+                time_s,
+                offset=self.offset,
+                drift=self.drift,
+                nonlinear=self.nonlinear,
             )
         return self._condensed[sampled]
 

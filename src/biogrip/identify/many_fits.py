@@ -1,4 +1,4 @@
-"""Local fits of many traces at once: same protocol, sampling times and model, linear.
+"""Local fits of many traces at once: same protocol, sampling times and model.
 
 `biogrip.identify.local_fit` for any number of traces and starting points as one
 array. To the last bit, a fit does not depend on which others are made with it.
@@ -18,6 +18,7 @@ from biogrip.identify.levenberg_marquardt import (
 )
 from biogrip.identify.local_fit import FINE, PRIOR_WIDTH
 from biogrip.identify.problem import Problem
+from biogrip.identify.refreshed_fits import minimized_with_refreshes
 
 
 class Held(Constraint, Protocol):
@@ -69,7 +70,13 @@ class ManyFits:
         trace : (n,)
             Which trace each is compared with.
         """
-        rows = self._residuals.condensed_responses(x)
+        return self._normal_of(self._residuals.condensed_responses(x), x, trace)
+
+    def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
+        """Normal equations, given rows of the responses; infinitely bad where these are none."""
+        answered = np.isfinite(rows[:, 0, 0])
+        if not np.all(answered):
+            rows[~answered] = 0.0
         rows[:, 0] -= self._traces[trace]
         products = rows @ rows.swapaxes(1, 2)
         misfit_rad = np.sqrt(products[:, 0, 0] / self._residuals.samples)
@@ -77,11 +84,12 @@ class ManyFits:
         away = (x - self._middle) / PRIOR_WIDTH
         diagonal = np.arange(1, 1 + x.shape[1])
         products[:, diagonal, diagonal] += 1 / PRIOR_WIDTH**2
+        square_sum = products[:, 0, 0] + np.sum(away**2, axis=1)
         return Normal(
-            products[:, 0, 0] + np.sum(away**2, axis=1),
+            np.where(answered, square_sum, np.inf),
             products[:, 0, 1:] + away / PRIOR_WIDTH,
             products[:, 1:, 1:],
-            misfit_rad,
+            np.where(answered, misfit_rad, np.inf),
         )
 
     def fitted(
@@ -112,15 +120,19 @@ class ManyFits:
         low = np.broadcast_to(self.low if low is None else low, starts.shape)
         high = np.broadcast_to(self.high if high is None else high, starts.shape)
         starts = np.clip(starts, low, high)
-        if held is None:
-            return minimized(
-                lambda x, fit: self.normal(x, trace[fit]), starts, low, high, tolerance
+        if held is not None:
+            starts = held.started(starts)
+
+        def objective(x: Array, fit: IntArray, correction: Array | None = None) -> Normal:
+            rows = self._residuals.condensed_linear(x)
+            if correction is not None:
+                rows += correction
+            normal = self._normal_of(rows, x, trace[fit])
+            return normal if held is None else held.added(normal, x, fit)
+
+        if self._residuals.nonlinear:
+            correction = self._residuals.condensed_corrections
+            return minimized_with_refreshes(
+                objective, correction, starts, low, high, tolerance, held
             )
-        return minimized(
-            lambda x, fit: held.added(self.normal(x, trace[fit]), x, fit),
-            held.started(starts),
-            low,
-            high,
-            tolerance,
-            held,
-        )
+        return minimized(objective, starts, low, high, tolerance, held)

@@ -11,9 +11,13 @@ from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.protocol import TorqueHistory
 from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import misfit_of
+from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
 from biogrip.sample import SampleModel
+
+# Forming the responses of a population to more samples takes minutes.
+_MANY_SAMPLES = 20_000
 
 
 @dataclass(frozen=True)
@@ -72,34 +76,44 @@ def problem_of(
     condensed
         What `condensed_of` gives for the same times, if there is one already.
     """
-    condensed = condensed or condensed_of(torque, time_s, offset=offset, drift=drift)
+    condensed = condensed or condensed_of(
+        torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear
+    )
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
+    residuals = Residuals(
+        gripper,
+        model,
+        torque,
+        time_s,
+        rotation_rad,
+        condensed,
+        nonlinear=nonlinear,
+        noise_rad=noise_rad,
+    )
+    misfit = misfit_of(
+        gripper,
+        model,
+        torque,
+        time_s,
+        rotation_rad,
+        nonlinear=nonlinear,
+        nuisance=condensed.nuisance,
+    )
+    formed = isinstance(misfit, FormedMisfit)
+    if formed and len(time_s) > _MANY_SAMPLES and residuals.condensable:
+        misfit = residuals.condensed_misfit
     return Problem(
-        misfit_of(
-            gripper,
-            model,
-            torque,
-            time_s,
-            rotation_rad,
-            nonlinear=nonlinear,
-            nuisance=condensed.nuisance,
-        ),
-        Residuals(
-            gripper,
-            model,
-            torque,
-            time_s,
-            rotation_rad,
-            condensed,
-            nonlinear=nonlinear,
-            noise_rad=noise_rad,
-        ),
+        misfit,
+        residuals,
         genome_of(model, ranges),
         np.log([genes.low for genes in chosen]),
         np.log([genes.high for genes in chosen]),
     )
 
 
-def condensed_of(torque: TorqueHistory, time_s: Array, *, offset: bool, drift: bool) -> Condensed:
+def condensed_of(
+    torque: TorqueHistory, time_s: Array, *, offset: bool, drift: bool, nonlinear: bool = False
+) -> Condensed:
     """Condense the residuals of all traces that are sampled at the same times."""
-    return Condensed(torque, time_s, nuisance_basis(time_s, offset=offset, drift=drift))
+    nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
+    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear)

@@ -5,7 +5,8 @@ under the protocol, g(t; r), and all of these, over all rates r, nearly span a
 space of some fifty dimensions only. In it a function is known from its values
 at as many well-chosen times. So a response is simulated at those, and a square
 matrix turns what it is there into rows whose sum of squares, gradients and all,
-is that of the residuals at every sample.
+is that of the residuals at every sample. Where samples are dense, that space is
+found on nodes that stand for them (`biogrip.response.dense_samples`).
 """
 
 from functools import cached_property
@@ -14,17 +15,21 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.protocol import TorqueHistory
+from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.mode_rows import ModeRows
+from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
 
-MOST_SAMPLES = 100_000
-"""Of more samples, finding those that stand for all would take gigabytes."""
+MOST_NODES = 50_000
+"""With more, finding the times that stand for all would take gigabytes."""
 
 # Neighbouring rates, in log(1 - T r), T the last time: far closer than modes can be told apart.
 _SPACING = 0.25
 # Rates go from next to nothing to where only what has not begun to decay is left.
 _SLOWEST, _FASTEST = 1e-6, 1e3
+# A correction on a mesh that follows a sinusoid of the torque may have thousands of values.
+_MOST_FUNCTIONS = 1000
 # Directions that matter less than this are rounding.
 _RANK = 1e-14
 
@@ -40,12 +45,23 @@ class Condensed:
         Ascending sampling times.
     nuisance : (n_functions, n_samples)
         What is taken out of trace and responses, see `nuisance_basis`.
+    nonlinear
+        Whether rows must also do for what the nonlinear model has over the linear one.
     """
 
-    def __init__(self, torque: TorqueHistory, time_s: Array, nuisance: Array) -> None:
+    def __init__(
+        self, torque: TorqueHistory, time_s: Array, nuisance: Array, *, nonlinear: bool = False
+    ) -> None:
         self.nuisance = nuisance
+        self._nonlinear = nonlinear
         self._torque = torque
         self._all_s = time_s
+
+    @property
+    def possible(self) -> bool:
+        """Whether few enough nodes stand for the samples."""
+        functions = len(self._edges_s) * (STAGES + 1)
+        return len(self._dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Rows of a trace less nuisance.
@@ -59,19 +75,21 @@ class Condensed:
         (n_rows,)
             The last is what no response can reach.
         """
-        rows = rotation_rad @ self._basis
-        return np.append(rows, np.linalg.norm(rotation_rad - self._basis @ rows))
+        seen, rest = self._dense.rows_of_samples(rotation_rad)
+        rows = seen @ self._basis
+        return np.append(rows, np.hypot(np.linalg.norm(seen - self._basis @ rows), rest))
 
     @cached_property
     def time_s(self) -> Array:
         """Times that stand for all, (n_times,)."""
-        return self._all_s[self._chosen]
+        return self._dense.time_s[self._chosen]
 
     @cached_property
     def to_rows(self) -> Array:
         """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
+        values = self._dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
-            self._span[self._chosen].T, (without(self.nuisance, self._span.T) @ self._basis)
+            values[:, self._chosen], without(self._seen_nuisance, self._span.T) @ self._basis
         )
         return np.pad(matrix, ((0, 0), (0, 1)))
 
@@ -84,33 +102,67 @@ class Condensed:
         return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
+    def _dense(self) -> DenseSamples:
+        return DenseSamples(self._torque, self._all_s, self._edges_s)
+
+    @cached_property
+    def _edges_s(self) -> Array:
+        """Edges of the mesh of a correction, if there is one."""
+        return mesh(self._torque, COARSE) if self._nonlinear else np.zeros(0)
+
+    @cached_property
+    def _corrections(self) -> Array:
+        """Rows of the nodes of what corrections are a sum of, (n_functions, n_nodes)."""
+        if not self._nonlinear:
+            return np.zeros((0, len(self._dense.time_s)))
+        functions = mesh_functions(self._edges_s, self._dense.time_s)
+        return self._dense.rows_of_values(functions)
+
+    @cached_property
+    def of_corrections(self) -> Array:
+        """Matrix that turns values of a `Correction`, from its left, into rows."""
+        rows = without(self._seen_nuisance, self._corrections) @ self._basis
+        return np.pad(rows, ((0, 0), (0, 1)))
+
+    @cached_property
+    def _seen_nuisance(self) -> Array:
+        """The nuisance as rows of the nodes, (n_functions, n_nodes)."""
+        rows = [self._dense.rows_of_samples(function)[0] for function in self.nuisance]
+        return np.reshape(rows, (len(rows), len(self._dense.time_s)))
+
+    @cached_property
     def _span(self) -> Array:
-        """Orthonormal functions that span all responses, (n_samples, n_rows)."""
-        end_s = self._all_s[-1]
+        """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
+        end_s, time_s = self._all_s[-1], self._dense.time_s
         shortest_s = np.diff(self._all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
-        growth, slope = responses_of_modes(rates, self._torque, self._all_s)
+        growth, slope = map(
+            self._dense.rows_of_values, responses_of_modes(rates, self._torque, time_s)
+        )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
-        basis, triangle = np.linalg.qr(family.reshape(-1, len(self._all_s)).T)
+        weights = np.linalg.norm(self._corrections, axis=1)
+        seen = self._corrections[weights > 0] / weights[weights > 0, None]
+        family = np.concatenate((family.reshape(-1, len(time_s)), seen))
+        basis, triangle = np.linalg.qr(family.T)
         turned, share, _ = np.linalg.svd(triangle)
         span: Array = basis @ turned[:, share > _RANK * share[0]]
         return span
 
     @cached_property
     def _chosen(self) -> IntArray:
-        """Samples at which the functions of the span differ most."""
+        """Nodes at which the functions of the span differ most."""
         # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
         from scipy.linalg import qr
 
-        span = self._span
-        _, order = qr(span.T, mode="r", pivoting=True)
-        chosen: IntArray = np.sort(order[: span.shape[1]])
+        span = self._dense.values_of_rows(self._span.T)
+        _, order = qr(span, mode="r", pivoting=True)
+        chosen: IntArray = np.sort(order[: span.shape[0]])
         return chosen
 
     @cached_property
     def _basis(self) -> Array:
-        """Orthonormal functions that span all responses less nuisance, (n_samples, n_rows - 1)."""
-        return np.linalg.qr(without(self.nuisance, self._span.T).T)[0]
+        """Orthonormal rows that span all responses less nuisance, (n_nodes, n_rows - 1)."""
+        return np.linalg.qr(without(self._seen_nuisance, self._span.T).T)[0]

@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError
 from biogrip.gripper import Arm, Gripper
 from biogrip.protocol import TorqueHistory, drives, torque_at
@@ -93,17 +93,44 @@ class Correction:
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate at ascending times, shape (n, n_times)."""
-        cuts = np.searchsorted(time_s, self.edges_s[1:-1], side="left")
-        pieces = np.split(time_s, cuts)
         values = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
         parts = [
-            values[:, element] @ _lagrange((piece - start) / (end - start))
-            for element, ((start, end), piece) in enumerate(
-                zip(pairwise(self.edges_s), pieces, strict=True)
-            )
-            if len(piece)
+            values[:, element] @ on_piece
+            for element, on_piece in enumerate(_interpolation(self.edges_s, time_s))
+            if on_piece.shape[1]
         ]
         return np.concatenate(parts, axis=1)
+
+
+def mesh_functions(edges_s: Array, time_s: Array) -> Array:
+    """Functions that a `Correction` is a sum of, weighted by its values.
+
+    Parameters
+    ----------
+    edges_s : (n_elements + 1,)
+        The mesh.
+    time_s : (n_times,)
+        Ascending times.
+
+    Returns
+    -------
+    (n_elements * (STAGES + 1), n_times)
+    """
+    functions, start = np.zeros((len(edges_s) - 1, STAGES + 1, len(time_s))), 0
+    for element, on_piece in enumerate(_interpolation(edges_s, time_s)):
+        stop = start + on_piece.shape[1]
+        functions[element, :, start:stop] = on_piece
+        start = stop
+    return functions.reshape(-1, len(time_s))
+
+
+def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
+    """Of each element, its polynomials at the times within, (STAGES + 1, n_times_within)."""
+    pieces = np.split(time_s, np.searchsorted(time_s, edges_s[1:-1], side="left"))
+    return [
+        _lagrange((piece - start) / (end - start))
+        for (start, end), piece in zip(pairwise(edges_s), pieces, strict=True)
+    ]
 
 
 def nonlinear_rotation(
@@ -162,14 +189,18 @@ def correction(
     peak = np.abs(linear).max(axis=(1, 2, 3))
     extra, extra_rate = np.zeros(shape), np.zeros(shape)
     converged = np.zeros(shape[0], dtype=bool)
+    # What has come to rest stays, lest it depended on the others how often it is swept.
+    left = np.arange(shape[0])
     for _ in range(accuracy.most_sweeps):
-        u, u_rate = b_0 * (linear + extra), b_0 * (linear_rate + extra_rate)
+        u = b_0 * (linear[left] + extra[left])
+        u_rate = b_0 * (linear_rate[left] + extra_rate[left])
         load = b_0 * _load(gripper, arms, tau, u, u_rate)
-        previous = extra
-        extra, extra_rate = modes.respond(_as_drives(load))
-        change = np.abs(extra - previous).max(axis=(1, 2, 3))
-        converged = change <= accuracy.tolerance * peak
-        if np.all(converged | ~np.isfinite(change)):
+        found, extra_rate[left] = modes.respond(_as_drives(load), left)
+        change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
+        extra[left] = found
+        converged[left] = change <= accuracy.tolerance * peak[left]
+        left = left[~converged[left] & np.isfinite(change)]
+        if not len(left):
             break
     phi = rotation_of_tip(gripper, b_0 * (linear + extra))
     at_nodes = phi - linear
@@ -248,18 +279,28 @@ class _Modes:
         self._rates = response.rates[:, None, :, None, None]
         self._residues = response.weights * response.rates[:, None, None, :]
 
-    def respond(self, load: Array) -> tuple[Array, Array]:
-        """Rotation and rate of the arms at the nodes, (n, n_arms, n_elements, STAGES) each."""
-        forced = np.einsum("nmeij,ndej->ndmei", self._gain, load, optimize=True)
+    def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
+        """Rotation and rate of the arms at the nodes, (n, n_arms, n_elements, STAGES) each.
+
+        Parameters
+        ----------
+        load : (n, n_drives, n_elements, STAGES)
+            At the nodes.
+        which : (n,)
+            Of the samples.
+        """
+        forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])
+        carry = self._carry[which]
         for element in range(forced.shape[3] - 1):
-            carried = self._carry[:, None, :, element, -1] * start[..., element]
+            carried = carry[:, None, :, element, -1] * start[..., element]
             start[..., element + 1] = carried + forced[..., element, -1]
-        q = self._carry[:, None] * start[..., None] + forced
-        q_rate = self._rates * q + load[:, :, None]
+        q = carry[:, None] * start[..., None] + forced
+        q_rate = self._rates[which] * q + load[:, :, None]
+        residues = self._residues[which]
         return (
-            np.einsum("nadm,ndmei->naei", self._residues, q, optimize=True),
-            np.einsum("nadm,ndmei->naei", self._residues, q_rate, optimize=True),
+            np.einsum("nadm,ndmei->naei", residues, q),
+            np.einsum("nadm,ndmei->naei", residues, q_rate),
         )
 
 

@@ -8,10 +8,19 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.gripper import Gripper
 from biogrip.protocol import TorqueHistory
-from biogrip.response.condensed import MOST_SAMPLES, Condensed
+from biogrip.response.condensed import Condensed
+from biogrip.response.linear import LEFT
 from biogrip.response.nuisance import without
-from biogrip.response.sensitivity import modes_of, rotation_and_sensitivity
+from biogrip.response.sensitivity import (
+    corrections,
+    differences,
+    modes_of,
+    rotation_and_sensitivity,
+)
 from biogrip.sample import SampleModel
+
+# Samples whose rows are formed at once, of the linear model and of what the nonlinear adds.
+_AT_ONCE, _FEW_AT_ONCE = 1000, 50
 
 
 class Residuals:
@@ -47,7 +56,7 @@ class Residuals:
         self._model = model
         self._torque = torque
         self._time_s = time_s
-        self._nonlinear = nonlinear
+        self.nonlinear = nonlinear
         self._nuisance = condensed.nuisance
         self._condensed = condensed
         self._rotation_rad = without(self._nuisance, rotation_rad)
@@ -90,7 +99,7 @@ class Residuals:
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
 
-        On the nonlinear model, or with very many samples, these are the residuals themselves.
+        Where samples are many and not dense, these are the residuals themselves.
 
         Parameters
         ----------
@@ -106,6 +115,9 @@ class Residuals:
         """
         if not self.condensable:
             return self(log_parameters)
+        if self.nonlinear:
+            found = self.condensed_responses(log_parameters[None])[0]
+            return found[0] - self.condensed_trace, found[1:]
         rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
         to_rows = self._condensed.to_rows
         return rotation @ to_rows - self.condensed_trace, sensitivity @ to_rows
@@ -113,7 +125,7 @@ class Residuals:
     @property
     def condensable(self) -> bool:
         """Whether few rows may stand for all samples."""
-        return not self._nonlinear and self.samples <= MOST_SAMPLES
+        return self._condensed.possible
 
     @cached_property
     def condensed_trace(self) -> Array:
@@ -131,17 +143,58 @@ class Residuals:
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
-            In rad; first the response, then its derivatives by the log-parameters.
+            In rad; first the response, then its derivatives by the log-parameters. NaN where
+            the nonlinear model has no answer.
         """
+        rows = self.condensed_linear(log_parameters)
+        return rows + self.condensed_corrections(log_parameters) if self.nonlinear else rows
+
+    def condensed_linear(self, log_parameters: Array) -> Array:
+        """Of `condensed_responses`, what the linear model gives."""
         modes = modes_of(self._gripper, self._model, self._torque, np.exp(log_parameters))
         return self._condensed.of_modes(modes)
+
+    def condensed_corrections(self, log_parameters: Array) -> Array:
+        """Of `condensed_responses`, what the nonlinear model has over the linear one."""
+        parts = range(0, len(log_parameters), _FEW_AT_ONCE)
+        return np.concatenate(
+            [self._corrections(log_parameters[start : start + _FEW_AT_ONCE]) for start in parts]
+        )
+
+    def _corrections(self, log_parameters: Array) -> Array:
+        found = corrections(self._gripper, self._model, self._torque, np.exp(log_parameters))
+        values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
+        # One product a sample: the order of its sums does not depend on how many there are.
+        shape = len(log_parameters), -1, len(self._condensed.of_corrections)
+        rows: Array = differences(values.reshape(shape)) @ self._condensed.of_corrections
+        return rows
+
+    def condensed_misfit(self, parameters: Array) -> Array:
+        """RMS misfit of a population; a sample's does not depend on the others.
+
+        Parameters
+        ----------
+        parameters : (n, n_parameters)
+            Sample parameters in the model's order, SI units.
+
+        Returns
+        -------
+        (n,)
+            In rad.
+        """
+        misfit = np.empty(len(parameters))
+        for start in range(0, len(parameters), _AT_ONCE):
+            some = slice(start, start + _AT_ONCE)
+            rows = self.condensed_responses(np.log(parameters[some]))[:, 0] - self.condensed_trace
+            misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
+        return misfit
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Whether only the trace, and its noise, tell this from others."""
         return self._assumed() == other._assumed() and self._condensed is other._condensed
 
     def _assumed(self) -> tuple[object, ...]:
-        return self._gripper, self._model, self._nonlinear
+        return self._gripper, self._model, self.nonlinear
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
         return rotation_and_sensitivity(
@@ -150,7 +203,7 @@ class Residuals:
             self._torque,
             time_s,
             np.exp(log_parameters),
-            nonlinear=self._nonlinear,
+            nonlinear=self.nonlinear,
         )
 
 

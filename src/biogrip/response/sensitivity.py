@@ -26,7 +26,7 @@ from biogrip.response.linear import (
     slope_at_poles,
     transfer_functions,
 )
-from biogrip.response.nonlinear import COARSE, correction
+from biogrip.response.nonlinear import COARSE, Correction, correction
 from biogrip.sample import SampleModel
 
 _TILT = 1e-30
@@ -86,12 +86,49 @@ def rotation_and_sensitivity(
     modes = modes_of(gripper, model, torque, parameters[None])
     phi, slopes = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s))
     if nonlinear:
-        steps = _STEP * np.concatenate((np.zeros((1, len(parameters))), _both_ways(parameters)))
-        found = correction(gripper, model.network(parameters * np.exp(steps)), torque, COARSE)
+        found = corrections(gripper, model, torque, parameters[None])
         values = np.where(found.converged[:, None], found.at(time_s), np.nan)
         phi = phi + values[0]
-        slopes = slopes + np.nan_to_num((values[1::2] - values[2::2]) / (2 * _STEP))
+        slopes = slopes + np.nan_to_num(differences(values[None])[0, 1:])
     return phi, slopes
+
+
+def corrections(
+    gripper: Gripper, model: SampleModel, torque: TorqueHistory, parameters: Array
+) -> Correction:
+    """Nonlinear minus linear rotation of samples, and of those that are a little different.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated.
+    parameters : (n, n_parameters)
+        All positive.
+
+    Returns
+    -------
+    Correction
+        Of n (1 + 2 n_parameters) samples, see `differences`.
+    """
+    count = parameters.shape[1]
+    steps = _STEP * np.concatenate((np.zeros((1, count)), _both_ways(count)))
+    around = (parameters[:, None] * np.exp(steps)).reshape(-1, count)
+    return correction(gripper, model.network(around), torque, COARSE)
+
+
+def differences(values: Array) -> Array:
+    """What `corrections` found, and its derivatives by the log-parameters.
+
+    Parameters
+    ----------
+    values : (n, 1 + 2 n_parameters, ...)
+
+    Returns
+    -------
+    (n, 1 + n_parameters, ...)
+    """
+    slopes = (values[:, 1::2] - values[:, 2::2]) / (2 * _STEP)
+    return np.concatenate((values[:, :1], slopes), axis=1)
 
 
 def modes_of(
@@ -149,10 +186,10 @@ def _tilts(count: int) -> ComplexArray:
     return tilts
 
 
-def _both_ways(parameters: Array) -> Array:
+def _both_ways(count: int) -> Array:
     """Unit steps of each parameter, forward and back in turn."""
-    unit = np.eye(len(parameters))
-    return np.stack((unit, -unit), axis=1).reshape(-1, len(parameters))
+    unit = np.eye(count)
+    return np.stack((unit, -unit), axis=1).reshape(-1, count)
 
 
 def responses_of_modes(rates: Array, torque: TorqueHistory, time_s: Array) -> tuple[Array, Array]:

@@ -1,0 +1,95 @@
+"""Two columns of a plain table of numbers, read in bulk.
+
+Plain is what leaves no question: ASCII, a row on every line, a cell in every
+column, no quotes, no comments, and numbers as computers write them. Of
+anything else nothing is said but that it is not plain; then it is for
+`biogrip.recordings` to read with care, and to find what is wrong.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import compute, csv
+
+from biogrip.arrays import Array
+
+_ODD = (b'"', b"#", b"\0")
+_GAPS = ("", "-", "na", "NA", "n/a", "N/A", "nan", "NaN", "NAN")
+# More than that is no cell of a table, see `csv.field_size_limit`.
+_LONGEST_LINE = 100_000
+
+
+def plain_rows(
+    path: Path, header_lines: int, width: int, wanted: Sequence[int], separator: str
+) -> Array | None:
+    """Read the rows below a header, one a line, if all of them are plain.
+
+    Parameters
+    ----------
+    path
+        The file.
+    header_lines
+        How many lines come before the rows.
+    width
+        How many columns there are.
+    wanted
+        Which of them to read, from 0.
+    separator
+        Between cells; numbers may have a decimal comma where it is none.
+
+    Returns
+    -------
+    (n_rows, n_wanted) or None
+        NaN where there is a gap; None if the rows are not plain.
+    """
+    content = path.read_bytes()
+    ends = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n")) + 1
+    if content.count(b"\r") != content.count(b"\r\n") or len(ends) < header_lines:
+        return None
+    start = int(ends[header_lines - 1])
+    ends = np.append(ends[header_lines - 1 :], [len(content)] * (content[-1:] != b"\n"))
+    lengths = np.diff(ends)
+    odd = any(content.find(byte, start) >= 0 for byte in _ODD)
+    if odd or not len(lengths) or lengths.max() > _LONGEST_LINE:
+        return None
+    body = pa.py_buffer(content).slice(start)
+    if np.frombuffer(body, np.uint8).max() > 0x7F:
+        return None
+    for decimal in "." if separator == "," else ".,":
+        rows = _parsed(body, width, wanted, separator, decimal)
+        if rows is not None:
+            return rows if len(rows) == len(lengths) else None
+    return None
+
+
+def _parsed(
+    body: pa.Buffer, width: int, wanted: Sequence[int], separator: str, decimal: str
+) -> Array | None:
+    names = [str(column) for column in range(width)]
+    chosen = [names[column] for column in wanted]
+    try:
+        table = csv.read_csv(
+            pa.BufferReader(body),
+            csv.ReadOptions(use_threads=False, column_names=names),
+            csv.ParseOptions(delimiter=separator, quote_char=False),
+            csv.ConvertOptions(
+                column_types=dict.fromkeys(chosen, pa.float64()),
+                include_columns=chosen,
+                null_values=_GAPS,
+                decimal_point=decimal,
+            ),
+        )
+    except pa.ArrowInvalid:
+        return None
+    rows = np.empty((len(table), len(chosen)))
+    for place, name in enumerate(chosen):
+        column = table[name]
+        # Arrow's own conversion loads pandas first.
+        filled = compute.fill_null(column, float("nan")).combine_chunks()
+        rows[:, place] = np.frombuffer(filled.buffers()[1])[filled.offset :][: len(filled)]
+        # Infinity, or not a number in some other spelling.
+        if np.count_nonzero(np.isfinite(rows[:, place])) != len(table) - column.null_count:
+            return None
+    return rows

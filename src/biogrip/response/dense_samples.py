@@ -1,0 +1,199 @@
+"""Nodes that stand for dense samples: whatever is smooth in between is known from them.
+
+After a change of torque, modes of all rates are seen; later, only slow ones are left.
+On a piece of time twice as far from the last change at its end as at its start, a
+response to it is a polynomial of degree 19 to 1e-15 of its peak, whatever the rate:
+with e^(-rho (3 + s)), |s| <= 1, Chebyshev's coefficients fall like 5.8^-n. Changes
+before are further away, and a sinusoid of the torque is a polynomial as well on a
+piece of a period. So a piece with thousands of samples needs twenty nodes, and sums
+of products over its samples are known from one small matrix, which is summed up block
+by block. Where samples are few, they are the nodes.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.polynomial import chebyshev, legendre
+
+from biogrip.arrays import Array
+from biogrip.protocol import TorqueHistory
+
+_NODES = 20
+_DEGREE = _NODES - 1
+_PLACES = chebyshev.chebpts1(_NODES)
+# From values at the nodes to coefficients of Legendre's polynomials, which samples that are
+# dense all over a piece leave nearly orthogonal.
+_TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
+# Fewer samples are their own nodes; so are those whose matrix is further from orthogonality.
+_FEWEST, _LARGEST_CONDITION = 256, 100.0
+# Samples whose polynomials are formed at once.
+_AT_ONCE = 16_384
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """Samples from `first` up to `stop`, and what their nodes have to do with them.
+
+    Parameters
+    ----------
+    first, stop
+        Indices of samples.
+    triangle : (n_nodes, n_nodes) or None
+        R^T of the samples' Legendre polynomials Q R, Q orthonormal; None where samples are nodes.
+    """
+
+    first: int
+    stop: int
+    triangle: Array | None
+
+
+class DenseSamples:
+    """Rows that stand for the samples of any smooth function of time.
+
+    Parameters
+    ----------
+    torque
+        The protocol; functions are smooth between its changes.
+    time_s : (n_samples,)
+        Ascending sampling times.
+    further_edges_s : (n_edges,)
+        Where else they may be less smooth.
+    """
+
+    def __init__(
+        self, torque: TorqueHistory, time_s: Array, further_edges_s: Array | None = None
+    ) -> None:
+        self._all_s = time_s
+        starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
+        self._starts_s = np.unique([-np.inf, *starts])
+        omega = torque.omega_rad_per_s
+        self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
+        edges = starts if further_edges_s is None else [*starts, *further_edges_s]
+        bounds = np.unique(np.concatenate(([0], time_s.searchsorted(edges), [len(time_s)])))
+        self._pieces = list(_joined(p for ends in pairwise(bounds) for p in self._divided(*ends)))
+        self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
+        """Times of the nodes, (n_nodes,), ascending."""
+
+    def rows_of_values(self, values: Array) -> Array:
+        """Rows of functions known at the nodes.
+
+        Parameters
+        ----------
+        values : (..., n_nodes)
+
+        Returns
+        -------
+        (..., n_nodes)
+            Their products are those of the functions' samples.
+        """
+        rows, start = np.empty_like(values), 0
+        for piece in self._pieces:
+            here = slice(start, start + self._count(piece))
+            start = here.stop
+            own = values[..., here]
+            rows[..., here] = (
+                own if piece.triangle is None else own @ (_TO_SERIES.T @ piece.triangle)
+            )
+        return rows
+
+    def values_of_rows(self, rows: Array) -> Array:
+        """Values at the nodes, from rows: the inverse of `rows_of_values`."""
+        values, start = np.empty_like(rows), 0
+        to_nodes = legendre.legvander(_PLACES, _DEGREE).T
+        for piece in self._pieces:
+            here = slice(start, start + self._count(piece))
+            start = here.stop
+            own = rows[..., here]
+            values[..., here] = (
+                own
+                if piece.triangle is None
+                else np.linalg.solve(piece.triangle.T, own.T).T @ to_nodes
+            )
+        return values
+
+    def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
+        """Rows of any function known at the samples, smooth or not, as seen by smooth ones.
+
+        Parameters
+        ----------
+        samples : (n_samples,)
+
+        Returns
+        -------
+        rows : (n_nodes,)
+            With them it has the same products with smooth functions.
+        rest
+            Norm of what no smooth function has a part in.
+        """
+        parts: list[Array] = []
+        rest = 0.0
+        for piece in self._pieces:
+            own = samples[piece.first : piece.stop]
+            if piece.triangle is None:
+                parts.append(own)
+                continue
+            seen = np.zeros(_NODES)
+            for block, series in self._blocks(piece.first, piece.stop):
+                seen += samples[block] @ series
+            part = np.asarray(np.linalg.solve(piece.triangle, seen), np.float64)
+            smooth = np.linalg.solve(piece.triangle.T, part)
+            for block, series in self._blocks(piece.first, piece.stop):
+                rest += float(np.sum((samples[block] - series @ smooth) ** 2))
+            parts.append(part)
+        return np.concatenate(parts), float(np.sqrt(rest))
+
+    def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
+        """Halve pieces that are not smooth, or not dense all over, down to few samples."""
+        if stop - first < _FEWEST:
+            yield _Piece(first, stop, None)
+            return
+        start, end = self._all_s[first], self._all_s[stop - 1]
+        elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
+        if end - start <= min(elapsed, self._longest_s):
+            gram = np.zeros((_NODES, _NODES))
+            for _, series in self._blocks(first, stop):
+                gram += series.T @ series
+            size = np.sqrt(np.diagonal(gram))
+            shares = np.linalg.eigvalsh(gram / (size[:, None] * size))
+            if shares[-1] <= _LARGEST_CONDITION * shares[0]:
+                triangle = np.asarray(np.linalg.cholesky(gram), np.float64)
+                yield _Piece(first, stop, triangle)
+                return
+        half = first + int(np.searchsorted(self._all_s[first:stop], 0.5 * (start + end)))
+        yield from self._divided(first, half)
+        yield from self._divided(half, stop)
+
+    def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
+        """Legendre's polynomials at the samples of a piece, (n_samples, n_nodes), by blocks."""
+        start, end = self._all_s[first], self._all_s[stop - 1]
+        for here in range(first, stop, _AT_ONCE):
+            block = slice(here, min(here + _AT_ONCE, stop))
+            place = (2 * self._all_s[block] - start - end) / (end - start)
+            yield block, legendre.legvander(place, _DEGREE)
+
+    def _nodes(self, piece: _Piece) -> Array:
+        if piece.triangle is None:
+            return self._all_s[piece.first : piece.stop]
+        start, end = self._all_s[piece.first], self._all_s[piece.stop - 1]
+        nodes: Array = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
+        return nodes
+
+    @staticmethod
+    def _count(piece: _Piece) -> int:
+        return piece.stop - piece.first if piece.triangle is None else _NODES
+
+
+def _joined(pieces: Iterator[_Piece]) -> Iterator[_Piece]:
+    """Join neighbours whose samples are nodes."""
+    last: _Piece | None = None
+    for piece in pieces:
+        if last is not None and last.triangle is None and piece.triangle is None:
+            last = _Piece(last.first, piece.stop, None)
+            continue
+        if last is not None:
+            yield last
+        last = piece
+    if last is not None:
+        yield last

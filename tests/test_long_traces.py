@@ -1,0 +1,68 @@
+"""Traces of very many samples: seconds, little memory, and the answer of fewer samples."""
+
+import tracemalloc
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.gripper import Gripper
+from biogrip.one_trace import Wanted, identify_trace
+from biogrip.protocol import held, torque_history
+from biogrip.response.linear import rotation, step_response
+from biogrip.sample import MODELS
+
+SAMPLES, MEANS_OF = 200_000, 50
+MODEL, TRUTH = MODELS["liquid_drop"], np.array([34.0, 12.0, 300.0])
+_RNG = np.random.default_rng(6)
+TIMES = {
+    "uniform": np.arange(SAMPLES) * (400.0 / SAMPLES),
+    "irregular": np.unique(np.round(_RNG.uniform(0.0, 400.0, SAMPLES), 7)),
+}
+
+
+def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
+    rows = zip(time_s.tolist(), rotation_rad.tolist(), strict=True)
+    text = "".join(f"{time:.9f},{value:.9g}\n" for time, value in rows)
+    path.write_text("time_s,rotation_rad\n" + text)
+    return path
+
+
+def found_in(path: Path) -> dict[str, Any]:
+    wanted = Wanted(path, MODEL.name, {"time": "time_s", "rotation": "rotation_rad"}, None)
+    return identify_trace(wanted, path.with_suffix(".json"))
+
+
+@pytest.mark.parametrize("times", TIMES)
+def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Path) -> None:
+    """Means of fifty samples lose next to nothing here: estimates and limits agree.
+
+    To a tenth of an interval; peak memory stays a few hundred bytes a sample.
+    """
+    torque, time_s = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9))), TIMES[times]
+    response = step_response(gripper, MODEL.network(TRUTH), symmetric=True)
+    clean = rotation(response, torque, time_s)[0]
+    trace = clean + 0.1 * clean.max() * _RNG.standard_normal(len(time_s))
+    path = written(tmp_path / "every.csv", time_s, trace)
+    tracemalloc.start()
+    every = found_in(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 400 * len(time_s)
+    assert every["samples"] == len(time_s)
+    # No mean over both sides of the second step.
+    sides = np.split(np.arange(len(time_s)), [time_s.searchsorted(200.0)])
+    groups = [side[: len(side) // MEANS_OF * MEANS_OF].reshape(-1, MEANS_OF) for side in sides]
+    means = [
+        np.concatenate([values[group].mean(axis=1) for group in groups])
+        for values in (time_s, trace)
+    ]
+    fewer = found_in(written(tmp_path / "means.csv", *means))
+    for one, other in zip(every["quantities"], fewer["quantities"], strict=True):
+        assert one["verdict"] == other["verdict"] == "determined"
+        width = np.log(one["high"] / one["low"])
+        for name in ("value", "low", "high"):
+            assert abs(np.log(one[name] / other[name])) < 0.1 * width
+        assert one["low"] < other["value"] < one["high"]
