@@ -19,7 +19,7 @@ from benchmarks.timing import clocked, time_to_success
 from biogrip.arrays import Array
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import METHODS as OURS
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import identifier, method_settings
 from biogrip.measurement import rms
 
 Method = Callable[[Problem, np.random.Generator], Array]
@@ -44,7 +44,8 @@ a share of the trace's RMS. A share of {_RUNS} runs is good to 8 % or better."""
 
 def by_study(p: Problem, rng: np.random.Generator, *, name: str) -> Array:
     """Identify by a method of the study."""
-    return identifier(name, p.blocks)(p.posed(), rng, silent).parameters
+    (found,) = identifier(name, method_settings(name, p.blocks))([p.posed()], [rng], silent)
+    return found.parameters
 
 
 def by_scipy(p: Problem, rng: np.random.Generator) -> Array:

@@ -17,9 +17,9 @@ from biogrip.sample import MODELS
 SAMPLES, MEANS_OF = 200_000, 50
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([34.0, 12.0, 300.0])
 _RNG = np.random.default_rng(6)
-TIMES = {
-    "uniform": np.arange(SAMPLES) * (400.0 / SAMPLES),
-    "irregular": np.unique(np.round(_RNG.uniform(0.0, 400.0, SAMPLES), 7)),
+TIMES: dict[str, Array] = {
+    "uniform": np.arange(SAMPLES, dtype=np.float64) * (400.0 / SAMPLES),
+    "irregular": np.unique(np.round(_RNG.uniform(0.0, 400.0, SAMPLES), 7)).astype(float),
 }
 
 

@@ -62,17 +62,27 @@ def test_results_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert run.output.count("\n") <= 25
 
 
-def test_a_damaged_target_is_named(finished: Path, tmp_path: Path) -> None:
+def test_a_damaged_target_is_named_and_made_again(finished: Path, tmp_path: Path) -> None:
     study = tmp_path / "study"
     shutil.copytree(finished, study)
     target = study / "results/targets/endothelial_cell.csv"
+    whole = target.read_bytes()
     target.write_text("time,angle\n1,2\n")
     for file in (study / "results/measurements/endothelial_cell").iterdir():
         file.unlink()
+    # By a job's command alone nothing is made again.
+    command = [sys.executable, "-m", "biogrip", "make", "measurement"]
+    job = ["--case", "endothelial_cell", "--batch", "seeds_0-1"]
+    done = subprocess.run([*command, *job], cwd=study, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "endothelial_cell.csv, line 1: found the columns time, angle" in done.stderr
+    assert "Traceback" not in done.stderr
     run = snakemake(study, "results/measurements/endothelial_cell/seeds_0-1.parquet")
-    assert run.status != 0
-    assert "endothelial_cell.csv, line 1: found the columns time, angle" in run.output
-    assert "Traceback" not in run.output
+    assert run.status == 0, run.output
+    kept = "results/targets/endothelial_cell.csv.edited"
+    assert f"kept as {kept}; making it again" in run.output
+    assert (study / kept).read_text() == "time,angle\n1,2\n"
+    assert target.read_bytes() == whole
 
 
 def started(folder: Path, *targets: str) -> "subprocess.Popen[bytes]":
