@@ -224,8 +224,7 @@ def test_what_cannot_be_fitted_together_is_fitted_one_by_one() -> None:
     times = np.array([1.0, 10.0, 100.0, 199.0, 205.0, 250.0, 390.0])
     network = MODEL.network([[SAMPLES["liquid_drop_2"][name] for name in MODEL.names]])
     response = rotation(step_response(GRIPPER, network, inertia=False), TORQUE, times)[0]
-    # Each with responses of its own.
-    problems = [posed(times, response, 1, nonlinear=True)[0] for _ in range(2)]
+    problems = posed(times, response, 2, nonlinear=True)
     assert not fit_together(problems)
     rngs = [np.random.default_rng(seed) for seed in range(2)]
     for seed, answer in enumerate(least_squares.identify_many(problems, few, rngs)):
