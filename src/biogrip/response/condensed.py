@@ -53,7 +53,7 @@ class Condensed:
         self, torque: TorqueHistory, time_s: Array, nuisance: Array, *, nonlinear: bool = False
     ) -> None:
         self.nuisance = nuisance
-        self._nonlinear = nonlinear
+        self.nonlinear = nonlinear
         self._torque = torque
         self._all_s = time_s
 
@@ -108,12 +108,12 @@ class Condensed:
     @cached_property
     def _edges_s(self) -> Array:
         """Edges of the mesh of a correction, if there is one."""
-        return mesh(self._torque, COARSE) if self._nonlinear else np.zeros(0)
+        return mesh(self._torque, COARSE) if self.nonlinear else np.zeros(0)
 
     @cached_property
     def _corrections(self) -> Array:
         """Rows of the nodes of what corrections are a sum of, (n_functions, n_nodes)."""
-        if not self._nonlinear:
+        if not self.nonlinear:
             return np.zeros((0, len(self._dense.time_s)))
         functions = mesh_functions(self._edges_s, self._dense.time_s)
         return self._dense.rows_of_values(functions)

@@ -125,7 +125,8 @@ class Residuals:
     @property
     def condensable(self) -> bool:
         """Whether few rows may stand for all samples."""
-        return self._condensed.possible
+        condensed = self._condensed
+        return condensed.possible and (condensed.nonlinear or not self.nonlinear)
 
     @cached_property
     def condensed_trace(self) -> Array:
