@@ -338,3 +338,24 @@ def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
         return model.network(np.stack(filled, axis=1))
 
     return replace(model, parameters=free, network=network)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Which constitutive model a sample has.
+
+    Parameters
+    ----------
+    name
+        Name of the model.
+    branches
+        Number of Maxwell branches of a generalized one.
+    """
+
+    name: str
+    branches: int = 1
+
+    @property
+    def model(self) -> SampleModel:
+        """The model itself."""
+        return model_named(self.name, self.branches)

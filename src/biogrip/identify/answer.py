@@ -46,7 +46,8 @@ class Identification:
     generations
         Number of steps: generations, or local fits.
     evaluations
-        Responses simulated; one with its derivatives counts as one.
+        Responses simulated; one with its derivatives counts as one. Those by which an
+        optimum is settled to its last digits are left out.
     stop_reason
         Why it stopped there.
     history

@@ -14,28 +14,7 @@ from biogrip.identify.genome import GeneRange
 from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.protocol import Phase, TorqueHistory, torque_history
 from biogrip.response.condensed import Condensed
-from biogrip.sample import SampleModel, model_named, with_fixed
-
-
-@dataclass(frozen=True)
-class Sample:
-    """Which constitutive model a sample has.
-
-    Parameters
-    ----------
-    name
-        Name of the model.
-    branches
-        Number of Maxwell branches of a generalized one.
-    """
-
-    name: str
-    branches: int = 1
-
-    @property
-    def model(self) -> SampleModel:
-        """The model itself."""
-        return model_named(self.name, self.branches)
+from biogrip.sample import Sample, SampleModel, with_fixed
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,8 @@ def best_of_many_starts(
     answers = []
     for own, first_row in enumerate(before):
         rows = _descents(rough.of(np.flatnonzero(trace == own)), first_row)
-        finished = fine.evaluations[trace[finalists] == own].sum() + best.evaluations[own]
+        # Not the steps that settle it: how many it takes, the last bits of a processor decide.
+        finished = fine.evaluations[trace[finalists] == own].sum()
         misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
         progress(evaluations, misfit_rad)

@@ -35,7 +35,7 @@ def _plain(value: object) -> Any:
         ]
     if isinstance(value, Mapping):
         return [[str(key), _plain(inner)] for key, inner in value.items()]
-    if isinstance(value, list | tuple | set | frozenset):
+    if isinstance(value, list | tuple):
         return [_plain(inner) for inner in value]
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())

@@ -7,7 +7,8 @@ from pathlib import Path
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
-from biogrip.running.manifest import Manifest, set_aside
+from biogrip.running.manifest import Manifest
+from biogrip.running.wholeness import make_room
 from biogrip.study.study import Study
 
 NAME = "study.json"
@@ -32,7 +33,7 @@ def write_study(study: Study, results: Path) -> None:
         if file.read_text(encoding="utf-8", errors="replace") == text:
             return
         if not manifest.was_written(NAME):
-            set_aside(file)
+            make_room(manifest, results, NAME, changing=True)
     with recorded_in(results):
         write_text(file, text)
 
@@ -47,10 +48,13 @@ def read_study(results: Path) -> Study:
     """
     file = results / NAME
     try:
-        return Study(json.loads(file.read_text(encoding="utf-8")))
+        study = Study(json.loads(file.read_text(encoding="utf-8")))
+        # What of it is wrong would come to light in the middle of something else.
+        _ = study.cases, study.points, study.sweeps, study.shown, study.study_seed
+        return study
     except FileNotFoundError as error:
         raise BiogripError(
             f"{file}: there is none, for no study was run here; allowed is what a run has begun."
         ) from error
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{file}: cannot be read as a study: {error}.") from error
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        raise BiogripError(f"{file}: cannot be read as a study: {error!r}.") from error

@@ -16,7 +16,7 @@ import biogrip
 _PACKAGE = Path(biogrip.__file__).parent
 _SAYING = (
     "biogrip.study",
-    *(f"biogrip.products.{name}" for name in ("product", "plan", "batches", "digest")),
+    *(f"biogrip.products.{name}" for name in ("product", "plan", "digest")),
     *(f"biogrip.products.{folder}.declared" for folder in ("tables", "figures")),
 )
 

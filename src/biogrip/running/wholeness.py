@@ -95,7 +95,7 @@ def check_results(
             gone.append(path)
         elif not manifest.is_whole(path) and may_make(str(file)):
             refuse_links(results, [file])
-            _make_room(manifest, results, path, changing=changing)
+            make_room(manifest, results, path, changing=changing)
             gone.append(path)
     if changing and manifest.paths:
         manifest.forget(gone)
@@ -185,7 +185,18 @@ def _check_writable(results: Path) -> None:
             ) from error
 
 
-def _make_room(manifest: Manifest, results: Path, path: str, *, changing: bool) -> None:
+def make_room(manifest: Manifest, results: Path, path: str, *, changing: bool) -> None:
+    """Clear the place of a recorded file that is not what was written, and say how.
+
+    Parameters
+    ----------
+    manifest, results
+        The record, and where the files are.
+    path
+        The file, from the results folder on.
+    changing
+        Whether to do it, or only say what would be done.
+    """
     file = results / path
     if file.stat().st_size == 0 or manifest.was_written(path):
         how = "was emptied" if file.stat().st_size == 0 else "is of an earlier run"

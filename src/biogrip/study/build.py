@@ -1,18 +1,15 @@
 """From plain config blocks to the objects of the field."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from biogrip.actuator import CombDrive, capacitance_slope
-from biogrip.arrays import Array
 from biogrip.contact import Contact, contact
 from biogrip.gripper import Arm, Gripper
 from biogrip.identify.genome import GeneRange
-from biogrip.protocol import Harmonic, Load, Phase, sample_times
+from biogrip.protocol import Harmonic, Load, Phase
 from biogrip.sample import SampleModel, model_named
 
 
@@ -48,11 +45,6 @@ def phases(protocol: Mapping[str, Any], actuator: Mapping[str, Any]) -> tuple[Ph
     """Build the phases of a ``protocol`` block, voltages turned into torques (eq. 9)."""
     per_square_volt = 0.5 * capacitance_slope(comb_drive(actuator))
     return tuple(_phase(phase, per_square_volt) for phase in protocol["phases"])
-
-
-def sampling(rate_Hz: float, times_s: Sequence[float], end_s: float) -> Array:
-    """Sampling times in s: those that are given, or at a rate until the end."""
-    return np.array(times_s, dtype=float) if times_s else sample_times(end_s, rate_Hz)
 
 
 def gene_ranges(block: Mapping[str, Any]) -> dict[str, GeneRange]:

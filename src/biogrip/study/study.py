@@ -2,98 +2,25 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 from biogrip.actuator import CombDrive
-from biogrip.arrays import Array
 from biogrip.calibration import CalibrationTest
 from biogrip.gripper import Gripper
-from biogrip.identify.case_problem import CaseProblem, Sample
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import method_settings
 from biogrip.measurement import Noise
 from biogrip.protocol import Phase, torque_history
 from biogrip.recordings import Columns
-from biogrip.sample import Parameter, SampleModel
+from biogrip.sample import Sample
+from biogrip.sampling import Sampling
 from biogrip.study import build
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
-
-
-@dataclass(frozen=True)
-class Published:
-    """What the paper reports of a sample; data to compare with.
-
-    Parameters
-    ----------
-    table, figure, generation
-        Numbers of the table and of the figure; generation at which the figure
-        shows the fit. None where the paper has none.
-    axis_rad
-        Ends of the figure's rotation axis.
-    identified, error_percent
-        Identified parameters in SI units, and their errors as printed, by name.
-    """
-
-    table: int | None = None
-    figure: int | None = None
-    generation: int | None = None
-    axis_rad: tuple[float, ...] = ()
-    identified: Mapping[str, float] = field(default_factory=dict)
-    error_percent: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Sampling:
-    """When the rotation is sampled.
-
-    Parameters
-    ----------
-    rate_Hz
-        Uniform rate, from 0 to the end of the protocol.
-    times_s
-        Instants, instead.
-    """
-
-    rate_Hz: float
-    times_s: tuple[float, ...] = ()
-
-    def over(self, end_s: float) -> Array:
-        """Sampling instants in s, (n_samples,), of a protocol that ends then."""
-        return build.sampling(self.rate_Hz, self.times_s, end_s)
-
-
-@dataclass(frozen=True)
-class Truth:
-    """What is known of a sample that was simulated, and what the paper says of it.
-
-    Parameters
-    ----------
-    title
-        Name in print.
-    sample
-        Its constitutive model.
-    parameters
-        True values by name, SI units; empty if the trace was recorded.
-    published
-        What the paper reports.
-    """
-
-    title: str
-    sample: Sample
-    parameters: Mapping[str, float]
-    published: Published
-
-    @property
-    def model(self) -> SampleModel:
-        """Constitutive model."""
-        return self.sample.model
-
-    def target(self, quantity: list[Parameter]) -> float | None:
-        """Return the true value of a parameter or a sum, unless the trace was recorded."""
-        return sum(self.parameters[p.name] for p in quantity) if self.parameters else None
+from biogrip.truth import Published, Truth
 
 
 @dataclass(frozen=True)

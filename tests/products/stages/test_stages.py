@@ -5,10 +5,10 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.case_problem import Sample
 from biogrip.products.stages import joined, target
 from biogrip.protocol import held
-from biogrip.study.study import Sampling
+from biogrip.sample import Sample
+from biogrip.sampling import Sampling
 from tests.products.default import STUDY
 
 

@@ -31,7 +31,7 @@ def drawing(
     reads: Mapping[str, Reads] | None = None,
     cases: Callable[[Study], Iterable[str]] | None = None,
     sweeps: bool = False,
-    sheet: str = "figures",
+    sheet: str = "",
     when: Callable[[Study], bool] = lambda _: True,
     weight: Weight | None = None,
 ) -> Product:

@@ -12,7 +12,8 @@ from biogrip.products.figures.results import read_history, seeds_in_words
 from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
-from biogrip.study.study import Case, Study, Truth
+from biogrip.study.study import Case, Study
+from biogrip.truth import Truth
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from biogrip.products.tables.linearisation import CAPTION
 from biogrip.protocol import TorqueHistory, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
-from biogrip.study.study import Truth
+from biogrip.truth import Truth
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3

@@ -35,7 +35,8 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.stages.calibrated import calibration_of
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 _WORST = 1e3
 _TITLE_LETTERS = 19

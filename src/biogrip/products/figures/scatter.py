@@ -31,7 +31,8 @@ from biogrip.products.figures.style import (
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import the
-from biogrip.study.study import Case, Study, Truth
+from biogrip.study.study import Case, Study
+from biogrip.truth import Truth
 
 # Beyond this bound (of a logarithm) an axis covers decades, not percents.
 _LOOSE = 0.25

@@ -8,7 +8,6 @@ import pyarrow.parquet as pq
 
 from biogrip.errors import BiogripError
 from biogrip.files import written_whole
-from biogrip.identify.case_problem import Sample
 from biogrip.products.files.identifications import (
     BATCHES,
     HISTORIES,
@@ -19,6 +18,7 @@ from biogrip.products.files.identifications import (
 from biogrip.products.files.rows import read_rows, write_rows
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, of_batches, wildcards_of
+from biogrip.sample import Sample
 from biogrip.study.study import Study
 
 

@@ -14,7 +14,8 @@ from biogrip.protocol import Phase, TorqueHistory, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.sample import Network
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 DIFFERENCES = RowFile(
     "a comparison",

@@ -19,7 +19,8 @@ from biogrip.products.files.rows import RowFile
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.study import Sampling, Study
+from biogrip.sampling import Sampling
+from biogrip.study.study import Study
 
 POINTS = RowFile(
     "a sweep",

@@ -41,6 +41,7 @@ ALL_ERRORS = table(
     stem="results/tables/errors",
     item="errors",
     caption=CAPTION,
+    sheet="tables",
     settings=lambda study: None,
     reads={"tables": of_cases(ERRORS.writes["csv"], lambda study: study.cases)},
 )

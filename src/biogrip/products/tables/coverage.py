@@ -128,6 +128,7 @@ COVERAGE = table(
     item="coverage",
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
     "their 95 % intervals hold the truth.",
+    sheet="tables",
     settings=settings,
     reads={
         "targets": of_cases(TARGETS, lambda study: study.covered),

@@ -21,7 +21,7 @@ def table(
     reads: Mapping[str, Reads] | None = None,
     cases: Callable[[Study], Iterable[str]] | None = None,
     sweeps: bool = False,
-    sheet: str = "tables",
+    sheet: str = "",
     when: Callable[[Study], bool] = lambda _: True,
     weight: Weight = LIGHT,
     stem: str = "results/tables/{name}",

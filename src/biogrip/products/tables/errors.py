@@ -12,7 +12,8 @@ from biogrip.products.product import EVALUATION, the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
 from biogrip.sample import Parameter
-from biogrip.study.study import Case, Study, Truth
+from biogrip.study.study import Case, Study
+from biogrip.truth import Truth
 
 TABLE_COLUMNS = (
     Column("case", "Case"),

@@ -17,7 +17,8 @@ from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.sample import SINGLE_BRANCH
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 _COLUMNS = (
     Column("quantity", "Quantity"),
@@ -185,6 +186,7 @@ EVIDENCE = table(
     item="evidence",
     caption="Statements of the paper beside what the study computes, and what speaks for the "
     "reconstructed values.",
+    sheet="tables",
     settings=settings,
     reads={
         "identifications": of_cases(PATH, lambda study: study.published),

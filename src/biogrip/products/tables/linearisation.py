@@ -65,6 +65,7 @@ LINEARISATION = table(
     name="linearisation",
     item="linearisation",
     caption=CAPTION,
+    sheet="tables",
     settings=lambda study: None,
     reads={"differences": the(DIFFERENCES.path)},
     when=lambda study: bool(study.simulated),

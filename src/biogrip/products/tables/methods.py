@@ -15,7 +15,8 @@ from biogrip.products.tables.declared import table
 from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.sample import Parameter
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 _LEADING = (
     Column("case", "Case"),
@@ -120,6 +121,7 @@ METHODS_COMPARED = table(
     item="methods",
     caption="The identifiers on the same traces: share of seeds at the global optimum and at the "
     "noise floor, responses simulated, errors.",
+    sheet="tables",
     settings=settings,
     reads={"identifications": of_cases(PATH, lambda study: study.simulated)},
     when=lambda study: bool(study.simulated),

@@ -76,6 +76,7 @@ MODELS_COMPARED = table(
     item="sample models",
     caption="Which sample model is the simplest that the traces ask for, by AIC and BIC, counted "
     "over seeds.",
+    sheet="tables",
     settings=settings,
     reads={"fits": of_cases(MODEL_FITS.path, lambda study: study.cases)},
     when=lambda study: bool(study.models),

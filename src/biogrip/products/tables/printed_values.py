@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from biogrip.identify.genome import GeneRange, nearest_encodable
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -70,6 +71,7 @@ PRINTED_VALUES = table(
     item="printed values",
     caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
     "encoding, ranges and error formula.",
+    sheet="tables",
     settings=settings,
     when=lambda study: bool(study.published),
 )

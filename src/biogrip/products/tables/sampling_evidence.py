@@ -13,7 +13,8 @@ from biogrip.products.tables.declared import table
 from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.protocol import sample_times
-from biogrip.study.study import Study, Truth
+from biogrip.study.study import Study
+from biogrip.truth import Truth
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 _DETERMINED_PERCENT = 100.0
@@ -105,6 +106,7 @@ SAMPLING_EVIDENCE = table(
     caption="The errors that the paper prints, beside the standard deviations that 10 % noise "
     "leaves at least at several sampling rates. Only near the rate at which the two are alike, on "
     "average over the rows, can the paper's traces have been sampled; that rate is reconstructed.",
+    sheet="tables",
     settings=settings,
     when=lambda study: bool(study.published),
 )

@@ -42,6 +42,7 @@ TIMES = table(
     stem="results/timings",
     item="processor times",
     caption="Processor time of the identifications on the machine that made this report.",
+    sheet="tables",
     settings=lambda study: None,
     reads={"times": of_cases(TIMINGS.path, lambda study: study.cases)},
 )
