@@ -3,6 +3,7 @@ from pathlib import Path
 
 import pytest
 
+from biogrip.cli import main
 from tests.generated_docs import GENERATED, ROOT, renewed
 
 
@@ -12,9 +13,28 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
     assert renewed(document) == document.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("document", ["README.md", "config/README.md", *Path("docs").glob("*.md")])
+@pytest.mark.parametrize(
+    "document",
+    [
+        "README.md",
+        "config/README.md",
+        *sorted(path.relative_to(ROOT) for path in (ROOT / "docs").glob("*.md")),
+    ],
+)
 def test_links_lead_somewhere(document: str | Path) -> None:
     path = ROOT / document
     text = path.read_text(encoding="utf-8")
     for link in re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text):
         assert not link or (path.parent / link).exists(), link
+
+
+def test_the_readme_shows_what_the_example_prints(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = ROOT / "data" / "example_trace.csv"
+    assert main(["identify", str(trace), "--output", str(tmp_path / "found.json")]) == 0
+    printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    shown = (ROOT / "README.md").read_text(encoding="utf-8").split("prints\n")[1].split("\n\n")[0]
+    lines = [line.strip() for line in shown.strip().splitlines()]
+    assert len(lines) == 5
+    assert [line for line in lines if line not in printed] == []
