@@ -11,7 +11,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tests.workflow.conftest import ROOT, SMALL, snakemake, tables
+from tests.workflow.conftest import ROOT, SMALL, results_of, snakemake, tables
 
 BAD = {
     "misspelt key": ("seedz: 3", "overlay.yaml, line 1: seedz: unknown key. Did you mean 'seeds'?"),
@@ -94,18 +94,6 @@ def started(folder: Path, *targets: str) -> "subprocess.Popen[bytes]":
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
 
 
-def whole_results(folder: Path) -> dict[str, bytes]:
-    """Every result by name, but for times and logs, which differ from run to run."""
-    results = folder / "results"
-    return {
-        str(path.relative_to(results)): path.read_bytes()
-        for path in sorted(results.rglob("*"))
-        if path.is_file()
-        and path.relative_to(results).parts[0] not in ("logs", "timings")
-        and not path.name.startswith("timings.")
-    }
-
-
 def test_a_killed_run_continues_with_the_same_command(finished: Path, tmp_path: Path) -> None:
     """Kill -9 of Snakemake in mid-run: the second call needs no other flag."""
     wanted = [f"results/tables/{name}.csv" for name in ("errors", "methods")]
@@ -122,7 +110,7 @@ def test_a_killed_run_continues_with_the_same_command(finished: Path, tmp_path: 
     assert run.status == 0, run.output
     # Of 12, three were there; of these, one may not have been written down.
     assert 0 < run.jobs("identification") < 12
-    ours, theirs = whole_results(tmp_path), whole_results(finished)
+    ours, theirs = results_of(tmp_path), results_of(finished)
     assert set(wanted) <= {f"results/{name}" for name in ours}
     assert [name for name in ours if ours[name] != theirs[name]] == []
 
@@ -144,7 +132,7 @@ def test_a_killed_job_is_done_again_with_the_same_command(finished: Path, tmp_pa
     assert process.wait(60) != 0
     run = snakemake(study)
     assert run.status == 0, run.output
-    assert whole_results(study) == whole_results(finished)
+    assert results_of(study) == results_of(finished)
 
 
 def is_identification(process: psutil.Process) -> bool:
@@ -175,7 +163,7 @@ def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Pa
         full = snakemake(study)
         filler.unlink()
         run = snakemake(study)
-        results = whole_results(study)
+        results = results_of(study)
     finally:
         subprocess.run(["umount", str(disk)], check=True)
     # The jobs' messages go to logs, which found no room either.
@@ -183,7 +171,7 @@ def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Pa
     assert full.status != 0
     assert "results: results cannot be written here: No space left on device" in full.output
     assert run.status == 0, run.output
-    assert results == whole_results(finished)
+    assert results == results_of(finished)
 
 
 def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None:

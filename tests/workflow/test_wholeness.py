@@ -142,7 +142,7 @@ def test_looking_changes_nothing(study: Path) -> None:
     errors = study / "results" / "tables" / "errors.csv"
     errors.write_text("edited")
     before = results_of(study)
-    for look in ("-n", "--summary", "--lint", "--list-rules", "--dag"):
+    for look in ("-n", "--summary", "--list-rules", "--dag"):
         run = snakemake(study, look, config=TINY)
         assert run.status == 0, run.output
         assert results_of(study) == before

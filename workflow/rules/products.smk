@@ -6,7 +6,9 @@ def reported(sheet):
     found = sheet.outputs
     for product in sheet.products:
         if product.category:
-            kind = next(kind for kind in ("png", "html", "page") if kind in product.writes)
+            kind = next(
+                kind for kind in ("png", "html", "page") if kind in product.writes
+            )
             labels = {
                 "case": "{case}" if "case" in sheet.wildcards else "all",
                 "item": product.item,
@@ -34,15 +36,15 @@ for sheet in SHEETS:
             sheet.log,
         wildcard_constraints:
             **sheet.constraints,
-        params:
-            job=sheet.command,
-            made_of=sheet.digest,
-        resources:
-            runtime=sheet.runtime,
-            mem_mb=sheet.megabytes,
         group:
             sheet.weight.group
         localrule: sheet.weight.local
+        resources:
+            runtime=sheet.runtime,
+            mem_mb=sheet.megabytes,
+        params:
+            job=sheet.command,
+            made_of=sheet.digest,
         message:
             sheet.message
         shell:

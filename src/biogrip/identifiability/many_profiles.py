@@ -102,7 +102,7 @@ class _Points:
         for side in (point <= start, point > start):
             here = profile[side], point[side]
             before, after = self.rises[here], rises[side]
-            news[here] |= after < before - _NEWS * (1 + after)
+            news[here] |= after < before - _NEWS * (1 + np.abs(after))
             better = after < before
             at = here[0][better], here[1][better]
             self.rises[at], self.x[at] = after[better], x[side][better]

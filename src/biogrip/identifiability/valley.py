@@ -100,7 +100,7 @@ def _rises_at_once(
         news = np.zeros(len(x), dtype=bool)
         for point, rise, parameters in zip(points, found, fitted, strict=True):
             if rise < rises[point]:
-                news[point] |= rise < rises[point] - _NEWS * (1 + rise)
+                news[point] |= rise < rises[point] - _NEWS * (1 + abs(rise))
                 rises[point], x[point] = rise, parameters
         origin = np.repeat(np.flatnonzero(news), 4)
         points = neighbours[:, news].T.ravel()
