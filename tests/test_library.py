@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 import biogrip
+from biogrip import library
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 
@@ -23,6 +24,11 @@ def test_what_the_documentation_shows_runs(
     (k_p,) = (f for f in told.findings if f.quantity.label == "k_p")  # type: ignore[attr-defined]
     assert k_p.low < 5.0 < k_p.high
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_all_of_the_library_can_be_had_from_the_package() -> None:
+    assert set(library.__all__) == biogrip._LIBRARY
+    assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
 
 
 def test_what_is_not_there_is_said_as_everywhere() -> None:

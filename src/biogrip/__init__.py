@@ -12,10 +12,17 @@ from importlib import import_module
 __version__ = "0.1.0"
 
 
+_LIBRARY = frozenset(
+    (
+        *("Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper", "Identification", "Noise"),
+        *("Phase", "Sample", "add_noise", "held", "identify_sample", "judge", "plot", "set_up"),
+        "simulate",
+    )
+)
+
+
 def __getattr__(name: str) -> object:
-    # Jobs import this package hundreds of times, and the library hardly ever.
-    if not name.startswith("_"):
-        library = import_module("biogrip.library")
-        if name in library.__all__:
-            return getattr(library, name)
+    # Jobs import this package hundreds of times, and the library never.
+    if name in _LIBRARY:
+        return getattr(import_module("biogrip.library"), name)
     raise AttributeError(f"module 'biogrip' has no attribute '{name}'")
