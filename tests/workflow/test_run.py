@@ -15,10 +15,13 @@ from tests.workflow.conftest import TINY
 
 BAD = {
     "missing": (None, r"my.yaml: cannot be read: No such file"),
-    "tab": ("seeds: 4\n\tx: 1\n", r"my.yaml, line 2: not valid YAML: found character '\\t'"),
+    "tab": ("seeds: 4\n\tx: 1\n", r"my.yaml, line 2: not valid YAML: found a tab character"),
     "bracket": ("methods: [genetic\nseeds: 3\n", r"my.yaml, line \d: not valid YAML"),
-    "list": ("- seeds\n", r"my.yaml: found no keys"),
-    "not UTF-8": (b"seeds: 3 # \xff\n", r"my.yaml.*: is not UTF-8 text"),
+    "list": ("- seeds\n", r"my.yaml, line 1: found no keys"),
+    "not UTF-8": (
+        b"seeds: 3 # \xff\n",
+        r"my.yaml, line 1: found the byte 0xff, allowed is text in UTF-8",
+    ),
     "unknown key": ("seedz: 3\n", r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'"),
     "program": (
         '__use_yte__: true\nseeds: ?__import__("os").system("touch {folder}/ran")\n',
