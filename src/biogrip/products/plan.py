@@ -48,7 +48,7 @@ class Plan:
         # Listed once: a plan does not change while it is carried out.
         if folder not in self._planned:
             whose = self.study.case(case)
-            seeds = self.study.coverage_seeds(whose) if stage == "coverage" else whose.seeds
+            seeds = whose.coverage_seeds if stage == "coverage" else whose.seeds
             existing = existing_batches(self.results.joinpath(*folder))
             size = self.study.batch_size or seeds_a_batch(seeds)
             self._planned[folder] = plan_batches(seeds, size, existing)

@@ -148,3 +148,41 @@ class Product:
 def wildcards_of(names: Iterable[str]) -> list[Wildcards]:
     """Jobs that are one a case."""
     return [{"case": name} for name in names]
+
+
+@dataclass(frozen=True)
+class Scope:
+    """Of what there is a table or figure: of the study, of each of some cases, or of each sweep.
+
+    Parameters
+    ----------
+    cases
+        Which cases; None where it is not of cases.
+    sweeps
+        Whether it is of sweeps.
+    when
+        Whether a study has it.
+    """
+
+    cases: Callable[[Study], Iterable[str]] | None
+    sweeps: bool
+    when: Callable[[Study], bool]
+
+    @property
+    def whose(self) -> str:
+        """The wildcard in braces; nothing of the study's."""
+        return "{case}" if self.cases else "{sweep}" if self.sweeps else ""
+
+    def jobs(self, plan: Plan) -> list[Wildcards]:
+        """Jobs that a study has of it."""
+        if not self.when(plan.study):
+            return []
+        if self.sweeps:
+            return [{"sweep": sweep} for sweep in plan.study.sweeps]
+        return wildcards_of(self.cases(plan.study)) if self.cases else [{}]
+
+    def settings(self, choose: Callable[..., object], study: Study, job: Wildcards) -> object:
+        """Call a function that chooses settings with the study, and the case or sweep."""
+        if self.sweeps:
+            return choose(study, study.sweeps[job["sweep"]])
+        return choose(study, study.case(job["case"])) if self.cases else choose(study)

@@ -28,7 +28,7 @@ def fingerprint(*modules: str) -> str:
     Parameters
     ----------
     modules
-        For example ``"biogrip.stages.target"``.
+        For example ``"biogrip.products.stages.target"``.
     """
     digest = hashlib.sha256()
     for file in source_files(*modules):
@@ -42,7 +42,7 @@ def source_files(*modules: str) -> list[str]:
     Parameters
     ----------
     modules
-        For example ``"biogrip.stages.target"``.
+        For example ``"biogrip.products.stages.target"``.
     """
     seen: set[str] = set()
     waiting = list(modules)

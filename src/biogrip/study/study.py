@@ -342,7 +342,3 @@ class Study:
     def published(self) -> list[str]:
         """Cases that the paper reports on."""
         return [name for name, case in self.cases.items() if case.published.table is not None]
-
-    def coverage_seeds(self, case: Case) -> int:
-        """Over how many seeds the intervals of a case are tested."""
-        return case.coverage_seeds

@@ -1,22 +1,21 @@
 """How a figure declares itself."""
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 
 from biogrip.products.figures.style import save, styled
-from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import (
     EVALUATION,
     FIGURE_KINDS,
     LIGHT,
     Product,
     Reads,
+    Scope,
     Weight,
-    wildcards_of,
 )
 from biogrip.study.study import Study
 
@@ -62,20 +61,9 @@ def drawing(
     weight
         How heavy its job is, if not as most.
     """
-    whose = "{case}" if cases else "{sweep}" if sweeps else ""
+    scope = Scope(cases, sweeps, when)
+    whose = scope.whose
     path = f"results/figures/{file or name}" + (f"_{whose}" if whose else "")
-
-    def jobs(plan: Plan) -> list[Wildcards]:
-        if not when(plan.study):
-            return []
-        if sweeps:
-            return [{"sweep": sweep} for sweep in plan.study.sweeps]
-        return wildcards_of(cases(plan.study)) if cases else [{}]
-
-    def chosen(study: Study, job: Wildcards) -> object:
-        if sweeps:
-            return settings(study, study.sweeps[job["sweep"]])
-        return settings(study, study.case(job["case"])) if cases else settings(study)
 
     @wraps(draw)
     def saved(given: object, *, png: Path, pdf: Path, **files: Any) -> None:
@@ -86,8 +74,8 @@ def drawing(
         name,
         {kind[1:]: path + kind for kind in FIGURE_KINDS},
         saved,
-        chosen,
-        jobs,
+        partial(scope.settings, settings),
+        scope.jobs,
         message=f"Drawing {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight or (EVALUATION if cases else LIGHT),

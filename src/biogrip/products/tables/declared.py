@@ -1,12 +1,11 @@
 """How a table declares itself."""
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Any
 
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import LIGHT, TABLE_KINDS, Product, Reads, Weight, wildcards_of
+from biogrip.products.product import LIGHT, TABLE_KINDS, Product, Reads, Scope, Weight
 from biogrip.products.tables.layout import Table, write
 from biogrip.study.study import Study
 
@@ -53,20 +52,9 @@ def table(
     stem
         Path but for the ending.
     """
-    whose = "{case}" if cases else "{sweep}" if sweeps else ""
+    scope = Scope(cases, sweeps, when)
+    whose = scope.whose
     path = stem.format(name=name) + (f"_{whose}" if whose else "")
-
-    def jobs(plan: Plan) -> list[Wildcards]:
-        if not when(plan.study):
-            return []
-        if sweeps:
-            return [{"sweep": sweep} for sweep in plan.study.sweeps]
-        return wildcards_of(cases(plan.study)) if cases else [{}]
-
-    def chosen(study: Study, job: Wildcards) -> object:
-        if sweeps:
-            return settings(study, study.sweeps[job["sweep"]])
-        return settings(study, study.case(job["case"])) if cases else settings(study)
 
     @wraps(make)
     def written(given: object, *, csv: Path, **files: Any) -> None:
@@ -78,8 +66,8 @@ def table(
         name,
         {kind[1:]: path + kind for kind in TABLE_KINDS},
         written,
-        chosen,
-        jobs,
+        partial(scope.settings, settings),
+        scope.jobs,
         message=f"Writing the table {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight,
