@@ -13,7 +13,7 @@ from benchmarks.section import Row, Section, number, times_ours
 from benchmarks.setup import POPULATION, Problem, problem
 from benchmarks.timing import alternate
 from biogrip.arrays import Array
-from biogrip.protocol import torque_at
+from biogrip.experiment.protocol import torque_at
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_formed import FormedMisfit
 

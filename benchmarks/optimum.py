@@ -17,10 +17,10 @@ from benchmarks.section import Row, Section, number
 from benchmarks.setup import NOISE_FLOOR, Problem, problem
 from benchmarks.timing import clocked, time_to_success
 from biogrip.arrays import Array
+from biogrip.experiment.noise import rms
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import METHODS as OURS
 from biogrip.identify.methods import identifier, method_settings
-from biogrip.measurement import rms
 
 Method = Callable[[Problem, np.random.Generator], Array]
 """Finds parameters of low misfit, from the trace on."""

@@ -9,17 +9,17 @@ import numpy as np
 import yaml
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.noise import add_noise, rms
+from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.experiment.sample import SampleModel, model_named
 from biogrip.identify.genetic import settings_of as genetic_settings
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
 from biogrip.identify.problem import problem_of
-from biogrip.measurement import add_noise, rms
-from biogrip.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import misfit_of
-from biogrip.sample import SampleModel, model_named
 from biogrip.study.load import load_study
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"

@@ -5,8 +5,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
+from biogrip.instrument.gripper import Arm, Gripper
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

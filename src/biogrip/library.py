@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Arm, Gripper
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import Phase, held
+from biogrip.experiment.sample import Sample
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.measurement import Noise, add_noise
-from biogrip.protocol import Phase, held
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.simulation import simulated_rotation
-from biogrip.sample import Sample
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

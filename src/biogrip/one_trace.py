@@ -13,6 +13,8 @@ from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import MODELS
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
@@ -21,10 +23,8 @@ from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
-from biogrip.random_streams import stream
 from biogrip.response.nuisance import nuisance_basis, within
 from biogrip.response.simulation import simulated_rotation
-from biogrip.sample import MODELS
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.many_limits import limits_of as limits_near
 from biogrip.identifiability.many_profiles import profiles_of
 from biogrip.identifiability.profile import Likelihood, likelihood_of
@@ -19,7 +20,6 @@ from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.random_streams import stream
 from biogrip.study import build
 from tests.identifiability.definition import rise_at, rises_along
 from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run, study_torque

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.experiment.sample import MODELS, SampleModel, model_named
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
 from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
@@ -25,7 +26,6 @@ from biogrip.identifiability.verdicts import (
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS, SampleModel, model_named
 from biogrip.study import build
 from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, problem, run, study_torque
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.experiment.sample import MODELS, model_named
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held_fit import brought_to, held_fit
 from biogrip.identifiability.many_limits import limits_of as limits_near
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.local_fit import FINE, Objective, local_fit, settled
-from biogrip.sample import MODELS, model_named
 from tests.identifiability.definition import Held
 from tests.identifiability.limits_campaign import (
     ALIKE,

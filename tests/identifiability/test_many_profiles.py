@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
+from biogrip.experiment.sample import MODELS, model_named, with_fixed
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.many_limits import many_limits
@@ -13,7 +14,6 @@ from biogrip.identifiability.many_profiles import many_profiles
 from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identify.local_fit import FINE, local_fit
-from biogrip.sample import MODELS, model_named, with_fixed
 from tests.identifiability.definition import Held
 from tests.identify.test_many_fits import identified, of_case
 from tests.identify.test_methods import MODEL

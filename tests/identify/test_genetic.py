@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.gripper import Gripper
+from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic import evolve
 from biogrip.identify.genetic_operators import cross, mutate
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
-from biogrip.measurement import Noise, add_noise, rms
-from biogrip.protocol import TorqueHistory
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.sample import MODELS
 from tests.identify.plain_genetic import chromosomes_of
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)

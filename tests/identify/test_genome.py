@@ -3,8 +3,8 @@ from decimal import Decimal
 import numpy as np
 import pytest
 
+from biogrip.experiment.sample import MODELS
 from biogrip.identify.genome import GeneRange, genome_of, nearest_encodable
-from biogrip.sample import MODELS
 
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}

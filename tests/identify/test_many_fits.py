@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.sample import MODELS, SampleModel, model_named
 from biogrip.identify import genetic_refined, least_squares
 from biogrip.identify.answer import Identification
 from biogrip.identify.levenberg_marquardt import Normal, bounded_step
@@ -16,9 +18,7 @@ from biogrip.identify.many_fits import ManyFits, fit_together
 from biogrip.identify.multi_start import screened
 from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.identify.settling import settled
-from biogrip.measurement import Noise, add_noise
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS, SampleModel, model_named
 from biogrip.study import build
 from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, study_torque
 from tests.response.test_sensitivity import MODEL_PARAMETERS

@@ -10,16 +10,16 @@ import pytest
 import yaml
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.experiment.sample import MODELS
 from biogrip.identify import many_starts, multi_start
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
 from biogrip.identify.methods import METHODS, identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.measurement import Noise, add_noise, rms
-from biogrip.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.residuals import Residuals
-from biogrip.sample import MODELS
 from biogrip.study import build
 
 CONFIG: dict[str, Any] = yaml.safe_load(

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.many_limits import many_limits
 from biogrip.identifiability.profile import Likelihood, likelihood_of
 from biogrip.identifiability.quantities import parameters_and_sum
@@ -13,9 +14,8 @@ from biogrip.identify.genome import GeneRange
 from biogrip.identify.many_fits import ManyFits
 from biogrip.identify.many_starts import fitted_from
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.protocol import held, torque_history
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.nonlinear import nonlinear_rotation
-from biogrip.sample import MODELS
 
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([1.0, 0.05, 10.0])
 RANGES = {

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
 from biogrip.identify import genetic, genetic_refined
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -15,10 +16,9 @@ from biogrip.identify.genome import WORD_BITS, GeneRange, Genome
 from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.identify.redraws import redraws
 from biogrip.identify.selection import best
-from biogrip.protocol import TorqueHistory
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import together
-from biogrip.sample import MODELS, SampleModel, model_named, with_fixed
 from tests.identify.plain_genetic import chromosomes_of, identified
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)

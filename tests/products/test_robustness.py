@@ -8,16 +8,16 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm, Gripper
+from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.products.figures import robustness as figure
 from biogrip.products.figures.style import styled
 from biogrip.products.files.identifications import columns
 from biogrip.products.heat_maps import HeatMaps, headlines, heat_maps
 from biogrip.products.stages import sweep_points as stage
 from biogrip.products.tables.robustness import robustness
-from biogrip.protocol import held, torque_history
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS, generalized_maxwell
 from biogrip.study.study import Study
 from tests.products.default import study_of
 

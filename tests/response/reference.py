@@ -9,8 +9,8 @@ import numpy as np
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.instrument.gripper import Gripper
 
 
 def rotation_50_digits(

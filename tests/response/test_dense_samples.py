@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.protocol import torque_history
+from biogrip.experiment.protocol import torque_history
 from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.sensitivity import responses_of_modes
 from tests.response.test_sensitivity import PROTOCOLS

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.sample import Network, generalized_maxwell
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import Network, generalized_maxwell
 from tests.response.reference import random_samples, rotation_50_digits
 
 # From 0.1 s after the start to the end, close to the step and far from it.

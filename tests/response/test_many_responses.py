@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import torque_history
+from biogrip.experiment.protocol import torque_history
+from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from biogrip.sample import MODELS, SampleModel, model_named
 from tests.response.test_condensed import TIMES
 from tests.response.test_sensitivity import MODEL_PARAMETERS, PROTOCOLS
 

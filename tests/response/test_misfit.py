@@ -3,11 +3,11 @@ import math
 import numpy as np
 import pytest
 
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory, drives, held, sample_times, torque_history
+from biogrip.experiment.protocol import TorqueHistory, drives, held, sample_times, torque_history
+from biogrip.experiment.sample import MODELS
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.sample import MODELS
 from tests.response.reference import random_samples
 
 MODEL = MODELS["generalized_maxwell"]

@@ -9,17 +9,17 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.sample import generalized_maxwell
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.instrument.linkage import rotation_of_tip
 from biogrip.response.linear import RIGHT, rotation, step_response
 from biogrip.response.nonlinear import (
     COARSE,
     FINE,
     correction,
     nonlinear_rotation,
-    rotation_of_tip,
 )
-from biogrip.sample import generalized_maxwell
 from tests.response.reference import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)

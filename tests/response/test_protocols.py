@@ -8,17 +8,17 @@ import pytest
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
-from biogrip.actuator import torque as torque_of_voltage
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import Harmonic, Load, Phase, torque_at, torque_history
+from biogrip.experiment.protocol import Harmonic, Load, Phase, torque_at, torque_history
+from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.instrument.actuator import torque as torque_of_voltage
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import phi_function, rotation, rotation_rate, step_response
 from biogrip.response.misfit import misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.sample import MODELS, generalized_maxwell
 from biogrip.study import build
+from tests.instrument.test_actuator import TABLE_2
 from tests.response.reference import random_samples
-from tests.test_actuator import TABLE_2
 
 ACTUATOR = {
     "thickness_m": 40e-6,

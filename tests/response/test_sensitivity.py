@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.nuisance import nuisance_basis, within, without
 from biogrip.response.residuals import Residuals
 from biogrip.response.sensitivity import rotation_and_sensitivity
-from biogrip.sample import MODELS, SampleModel, model_named, with_fixed
 from tests.response.reference import random_samples, rotation_50_digits
 
 TIMES = np.array([0.1, 1.0, 7.5, 60.0, 199.0, 200.1, 201.0, 230.0, 399.0])

@@ -1,9 +1,9 @@
 import numpy as np
 
-from biogrip.gripper import Gripper
+from biogrip.experiment.sample import MODELS
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import step_response
 from biogrip.response.two_modes import two_modes
-from biogrip.sample import MODELS
 from tests.response.reference import random_samples
 
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 import yaml
 
-from biogrip.actuator import torque
 from biogrip.errors import BiogripError
+from biogrip.instrument.actuator import torque
 from biogrip.products.digest import digest
 from biogrip.products.tables import coverage
 from biogrip.study.load import load_study

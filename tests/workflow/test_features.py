@@ -85,10 +85,10 @@ def test_what_is_fixed_stays(study: Path) -> None:
 
 def test_nonlinear_targets_differ_from_linear_ones_as_the_model_says(study: Path) -> None:
     """By some 1e-4 of the peak at 75 degrees and the paper's torque."""
-    from biogrip.gripper import Arm, Gripper
-    from biogrip.protocol import held, torque_history
+    from biogrip.experiment.protocol import held, torque_history
+    from biogrip.experiment.sample import MODELS
+    from biogrip.instrument.gripper import Arm, Gripper
     from biogrip.response.linear import rotation, step_response
-    from biogrip.sample import MODELS
 
     target = pd.read_csv(study / "targets" / "nonlinear.csv")
     arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)

@@ -9,10 +9,10 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import held, torque_history
+from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.sample import generalized_maxwell
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import generalized_maxwell
 from tests.workflow.conftest import SMALL, snakemake, tables
 
 COLUMNS = (

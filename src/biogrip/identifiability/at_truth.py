@@ -6,10 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.measurement import Noise, standard_deviation
 from biogrip.response.sensitivity import rotation_and_sensitivity
 
 

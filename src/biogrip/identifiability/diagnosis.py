@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.profile import Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
-from biogrip.sample import SampleModel
 
 # A misfit that exceeds what neighbouring samples scatter by so much is not noise.
 _TOO_MUCH = 1.2

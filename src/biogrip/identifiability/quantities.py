@@ -10,7 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.sample import Parameter, SampleModel
+from biogrip.experiment.sample import Parameter, SampleModel
 
 
 @dataclass(frozen=True)

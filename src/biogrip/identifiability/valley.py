@@ -7,11 +7,11 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded
+from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.profile import Likelihood
 from biogrip.identify.local_fit import FAIR, local_fit
 from biogrip.identify.many_fits import fit_together
-from biogrip.sample import SampleModel, with_fixed
 
 # Shares of the first in the sum, and sums over the best sum: fine where the valley is.
 _SHARES = np.linspace(0.002, 0.998, 25)

@@ -6,6 +6,7 @@ from itertools import combinations
 
 import numpy as np
 
+from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.many_profiles import profiles_of
 from biogrip.identifiability.profile import Likelihood, Profile
 from biogrip.identifiability.quantities import (
@@ -13,7 +14,6 @@ from biogrip.identifiability.quantities import (
     combinations_of,
     parameters_and_sum,
 )
-from biogrip.sample import SampleModel
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.calibrated_gripper import read_calibrated_arms
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
+from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.problem import Problem, condensed_of, problem_of
-from biogrip.protocol import Phase, TorqueHistory, torque_history
+from biogrip.instrument.calibrated_gripper import read_calibrated_arms
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
-from biogrip.sample import Sample, SampleModel, with_fixed
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from math import prod
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.sample import SampleModel
+from biogrip.experiment.sample import SampleModel
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import SampleModel
 from biogrip.identify.genome import GeneRange, Genome, genome_of
-from biogrip.protocol import TorqueHistory
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from biogrip.sample import SampleModel
 
 # Forming the responses of a population to more samples takes minutes.
 _MANY_SAMPLES = 20_000

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions

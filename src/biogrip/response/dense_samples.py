@@ -18,7 +18,7 @@ import numpy as np
 from numpy.polynomial import chebyshev, legendre
 
 from biogrip.arrays import Array
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
 
 _NODES = 20
 _DEGREE = _NODES - 1

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueHistory, drives
+from biogrip.experiment.protocol import TorqueHistory, drives
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.roots import real_quadratic_roots, roots, separate
-from biogrip.sample import Network
 
 LEFT, RIGHT = 0, 1
 

@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.sample import SampleModel
 
 Misfit = Callable[[Array], Array]
 """Of parameters of shape (n, n_parameters), the RMS misfit in rad, (n,)."""

@@ -7,12 +7,12 @@ uniform sampling and the linear model.
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import Network, SampleModel
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import COARSE, correction
 from biogrip.response.nuisance import without
-from biogrip.sample import Network, SampleModel
 
 # Numbers formed at once: what fits a processor's cache is faster than all at once.
 _AT_ONCE = 400_000

@@ -19,12 +19,12 @@ from itertools import combinations
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory, drives
+from biogrip.experiment.protocol import TorqueHistory, drives
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.linear import LEFT, is_symmetric, step_response
 from biogrip.response.two_modes import two_modes
-from biogrip.sample import SampleModel
 
 # Individuals looked at together: enough to make calls worth their while, and to stay in the cache.
 _AT_ONCE = 7000

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from biogrip.arrays import Array
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.decay_table import DEGREE, WIDTH
 from biogrip.response.sensitivity import Modes, responses_of_modes
 

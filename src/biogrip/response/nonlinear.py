@@ -25,8 +25,10 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm, Gripper
-from biogrip.protocol import TorqueHistory, drives, torque_at
+from biogrip.experiment.protocol import TorqueHistory, drives, torque_at
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.instrument.linkage import rotation_of_tip
 from biogrip.response.linear import (
     LEFT,
     RIGHT,
@@ -36,7 +38,6 @@ from biogrip.response.linear import (
     rotation_rate,
     step_response,
 )
-from biogrip.sample import Network
 
 STAGES = 5
 
@@ -207,21 +208,6 @@ def correction(
     values = np.concatenate((np.zeros((*shape[:3], 1)), at_nodes), axis=3)
     values[:, :, 1:, 0] = at_nodes[:, :, :-1, -1]
     return Correction(edges, values, converged)
-
-
-def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
-    """Rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
-
-    Solved for phi without a difference of nearly equal cosines; NaN beyond the
-    displacement at which the arms lie flat.
-    """
-    angle = np.radians(gripper.reference_angle_deg)
-    cos, sin = np.cos(angle), np.sin(angle)
-    x = displacement_m / gripper.arm_length_m
-    rest = x * (2 * cos + x)
-    with np.errstate(invalid="ignore"):
-        new_sin = np.sqrt(sin * sin - rest)
-    return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)
 
 
 def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:

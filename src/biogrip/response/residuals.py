@@ -6,8 +6,9 @@ from functools import cached_property
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import LEFT
 from biogrip.response.nuisance import without
@@ -17,7 +18,6 @@ from biogrip.response.sensitivity import (
     modes_of,
     rotation_and_sensitivity,
 )
-from biogrip.sample import SampleModel
 
 # Samples whose rows are formed at once, of the linear model and of what the nonlinear adds.
 _AT_ONCE, _FEW_AT_ONCE = 1000, 50

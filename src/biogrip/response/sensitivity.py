@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import (
     LEFT,
     evaluate,
@@ -27,7 +28,6 @@ from biogrip.response.linear import (
     transfer_functions,
 )
 from biogrip.response.nonlinear import COARSE, Correction, correction
-from biogrip.sample import SampleModel
 
 _TILT = 1e-30
 # The correction is of second order itself; its derivative by differences is good to 1e-6 of that.

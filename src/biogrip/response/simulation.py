@@ -1,11 +1,11 @@
 """The rotation that a sample gives, by whichever model is asked for."""
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
-from biogrip.sample import Network
 
 
 def simulated_rotation(

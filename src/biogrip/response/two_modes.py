@@ -7,9 +7,9 @@ population of a genetic algorithm is small and most of its time goes into calls.
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Arm
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Arm
 from biogrip.response.roots import real_quadratic_roots
-from biogrip.sample import Network
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:

@@ -5,12 +5,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from biogrip.actuator import CombDrive, capacitance_slope
-from biogrip.contact import Contact, contact
-from biogrip.gripper import Arm, Gripper
+from biogrip.experiment.protocol import Harmonic, Load, Phase
+from biogrip.experiment.sample import SampleModel, model_named
 from biogrip.identify.genome import GeneRange
-from biogrip.protocol import Harmonic, Load, Phase
-from biogrip.sample import SampleModel, model_named
+from biogrip.instrument.actuator import CombDrive, capacitance_slope
+from biogrip.instrument.contact import Contact, contact
+from biogrip.instrument.gripper import Arm, Gripper
 
 
 def gripper(block: Mapping[str, Any]) -> Gripper:

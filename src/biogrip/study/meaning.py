@@ -5,7 +5,7 @@ from itertools import pairwise
 from typing import Any
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.sample import Parameter, SampleModel
+from biogrip.experiment.sample import Parameter, SampleModel
 from biogrip.study import build
 from biogrip.study.source import KeyPath
 from biogrip.study.trace_file import trace_file_problem

@@ -6,21 +6,21 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from biogrip.actuator import CombDrive
-from biogrip.calibration import CalibrationTest
-from biogrip.gripper import Gripper
+from biogrip.experiment.noise import Noise
+from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.sample import Sample
+from biogrip.experiment.sampling import Sampling
+from biogrip.experiment.truth import Published, Truth
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import method_settings
-from biogrip.measurement import Noise
-from biogrip.protocol import Phase, torque_history
-from biogrip.recordings import Columns
-from biogrip.sample import Sample
-from biogrip.sampling import Sampling
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.calibration import CalibrationTest
+from biogrip.instrument.gripper import Gripper
 from biogrip.study import build
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
-from biogrip.truth import Published, Truth
+from biogrip.traces.recordings import Columns
 
 
 @dataclass(frozen=True)

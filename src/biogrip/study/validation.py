@@ -14,13 +14,13 @@ from jsonschema.exceptions import ValidationError
 from jsonschema.validators import extend
 
 from biogrip.errors import BiogripError, nearest
+from biogrip.experiment.sample import MODELS, MOST_BRANCHES
 from biogrip.identify.methods import METHODS
-from biogrip.recordings import nearest_unit
-from biogrip.sample import MODELS, MOST_BRANCHES
 from biogrip.study.meaning import Problem, arm_problems, meaning_problems, workflow_problems
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweeps import placed, point_blocks, sweep_problems
 from biogrip.study.yaml_text import LONGEST_NUMBER
+from biogrip.traces.recordings import nearest_unit
 
 OVERRIDABLE = (
     *("gripper", "protocol", "measurement", "search_range"),

@@ -5,10 +5,10 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import held
+from biogrip.experiment.sample import Sample
+from biogrip.experiment.sampling import Sampling
 from biogrip.products.stages import joined, target
-from biogrip.protocol import held
-from biogrip.sample import Sample
-from biogrip.sampling import Sampling
 from tests.products.default import STUDY
 
 

@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.experiment.sample import MODELS, Sample
+from biogrip.experiment.truth import Published, Truth
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables import verdicts as verdicts_table
 from biogrip.products.tables.layout import Table
@@ -17,8 +19,6 @@ from biogrip.products.tables.methods import Settings, methods
 from biogrip.products.tables.models import models
 from biogrip.products.tables.timings import timings
 from biogrip.products.tables.verdicts import verdicts
-from biogrip.sample import MODELS, Sample
-from biogrip.truth import Published, Truth
 
 
 def rows(table: Table) -> list[dict[str, Any]]:

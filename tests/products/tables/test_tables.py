@@ -6,12 +6,12 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.experiment.sample import MODELS, Sample
+from biogrip.experiment.truth import Published, Truth
 from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables.errors import ERRORS, Settings, errors
 from biogrip.products.tables.layout import Column, Table, inert, write
-from biogrip.sample import MODELS, Sample
-from biogrip.truth import Published, Truth
 from tests.workflow.conftest import ROOT
 
 SETTINGS = Settings(

@@ -8,12 +8,12 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Wedge
 
-from biogrip import actuator
-from biogrip.actuator import CombDrive
+from biogrip.experiment.protocol import torque_at, torque_history
+from biogrip.instrument import actuator
+from biogrip.instrument.actuator import CombDrive
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
 from biogrip.products.figures.torque import Settings, settings
-from biogrip.protocol import torque_at, torque_history
 
 
 def draw(settings: Settings) -> Figure:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
+from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import lowest_misfit
 from biogrip.products.figures.declared import drawing
@@ -13,7 +14,6 @@ from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TA
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
 from biogrip.study.study import Case, Study
-from biogrip.truth import Truth
 
 
 @dataclass(frozen=True)

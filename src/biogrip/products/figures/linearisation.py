@@ -7,16 +7,16 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import TorqueHistory, torque_history
+from biogrip.experiment.truth import Truth
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, ORANGE, PAGE_IN, figure, panel
 from biogrip.products.product import the
 from biogrip.products.stages.model_difference import DIFFERENCES, Settings, scaled, settings
 from biogrip.products.tables.linearisation import CAPTION
-from biogrip.protocol import TorqueHistory, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
-from biogrip.truth import Truth
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from biogrip.gripper import Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
 

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
+from biogrip.experiment.truth import Truth
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.success import at_noise_floor
 from biogrip.products.figures.declared import drawing
@@ -36,7 +37,6 @@ from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 _WORST = 1e3
 _TITLE_LETTERS = 19

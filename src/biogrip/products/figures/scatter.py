@@ -12,11 +12,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.truth import Truth
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS
-from biogrip.measurement import Noise, standard_deviation
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.products.figures.style import (
@@ -32,7 +33,6 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import the
 from biogrip.study.study import Case, Study
-from biogrip.truth import Truth
 
 # Beyond this bound (of a logarithm) an axis covers decades, not percents.
 _LOOSE = 0.25

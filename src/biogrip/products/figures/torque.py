@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
-from biogrip import actuator
-from biogrip.actuator import CombDrive
+from biogrip.experiment.protocol import Phase, torque_at, torque_history
+from biogrip.instrument import actuator
+from biogrip.instrument.actuator import CombDrive
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, figure
-from biogrip.protocol import Phase, torque_at, torque_history
 from biogrip.study.study import Study
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.experiment.sample import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.identify.answer import Identification
-from biogrip.parquet import Table, table_of, write_tables
+from biogrip.products.files.parquet import Table, table_of, write_tables
 from biogrip.products.files.rows import RowFile, read_frame, write_rows
-from biogrip.sample import SINGLE_BRANCH, Parameter, SampleModel
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.parquet import column_names, read_columns, table_of, write_tables
+from biogrip.products.files.parquet import column_names, read_columns, table_of, write_tables
 from biogrip.products.files.rows import write_rows
 
 TARGETS = "results/targets/{case}.csv"

@@ -1,6 +1,6 @@
 """The calibration that a case relies on, if it does."""
 
-from biogrip.calibrated_gripper import CALIBRATIONS
+from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Reads
 

@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from biogrip.calibrated_gripper import CALIBRATIONS, calibration_yaml
-from biogrip.calibration import CalibrationTest, FreeMotion, calibrate, free_motion
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import sample_times
+from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
-from biogrip.gripper import Gripper
-from biogrip.measurement import Noise, add_noise
-from biogrip.parquet import table_of, write_tables
+from biogrip.instrument.calibrated_gripper import CALIBRATIONS, calibration_yaml
+from biogrip.instrument.calibration import CalibrationTest, FreeMotion, calibrate, free_motion
+from biogrip.instrument.gripper import Gripper
+from biogrip.products.files.parquet import table_of, write_tables
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
-from biogrip.protocol import sample_times
-from biogrip.random_streams import stream
 from biogrip.study.study import Study
 
 

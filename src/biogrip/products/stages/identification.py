@@ -5,9 +5,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.experiment.noise import rms
+from biogrip.experiment.random_streams import stream
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, identifier
-from biogrip.measurement import rms
 from biogrip.products.files.identifications import (
     BATCHES,
     HISTORY_BATCHES,
@@ -23,7 +24,6 @@ from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
-from biogrip.random_streams import stream
 from biogrip.study.study import Study
 
 

@@ -7,6 +7,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from biogrip.errors import BiogripError
+from biogrip.experiment.sample import Sample
 from biogrip.files import written_whole
 from biogrip.products.files.identifications import (
     BATCHES,
@@ -18,7 +19,6 @@ from biogrip.products.files.identifications import (
 from biogrip.products.files.rows import read_rows, write_rows
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, of_batches, wildcards_of
-from biogrip.sample import Sample
 from biogrip.study.study import Study
 
 

@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise, standard_deviation
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import with_fixed
 from biogrip.identifiability.fisher import covariance
 from biogrip.identifiability.many_limits import limits_of
 from biogrip.identifiability.profile import likelihood_of
@@ -17,7 +20,6 @@ from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.many_starts import fitted_from
 from biogrip.identify.methods import METHODS, identifier
-from biogrip.measurement import Noise, add_noise, standard_deviation
 from biogrip.products.files.rows import RowFile
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
@@ -26,8 +28,6 @@ from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
-from biogrip.random_streams import stream
-from biogrip.sample import with_fixed
 from biogrip.study.study import Study
 
 INTERVALS = RowFile(

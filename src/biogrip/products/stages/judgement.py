@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.experiment.noise import Noise, rms, standard_deviation
+from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.valley import valley_data
@@ -12,13 +14,11 @@ from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, identifier
 from biogrip.identify.multi_start import fitted_from
-from biogrip.measurement import Noise, rms, standard_deviation
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
 from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
 from biogrip.products.stages.calibrated import calibration_of
-from biogrip.random_streams import stream
 from biogrip.study.study import Case, Study
 
 TRACE = 0

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from biogrip.measurement import Noise, add_noise
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.random_streams import stream
 from biogrip.products.files.traces import (
     MEASUREMENTS,
     TARGETS,
@@ -14,7 +15,6 @@ from biogrip.products.files.traces import (
 )
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
-from biogrip.random_streams import stream
 from biogrip.study.study import Study
 
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
+from biogrip.experiment.sample import Network
+from biogrip.experiment.truth import Truth
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.rows import RowFile
 from biogrip.products.product import Product, Weight
-from biogrip.protocol import Phase, TorqueHistory, torque_history
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
-from biogrip.sample import Network
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 DIFFERENCES = RowFile(
     "a comparison",

@@ -4,6 +4,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, identifier
@@ -14,8 +16,6 @@ from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
-from biogrip.random_streams import stream
-from biogrip.sample import MODELS
 from biogrip.study.study import Study
 
 MODEL_FITS = RowFile(

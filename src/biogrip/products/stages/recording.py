@@ -3,15 +3,15 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from biogrip.gripper import Gripper
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.plausibility import check_recording
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Reads
-from biogrip.recordings import Columns, read_recording
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.study.study import Case, Study
+from biogrip.traces.plausibility import check_recording
+from biogrip.traces.recordings import Columns, read_recording
 
 
 @dataclass(frozen=True)

@@ -9,17 +9,17 @@ import pandas as pd
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.experiment.noise import Noise, rms
+from biogrip.experiment.sampling import Sampling
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import nearest_encodable
 from biogrip.identify.success import at_noise_floor
-from biogrip.measurement import Noise, rms
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.rows import RowFile
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.response.simulation import simulated_rotation
-from biogrip.sampling import Sampling
 from biogrip.study.study import Study
 
 POINTS = RowFile(

@@ -8,14 +8,14 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import Phase, torque_at, torque_history
+from biogrip.experiment.sample import Sample
+from biogrip.experiment.sampling import Sampling
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import TARGETS, write_target
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, wildcards_of
-from biogrip.protocol import Phase, torque_at, torque_history
 from biogrip.response.simulation import simulated_rotation
-from biogrip.sample import Sample
-from biogrip.sampling import Sampling
 from biogrip.study.study import Study
 
 

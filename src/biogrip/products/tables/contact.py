@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.actuator import CombDrive
-from biogrip.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.measurement import Noise, standard_deviation
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import of_cases
 from biogrip.products.stages.intervals import INTERVALS

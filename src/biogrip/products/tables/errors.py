@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.sample import Parameter
+from biogrip.experiment.truth import Truth
 from biogrip.identify.success import at_noise_floor, lowest_misfit
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import EVALUATION, the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
-from biogrip.sample import Parameter
 from biogrip.study.study import Case, Study
-from biogrip.truth import Truth
 
 TABLE_COLUMNS = (
     Column("case", "Case"),

@@ -7,18 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip import actuator
-from biogrip.actuator import CombDrive
-from biogrip.gripper import Gripper
+from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.experiment.truth import Truth
 from biogrip.identify.genome import GeneRange
+from biogrip.instrument import actuator
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import MEASUREMENTS, read_measurements
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.sample import SINGLE_BRANCH
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 _COLUMNS = (
     Column("quantity", "Quantity"),

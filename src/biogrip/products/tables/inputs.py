@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from biogrip.actuator import CombDrive
-from biogrip.gripper import Gripper
+from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.identify.genome import GeneRange
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
-from biogrip.sample import SINGLE_BRANCH
 
 _SOURCE = Column("source", "Source")
 _LEGEND = (

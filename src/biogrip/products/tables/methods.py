@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from biogrip.experiment.sample import Parameter
+from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import at_noise_floor, chi_square_rise
 from biogrip.products.files.identifications import PATH, read_identifications
@@ -14,9 +16,7 @@ from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.sample import Parameter
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 _LEADING = (
     Column("case", "Case"),

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from biogrip.experiment.truth import Truth
 from biogrip.identify.genome import GeneRange, nearest_encodable
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 _COLUMNS = (
     Column("case", "Case"),

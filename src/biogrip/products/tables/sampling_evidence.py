@@ -5,16 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biogrip.experiment.noise import Noise
+from biogrip.experiment.protocol import sample_times
+from biogrip.experiment.truth import Truth
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.measurement import Noise
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.protocol import sample_times
 from biogrip.study.study import Study
-from biogrip.truth import Truth
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 _DETERMINED_PERCENT = 100.0

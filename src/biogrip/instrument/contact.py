@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip import actuator
-from biogrip.actuator import CombDrive
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
-from biogrip.response.nonlinear import rotation_of_tip
+from biogrip.instrument import actuator
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.linkage import rotation_of_tip
 
 SMALLEST_M, LARGEST_M = 30e-6, 120e-6
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm, Gripper
+from biogrip.instrument.gripper import Arm, Gripper
 
 CALIBRATIONS = "results/calibrations/{case}.yaml"
 

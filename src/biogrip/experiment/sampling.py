@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.protocol import sample_times
+from biogrip.experiment.protocol import sample_times
 
 
 @dataclass(frozen=True)

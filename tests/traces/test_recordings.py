@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biogrip import recordings
 from biogrip.errors import BiogripError
-from biogrip.recordings import (
+from biogrip.traces import recordings
+from biogrip.traces.recordings import (
     ROTATION_UNITS,
     TIME_UNITS,
     Columns,

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from biogrip.measurement import Noise, add_noise, rms
+from biogrip.experiment.noise import Noise, add_noise, rms
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
 

@@ -6,10 +6,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
-from biogrip.measurement import Noise, add_noise
-from biogrip.plausibility import LARGEST_SHARE, SMALLEST_SHARE, check_recording, free_rotation
-from biogrip.protocol import (
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import (
     Harmonic,
     Load,
     Phase,
@@ -18,10 +16,17 @@ from biogrip.protocol import (
     sample_times,
     torque_history,
 )
-from biogrip.recordings import Columns, Recording
+from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nuisance import nuisance_basis
-from biogrip.sample import MODELS, generalized_maxwell
+from biogrip.traces.plausibility import (
+    LARGEST_SHARE,
+    SMALLEST_SHARE,
+    check_recording,
+    free_rotation,
+)
+from biogrip.traces.recordings import Columns, Recording
 
 FILE = Path("trace.csv")
 SI = Columns("time_s", "rotation_rad")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from biogrip.actuator import CombDrive, capacitance, capacitance_slope, torque, voltage
+from biogrip.instrument.actuator import CombDrive, capacitance, capacitance_slope, torque, voltage
 
 TABLE_2 = CombDrive(40e-6, 4e-6, 3e-6, 66, 321e-6, 6.0, 4.5, 1.5)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError, nearest
-from biogrip.plain_rows import plain_rows
+from biogrip.traces.plain_rows import plain_rows
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}

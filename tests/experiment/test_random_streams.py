@@ -2,7 +2,7 @@ import itertools
 
 import numpy as np
 
-from biogrip.random_streams import stream
+from biogrip.experiment.random_streams import stream
 
 
 def first(*key: object) -> float:

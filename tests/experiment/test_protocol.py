@@ -1,6 +1,6 @@
 import numpy as np
 
-from biogrip.protocol import held, sample_times, torque_at, torque_history
+from biogrip.experiment.protocol import held, sample_times, torque_at, torque_history
 
 PAPER = (held(200.0, 1.6e-9), held(200.0, 0.32e-9))
 

@@ -22,11 +22,11 @@ from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory, torque_at
-from biogrip.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
+from biogrip.experiment.protocol import TorqueHistory, torque_at
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import StepResponse, rotation
 from biogrip.response.nuisance import without
+from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
 
 LARGEST_SHARE = 1.5
 """Most that a trace may turn, in free rotations.

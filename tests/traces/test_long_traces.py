@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.gripper import Gripper
+from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.sample import MODELS
+from biogrip.instrument.gripper import Gripper
 from biogrip.one_trace import Wanted, identify_trace
-from biogrip.protocol import held, torque_history
 from biogrip.response.linear import rotation, step_response
-from biogrip.sample import MODELS
 
 SAMPLES, MEANS_OF = 200_000, 50
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([34.0, 12.0, 300.0])

@@ -2,10 +2,10 @@ import math
 
 import pytest
 
-from biogrip.contact import contact
 from biogrip.errors import BiogripError
-from biogrip.gripper import Gripper
-from tests.test_actuator import TABLE_2
+from biogrip.instrument.contact import contact
+from biogrip.instrument.gripper import Gripper
+from tests.instrument.test_actuator import TABLE_2
 
 
 @pytest.mark.parametrize("size_um", [30, 60, 120])

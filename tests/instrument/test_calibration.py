@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from biogrip.calibrated_gripper import calibration_yaml, read_calibrated_arms
-from biogrip.calibration import FreeMotion, calibrate, free_motion
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm, Gripper
-from biogrip.measurement import Noise, add_noise
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.instrument.calibrated_gripper import calibration_yaml, read_calibrated_arms
+from biogrip.instrument.calibration import FreeMotion, calibrate, free_motion
+from biogrip.instrument.gripper import Arm, Gripper
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 TIME_S = np.arange(3001) / 100e3

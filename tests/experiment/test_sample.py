@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from biogrip.gripper import Gripper
-from biogrip.protocol import TorqueHistory, held, torque_history
-from biogrip.response.linear import _sample_polynomials, rotation, step_response
-from biogrip.sample import (
+from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.sample import (
     MODELS,
     Network,
     generalized_maxwell,
@@ -18,6 +16,8 @@ from biogrip.sample import (
     model_named,
     with_fixed,
 )
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.linear import _sample_polynomials, rotation, step_response
 
 TIMES = np.linspace(0.1, 400, 300)
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.errors import BiogripError
-from biogrip.gripper import Arm
+from biogrip.instrument.calibrated_gripper import ARM_KEYS, CalibratedArm
+from biogrip.instrument.gripper import Arm
 
 _FEWEST_SAMPLES = 64
 

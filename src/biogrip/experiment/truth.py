@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from biogrip.sample import Parameter, Sample, SampleModel
+from biogrip.experiment.sample import Parameter, Sample, SampleModel
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Plain is what leaves no question: ASCII, a row on every line, a cell in every
 column, no quotes, no comments, and numbers as computers write them. Of
 anything else nothing is said but that it is not plain; then it is for
-`biogrip.recordings` to read with care, and to find what is wrong.
+`biogrip.traces.recordings` to read with care, and to find what is wrong.
 """
 
 from collections.abc import Sequence

@@ -1,0 +1,1 @@
+"""The experiment: what is gripped, with which torque, and what noise adds."""

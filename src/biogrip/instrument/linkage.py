@@ -1,0 +1,21 @@
+"""The linkage: how far a tip moves when its arm turns."""
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.instrument.gripper import Gripper
+
+
+def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
+    """Rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
+
+    Solved for phi without a difference of nearly equal cosines; NaN beyond the
+    displacement at which the arms lie flat.
+    """
+    angle = np.radians(gripper.reference_angle_deg)
+    cos, sin = np.cos(angle), np.sin(angle)
+    x = displacement_m / gripper.arm_length_m
+    rest = x * (2 * cos + x)
+    with np.errstate(invalid="ignore"):
+        new_sin = np.sqrt(sin * sin - rest)
+    return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)

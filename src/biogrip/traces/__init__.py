@@ -1,0 +1,1 @@
+"""Recorded traces: read, thinned, and held against what a grip can give."""
