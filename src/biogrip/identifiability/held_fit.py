@@ -12,7 +12,6 @@ quantity is monotone, whatever their sizes.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
@@ -146,6 +145,8 @@ def brought_to(quantity: Quantity, target: float, x: Array, low: Array, high: Ar
     elif beyond(last) <= 0:
         aim = last
     else:
+        from scipy.optimize import brentq
+
         aim = float(brentq(beyond, first, last, xtol=_ON_TARGET, rtol=1e-15))
     return np.clip(quantity.moved(inside, aim), low, high)
 

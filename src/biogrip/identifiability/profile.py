@@ -6,9 +6,9 @@ is the threshold, and what is returned is the value at which it was found to be.
 """
 
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
 from biogrip.identifiability.held_fit import held_fit
@@ -133,12 +133,14 @@ def likelihood_of(
     noise_rad
         Standard deviation of the noise if it is known.
     """
-    levels = np.array([confidence, _CERTAIN])
+    levels = (confidence, _CERTAIN)
     if noise_rad is not None:
-        threshold, certainty = chdtri(1, 1 - levels)
+        threshold, certainty = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
     else:
         left = problem.residuals.free - len(best)
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
+        from scipy.special import fdtri
+
         threshold, certainty = fdtri(1, left, levels)
     return Likelihood(problem, best, misfit_rad, noise_rad, float(threshold), float(certainty))
 

@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.identify.problem import Problem
@@ -138,6 +137,8 @@ def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalF
     tolerance
         `ROUGH`, `FAIR` or `FINE`.
     """
+    from scipy.optimize import least_squares
+
     objective = Objective(problem)
     inside = 1e-9 * (problem.high - problem.low)
     found = least_squares(

@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
 from pkgutil import walk_packages
 
 import biogrip.products
@@ -14,15 +16,15 @@ from biogrip.products.product import Product
 def products() -> dict[str, Product]:
     """Return every product by its name."""
     found: dict[str, Product] = {}
-    for module in walk_packages(biogrip.products.__path__, "biogrip.products."):
-        for product in _declared(import_module(module.name)):
+    for module in _modules():
+        for product in _declared(import_module(module)):
             if found.setdefault(product.name, product) is not product:
-                raise BiogripError(f"{module.name}: declares {product.name} a second time.")
+                raise BiogripError(f"{module}: declares {product.name} a second time.")
     return found
 
 
 def chosen(names: Iterable[str]) -> list[Product]:
-    """Return some products, without loading the others where a module is named like one.
+    """Return some products, loading as few of the others as may be.
 
     Raises
     ------
@@ -33,21 +35,29 @@ def chosen(names: Iterable[str]) -> list[Product]:
 
 
 def _product(name: str) -> Product:
-    for folder in ("tables", "figures", "stages", "pages"):
-        try:
-            module = import_module(f"biogrip.products.{folder}.{name}")
-        except ModuleNotFoundError as error:
-            if error.name != f"biogrip.products.{folder}.{name}":
-                raise
-            continue
-        for product in _declared(module):
-            if product.name == name:
-                return product
+    called_so = [module for module in _modules() if module.endswith(f".{name}")]
+    # Where none is, the declaration itself says the name.
+    for module in (*called_so, *_modules()):
+        if module in called_so or f'"{name}"' in _source(module):
+            for product in _declared(import_module(module)):
+                if product.name == name:
+                    return product
     if name not in products():
         raise BiogripError(
             f"no product '{name}'.{nearest(name, products())} Allowed: {', '.join(products())}."
         )
     return products()[name]
+
+
+@cache
+def _modules() -> tuple[str, ...]:
+    return tuple(m.name for m in walk_packages(biogrip.products.__path__, "biogrip.products."))
+
+
+@cache
+def _source(module: str) -> str:
+    spec = find_spec(module)
+    return Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
 
 
 def _declared(module: object) -> list[Product]:

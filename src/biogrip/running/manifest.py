@@ -12,8 +12,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 
-import psutil
-
 from biogrip.errors import BiogripError
 from biogrip.running.journal import JOURNALS, Record, sha256_of
 
@@ -226,5 +224,7 @@ def _is_closed(journal: Path) -> bool:
     """Whether its process is gone: known here, taken for granted elsewhere after a day."""
     host, pid, _ = journal.stem.rsplit("--", 2)
     if host == os.uname().nodename and pid.isdigit():
+        import psutil
+
         return not psutil.pid_exists(int(pid)) or int(pid) == os.getpid()
     return time.time() - journal.stat().st_mtime > _DAY_S

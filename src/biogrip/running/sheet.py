@@ -32,11 +32,14 @@ class Sheet:
         What is made.
     plan
         The study's jobs.
+    jobs
+        Those that make these products, all of them; wildcards of each.
     """
 
     name: str
     products: tuple[Product, ...]
     plan: Plan
+    jobs: tuple[Wildcards, ...] = ()
 
     @property
     def wildcards(self) -> list[str]:
@@ -45,16 +48,11 @@ class Sheet:
         return sorted(set(re.findall(r"{(\w+)}", patterns)))
 
     @property
-    def jobs(self) -> list[Wildcards]:
-        """Jobs that the study has of it."""
-        return list(self.products[0].jobs(self.plan))
-
-    @property
     def constraints(self) -> dict[str, str]:
         """What its wildcards may be: those of the study's own jobs, if it has any."""
-        jobs, found = self.jobs, {}
+        found = {}
         for name in self.wildcards:
-            values = {job[name] for job in jobs} if name in ("case", "sweep") else set()
+            values = {job[name] for job in self.jobs} if name in ("case", "sweep") else set()
             found[name] = "|".join(map(re.escape, sorted(values))) or _CONSTRAINTS[name]
         return found
 
@@ -135,16 +133,33 @@ class Sheet:
 
 
 def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
-    """Put products together that are made by one job."""
+    """Put products together that are made by one job.
+
+    All outputs of a rule are made, and not every case has every figure: of a sheet
+    there is a rule for each set of products that cases have in common.
+    """
     together: dict[str, list[Product]] = defaultdict(list)
     for product in products:
         together[product.sheet or product.name].append(product)
     found = []
     for name, members in together.items():
-        # Only what the study has: a rule's outputs are all made.
-        there = [product for product in members if not product.asked or product.jobs(plan)]
-        if there:
-            found.append(Sheet(name, tuple(there), plan))
+        if not members[0].asked:
+            found.append(Sheet(name, tuple(members), plan))
+        for number, (makes, jobs) in enumerate(_in_common(members, plan).items(), 1):
+            label = name if number == 1 else f"{name}_{number}"
+            found.append(Sheet(label, tuple(members[i] for i in makes), plan, tuple(jobs)))
+    return found
+
+
+def _in_common(members: list[Product], plan: Plan) -> dict[tuple[int, ...], list[Wildcards]]:
+    """Jobs by the indices of the products that they have."""
+    makes: dict[tuple[tuple[str, str], ...], list[int]] = defaultdict(list)
+    for index, product in enumerate(members):
+        for job in product.jobs(plan):
+            makes[tuple(job.items())].append(index)
+    found: dict[tuple[int, ...], list[Wildcards]] = defaultdict(list)
+    for items, indices in makes.items():
+        found[tuple(indices)].append(dict(items))
     return found
 
 
@@ -154,6 +169,6 @@ def files_of(sheets: Iterable[Sheet]) -> list[str]:
         file
         for sheet in sheets
         for product in sheet.products
-        for job in product.jobs(sheet.plan)
+        for job in sheet.jobs
         for file in product.outputs(job).values()
     ]

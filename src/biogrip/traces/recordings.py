@@ -13,7 +13,6 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.errors import BiogripError, nearest
-from biogrip.traces.plain_rows import plain_rows
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
@@ -240,6 +239,8 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
     time_unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
     rotation_unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
     sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
+    from biogrip.traces.plain_rows import plain_rows  # Arrow takes as long as a short job.
+
     plain = plain_rows(path, at[0], layout.width, [*layout.indices.values()], layout.separator)
     if plain is not None and len(plain) <= MOST_ROWS:
         return sizes, plain, at[0] + 1 + np.arange(len(plain))

@@ -116,5 +116,5 @@ COMB = drawing(
     caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
     settings=settings,
-    sheet="input_figures",
+    sheet="study_figures",
 )

@@ -12,8 +12,9 @@ from biogrip.experiment.truth import Truth
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, ORANGE, PAGE_IN, figure, panel
+from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
-from biogrip.products.stages.model_difference import DIFFERENCES, Settings, scaled, settings
+from biogrip.products.stages.model_difference import Settings, scaled, settings
 from biogrip.products.tables.linearisation import CAPTION
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
@@ -94,5 +95,5 @@ LINEARISATION_MAP = drawing(
     settings=settings,
     reads={"differences": the(DIFFERENCES.path)},
     when=lambda study: bool(study.simulated),
-    sheet="",
+    sheet="study_figures",
 )

@@ -177,5 +177,5 @@ LINKAGE = drawing(
     "constitutive models. Arm length and angle are those of the config; in the default study they "
     "are reconstructed.",
     settings=lambda study: study.gripper,
-    sheet="input_figures",
+    sheet="study_figures",
 )

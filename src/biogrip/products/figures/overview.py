@@ -242,6 +242,6 @@ OVERVIEW = drawing(
         ),
     },
     when=lambda study: bool(study.simulated),
-    sheet="",
+    sheet="study_figures",
     weight=Weight(10, 2000),
 )

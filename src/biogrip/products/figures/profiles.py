@@ -14,7 +14,7 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, PAGE_IN, SHADE, TARGET, figure, panel
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.stages.judgement import verdicts_expected
+from biogrip.products.stages.expected import verdicts_expected
 from biogrip.study.study import Case, Study
 
 _HIGHEST = 12.0
@@ -112,6 +112,6 @@ PROFILES = drawing(
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,
-    sheet="judgement_figures",
+    sheet="case_figures",
     weight=JUDGEMENT,
 )

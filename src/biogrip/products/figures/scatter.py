@@ -172,5 +172,5 @@ SCATTER = drawing(
     settings=settings,
     reads={"identifications": the(PATH), "target": the(TARGETS)},
     cases=lambda study: study.simulated,
-    sheet="simulated_figures",
+    sheet="case_figures",
 )

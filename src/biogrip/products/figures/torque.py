@@ -76,5 +76,5 @@ TORQUE = drawing(
     caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
     "takes by eq. (9).",
     settings=settings,
-    sheet="input_figures",
+    sheet="study_figures",
 )

@@ -125,6 +125,6 @@ VALLEY = drawing(
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],
-    sheet="",
+    sheet="case_figures",
     weight=JUDGEMENT,
 )

@@ -96,5 +96,5 @@ WATERFALL = drawing(
     settings=settings,
     reads={"identifications": the(PATH)},
     cases=lambda study: study.simulated,
-    sheet="simulated_figures",
+    sheet="case_figures",
 )

@@ -98,6 +98,7 @@ SUMMARY = Product(
     lambda plan: wildcards_of(plan.study.cases),
     message="Writing what a trace of {case} tells on one page",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},
+    sheet="case_figures",
     category="Summaries",
     item="summary",
     caption="What one trace of this case tells, on one page.",

@@ -84,7 +84,9 @@ def join(
         schema = pq.read_schema(history_batches[0])
         with pq.ParquetWriter(scratch, schema) as joined:
             for batch in history_batches:
-                table = pq.read_table(batch)
+                # Reading it as a data set would load pandas.
+                with pq.ParquetFile(batch) as file:
+                    table = file.read()
                 joined.write_table(table.filter(pc.less(table["seed"], settings.seeds)))
 
 

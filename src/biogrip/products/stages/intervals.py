@@ -20,7 +20,7 @@ from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.many_starts import fitted_from
 from biogrip.identify.methods import METHODS, identifier
-from biogrip.products.files.rows import RowFile
+from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.plan import Wildcards
@@ -29,13 +29,6 @@ from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
-
-INTERVALS = RowFile(
-    "intervals",
-    ("case", "quantity", "seed", "estimate", "low", "high", "estimate_rest_known"),
-    "results/coverage/{case}.csv",
-    "results/coverage/{case}/{batch}.csv",
-)
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from biogrip.products.files.identifications import TIMINGS
+from biogrip.products.files.intervals import INTERVALS
+from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.files.rows import RowFile, read_rows, write_rows
 from biogrip.products.plan import Plan
 from biogrip.products.product import Product, of_batches, wildcards_of
-from biogrip.products.stages.intervals import INTERVALS
-from biogrip.products.stages.model_fits import MODEL_FITS
 from biogrip.study.study import Case
 
 

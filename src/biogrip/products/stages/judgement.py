@@ -152,13 +152,6 @@ def expect(
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
 
 
-def verdicts_expected() -> Reads:
-    """Read what the traces of the job's case should tell, where its truth is known."""
-    return Reads(
-        lambda plan, job: [] if plan.study.case(job["case"]).recorded else [EXPECTED.format(**job)]
-    )
-
-
 JUDGED = Product(
     "judgement",
     {"verdicts": PATH},

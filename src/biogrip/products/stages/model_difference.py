@@ -11,17 +11,12 @@ from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.experiment.truth import Truth
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.files.rows import RowFile
+from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import Product, Weight
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.study.study import Study
 
-DIFFERENCES = RowFile(
-    "a comparison",
-    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
-    "results/linearisation.csv",
-)
 ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
 FACTORS = np.geomspace(0.25, 32.0, 15)
 

@@ -9,7 +9,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, identifier
-from biogrip.products.files.rows import RowFile
+from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, read_measurements
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
@@ -17,13 +17,6 @@ from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
-
-MODEL_FITS = RowFile(
-    "fits of models",
-    ("case", "model", "seed", "parameters", "samples", "misfit_rad"),
-    "results/selection/{case}.csv",
-    "results/selection/{case}/{batch}.csv",
-)
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import of_cases
-from biogrip.products.stages.intervals import INTERVALS
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
-from biogrip.products.stages.model_difference import DIFFERENCES
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 

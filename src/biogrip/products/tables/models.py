@@ -7,8 +7,8 @@ import numpy as np
 import pandas as pd
 
 from biogrip.experiment.sample import MODELS
+from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.product import of_cases
-from biogrip.products.stages.model_fits import MODEL_FITS
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study

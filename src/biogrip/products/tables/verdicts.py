@@ -6,7 +6,7 @@ from pathlib import Path
 
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.stages.judgement import verdicts_expected
+from biogrip.products.stages.expected import verdicts_expected
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Case, Study
@@ -100,6 +100,6 @@ VERDICTS = table(
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,
-    sheet="judgement_tables",
+    sheet="case_tables",
     weight=JUDGEMENT,
 )

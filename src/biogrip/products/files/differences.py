@@ -1,0 +1,9 @@
+"""How far the linear model is from the nonlinear one: a row per case, angle and torque."""
+
+from biogrip.products.files.rows import RowFile
+
+DIFFERENCES = RowFile(
+    "a comparison",
+    ("case", "reference_angle_deg", "torque_factor", "difference_over_peak"),
+    "results/linearisation.csv",
+)

@@ -1,0 +1,10 @@
+"""How well each sample model fits: a row per model and seed."""
+
+from biogrip.products.files.rows import RowFile
+
+MODEL_FITS = RowFile(
+    "fits of models",
+    ("case", "model", "seed", "parameters", "samples", "misfit_rad"),
+    "results/selection/{case}.csv",
+    "results/selection/{case}/{batch}.csv",
+)
