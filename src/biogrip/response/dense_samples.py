@@ -30,6 +30,8 @@ _TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
 _FEWEST, _LARGEST_CONDITION = 256, 100.0
 # Samples whose polynomials are formed at once.
 _AT_ONCE = 16_384
+# Of no more samples they are kept, for the next trace.
+_MOST_KEPT = 100_000
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,7 @@ class DenseSamples:
         self, torque: TorqueHistory, time_s: Array, further_edges_s: Array | None = None
     ) -> None:
         self._all_s = time_s
+        self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
         self._starts_s = np.unique([-np.inf, *starts])
         omega = torque.omega_rad_per_s
@@ -167,6 +170,13 @@ class DenseSamples:
 
     def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         """Legendre's polynomials at the samples of a piece, (n_samples, n_nodes), by blocks."""
+        if len(self._all_s) > _MOST_KEPT:
+            return self._formed(first, stop)
+        if (first, stop) not in self._kept:
+            self._kept[first, stop] = list(self._formed(first, stop))
+        return iter(self._kept[first, stop])
+
+    def _formed(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
         start, end = self._all_s[first], self._all_s[stop - 1]
         for here in range(first, stop, _AT_ONCE):
             block = slice(here, min(here + _AT_ONCE, stop))

@@ -96,7 +96,7 @@ class Correction:
         """Evaluate at ascending times, shape (n, n_times)."""
         values = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
         parts = [
-            values[:, element] @ on_piece
+            values[:, element] @ np.ascontiguousarray(on_piece)
             for element, on_piece in enumerate(_interpolation(self.edges_s, time_s))
             if on_piece.shape[1]
         ]
@@ -127,11 +127,12 @@ def mesh_functions(edges_s: Array, time_s: Array) -> Array:
 
 def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
     """Of each element, its polynomials at the times within, (STAGES + 1, n_times_within)."""
-    pieces = np.split(time_s, np.searchsorted(time_s, edges_s[1:-1], side="left"))
-    return [
-        _lagrange((piece - start) / (end - start))
-        for (start, end), piece in zip(pairwise(edges_s), pieces, strict=True)
-    ]
+    cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
+    starts, lengths = (
+        np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
+        for of_elements in (edges_s[:-1], np.diff(edges_s))
+    )
+    return np.split(_lagrange((time_s - starts) / lengths), cuts, axis=1)
 
 
 def nonlinear_rotation(
@@ -155,7 +156,11 @@ def nonlinear_rotation(
 
 
 def correction(
-    gripper: Gripper, network: Network, torque: TorqueHistory, accuracy: Accuracy
+    gripper: Gripper,
+    network: Network,
+    torque: TorqueHistory,
+    accuracy: Accuracy,
+    factors: Array | None = None,
 ) -> Correction:
     """Compute nonlinear minus linear rotation, without inertia.
 
@@ -165,6 +170,8 @@ def correction(
         The arms, n samples, the protocol.
     accuracy
         How finely.
+    factors : (n,)
+        By which the torque on each sample is multiplied, if at all.
     """
     symmetric = is_symmetric(gripper, torque)
     arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
@@ -187,6 +194,10 @@ def correction(
         rate = rotation_rate(response, torque, before_jumps, index)
         linear_rate[:, index] = rate.reshape(-1, *nodes.shape)
         tau[index] = torque_at(torque, before_jumps, name).reshape(nodes.shape)
+    times = np.ones(shape[0]) if factors is None else factors
+    linear, linear_rate, tau = (
+        times[:, None, None, None] * each for each in (linear, linear_rate, tau)
+    )
     peak = np.abs(linear).max(axis=(1, 2, 3))
     extra, extra_rate = np.zeros(shape), np.zeros(shape)
     converged = np.zeros(shape[0], dtype=bool)
@@ -195,7 +206,7 @@ def correction(
     for _ in range(accuracy.most_sweeps):
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
-        load = b_0 * _load(gripper, arms, tau, u, u_rate)
+        load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
         found, extra_rate[left] = modes.respond(_as_drives(load), left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
@@ -236,7 +247,7 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
     load = np.empty_like(u)
     for i, arm in enumerate(arms):
         stiffness, damping = arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad
-        load[:, i] = tau[i] * (1 / b[:, i] - 1 / b_0)
+        load[:, i] = tau[:, i] * (1 / b[:, i] - 1 / b_0)
         load[:, i] -= stiffness * (phi[:, i] / b[:, i] - u[:, i] / b_0**2)
         load[:, i] -= damping * u_rate[:, i] * (1 / b[:, i] ** 2 - 1 / b_0**2)
     return load

@@ -54,27 +54,38 @@ def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
     torque = torque_history(settings.phases)
     for name, (truth, gripper) in settings.cases.items():
         model = truth.model
-        network = model.network(np.array([[truth.parameters[p] for p in model.names]]))
+        values = [truth.parameters[p] for p in model.names]
+        network = model.network(np.tile(values, (len(FACTORS), 1)))
         for angle in ANGLES_DEG:
             turned = replace(gripper, reference_angle_deg=float(angle))
-            for factor in FACTORS:
-                share = difference_over_peak(turned, network, scaled(torque, factor))
+            shares = difference_over_peak(turned, network, torque, FACTORS)
+            for factor, share in zip(FACTORS, shares, strict=True):
                 yield name, f"{angle:g}", f"{factor:.4g}", f"{share:.4g}"
 
 
-def difference_over_peak(gripper: Gripper, network: Network, torque: TorqueHistory) -> float:
+def difference_over_peak(
+    gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array
+) -> Array:
     """Largest difference of the models over the protocol, as a share of the nonlinear peak.
 
-    NaN where the torque closes the arms beyond what the model describes.
+    Parameters
+    ----------
+    gripper, network, torque
+        The arms, n samples, the protocol.
+    factors : (n,)
+        By which the torque on each is multiplied.
+
+    Returns
+    -------
+    (n,), NaN where the torque closes the arms beyond what the model describes.
     """
     time_s = _times(torque)
-    found = correction(gripper, network, torque, FINE)
-    if not found.converged[0]:
-        return float("nan")
+    found = correction(gripper, network, torque, FINE, factors)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
-    difference = found.at(time_s)[0]
-    nonlinear = rotation(response, torque, time_s)[0] + difference
-    return float(np.max(np.abs(difference)) / np.max(np.abs(nonlinear)))
+    difference = found.at(time_s)
+    nonlinear = factors[:, None] * rotation(response, torque, time_s) + difference
+    share = np.max(np.abs(difference), axis=1) / np.max(np.abs(nonlinear), axis=1)
+    return np.where(found.converged, share, np.nan)
 
 
 def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
