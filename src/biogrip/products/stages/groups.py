@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
-_TOGETHER = 25
+_TOGETHER = 63
 
 
 def groups(seeds: Sequence[int]) -> Iterator[Sequence[int]]:
