@@ -160,7 +160,7 @@ class TestPeers:
                 batches.append(np.array(chromosomes))
                 return 1.0 + chromosomes.sum(axis=1)
 
-        genome = Genome(np.zeros(12, dtype=np.int64), np.full(12, 10**9, dtype=np.int64))
+        genome = Genome(np.zeros(12, dtype=np.int64), np.full(12, 10**9, dtype=np.int64), (3,) * 4)
         getattr(genetic_peers, name)(
             Recording(task.misfit, genome, task.settings), 1, documented=False
         )

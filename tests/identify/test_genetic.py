@@ -26,7 +26,7 @@ BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
 
 def crossed(parents: IntArray, settings: GeneticSettings, rng: np.random.Generator) -> IntArray:
     genes = parents.shape[1]
-    genome = Genome(np.zeros(genes, dtype=np.int64), np.full(genes, parents.max()))
+    genome = Genome(np.zeros(genes, dtype=np.int64), np.full(genes, parents.max()), (1,) * genes)
     children = cross(genome.code(parents)[:, None], genome, settings, [rng])
     return chromosomes_of(genome, children[:, 0])
 
@@ -254,6 +254,6 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
     settings = replace(
         PAPER, mutation_start=2, mutation_probability=1.0, mutated_genes=5, max_generations=2
     )
-    evolve(spying, Single(genome.low, genome.high), settings, np.random.default_rng(0))
+    evolve(spying, Single(genome.low, genome.high, genome.sizes), settings, np.random.default_rng(0))
     assert seen[:2] == [1, 1]
     assert seen[2] > 1

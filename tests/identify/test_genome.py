@@ -52,3 +52,42 @@ def test_a_model_with_fewer_parameters_has_fewer_genes() -> None:
 )
 def test_nearest_encodable(value: float, nearest: float) -> None:
     assert nearest_encodable(value, DAMPING) == nearest
+
+
+@pytest.mark.parametrize("digits", range(1, 7))
+@pytest.mark.parametrize("digit", [(1, 9), (0, 9), (3, 5)])
+def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
+    digits: int, digit: tuple[int, int]
+) -> None:
+    ranges = {**RANGES, "k": GeneRange((-16, 16), digit, digits)}
+    genome = genome_of(MODELS["generalized_maxwell"], ranges)
+    assert genome.genes == 9 + 1 + digits
+    chromosomes = genome.draw(300, np.random.default_rng(digits))
+    decoded = genome.decode(chromosomes)
+    for genes, value in zip(chromosomes[:, : 1 + digits].tolist(), decoded[:, 0], strict=True):
+        share = sum(Decimal(g) * Decimal(10) ** -place for place, g in enumerate(genes[1:], 1))
+        assert value == float(share * Decimal(10) ** genes[0])
+    np.testing.assert_array_equal(genome.parameters(genome.code(chromosomes)), decoded)
+    assert genome.decode(np.stack((genome.low, genome.high)))[:, 0].tolist() == [
+        ranges["k"].low,
+        ranges["k"].high,
+    ]
+
+
+def test_a_first_digit_is_never_zero_lest_numbers_were_encoded_twice() -> None:
+    genome = genome_of(MODELS["damper"], {"c_p": GeneRange((0, 0), (0, 9), 3)})
+    first, second, third = (genome.draw(5000, np.random.default_rng(0))[:, g] for g in (1, 2, 3))
+    assert (set(first), set(second), set(third)) == ({*range(1, 10)}, *[{*range(10)}] * 2)
+
+
+@pytest.mark.parametrize("value", [1e-9, 0.0999, 10.0, 12.34567, 302.5, 1.0e12])
+@pytest.mark.parametrize("digits", [1, 3, 4])
+def test_nearest_encodable_is_the_nearest_of_all(value: float, digits: int) -> None:
+    genes = GeneRange((-2, 4), (0, 9), digits)
+    every = [
+        float(f"{mantissa}e{exponent - digits}")
+        for mantissa in range(10 ** (digits - 1), 10**digits)
+        for exponent in range(-2, 5)
+    ]
+    nearest = min(abs(each - value) for each in every)
+    assert abs(nearest_encodable(value, genes) - value) == nearest

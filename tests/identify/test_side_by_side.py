@@ -151,7 +151,7 @@ def test_progress_is_of_all_together(gripper: Gripper, steps: TorqueHistory) -> 
 
 def wide(values: int) -> Genome:
     low = np.arange(12, dtype=np.int64) - 5
-    return Genome(low, low + values - 1)
+    return Genome(low, low + values - 1, (3,) * 4)
 
 
 @pytest.mark.parametrize("values", [1, 2, 9, 2**30 + 1, 2**31 - 2**20, 2**31 + 1, 2**40])
@@ -175,7 +175,7 @@ def test_redrawn_genes_are_those_of_numpy(values: int, times: int) -> None:
 
 def test_genes_of_different_ranges_are_those_of_numpy() -> None:
     low = np.zeros(12, dtype=np.int64)
-    genome = Genome(low, np.array([1, 2**30, 2**30 + 2**29, 8, 3, 2**31 - 2] * 2))
+    genome = Genome(low, np.array([1, 2**30, 2**30 + 2**29, 8, 3, 2**31 - 2] * 2), (3,) * 4)
     numpys = rng(0)
     drawn = redraws(genome, [500, 1], 1, [rng(0), rng(1)])[0, :, :500]
     gene = numpys.integers(12, size=500)

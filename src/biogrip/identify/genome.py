@@ -1,7 +1,9 @@
-"""The chromosome: three integer genes a parameter (eq. 10, Tables 3 and 4)."""
+"""The chromosome: an exponent and some digits a parameter, each a gene (eq. 10, Tables 3, 4)."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from itertools import accumulate, pairwise
 from math import prod
 
 import numpy as np
@@ -19,21 +21,35 @@ class GeneRange:
     exponent
         Lowest and highest order of magnitude g_1.
     digit
-        Lowest and highest value of the digits g_2 and g_3.
+        Lowest and highest value of a digit; the first is never below 1, for numbers with
+        leading zeros would be encoded twice.
+    digits
+        How many there are; in eq. (10) two, g_2 and g_3.
     """
 
     exponent: tuple[int, int]
     digit: tuple[int, int]
+    digits: int = 2
+
+    @property
+    def least(self) -> tuple[int, ...]:
+        """Smallest value of each gene."""
+        return self.exponent[0], max(self.digit[0], 1), *[self.digit[0]] * (self.digits - 1)
+
+    @property
+    def most(self) -> tuple[int, ...]:
+        """Largest value of each gene."""
+        return self.exponent[1], *[self.digit[1]] * self.digits
 
     @property
     def low(self) -> float:
         """Smallest value that can be encoded (Table 4)."""
-        return _value(self.exponent[0], self.digit[0], self.digit[0])
+        return _value(self.least)
 
     @property
     def high(self) -> float:
         """Largest value that can be encoded (Table 4)."""
-        return _value(self.exponent[1], self.digit[1], self.digit[1])
+        return _value(self.most)
 
 
 @dataclass(frozen=True)
@@ -43,12 +59,14 @@ class Genome:
     Parameters
     ----------
     low, high : (n_genes,)
-        Smallest and largest value of each gene, both included; three genes a
-        parameter: exponent, first digit, second digit.
+        Smallest and largest value of each gene, both included.
+    sizes : (n_parameters,)
+        How many genes each parameter has, one after the other: exponent and digits.
     """
 
     low: IntArray
     high: IntArray
+    sizes: tuple[int, ...]
 
     @property
     def genes(self) -> int:
@@ -60,7 +78,7 @@ class Genome:
         return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
 
     def decode(self, chromosomes: IntArray) -> Array:
-        """Parameters of chromosomes, 10^g_1 (0.1 g_2 + 0.01 g_3) (eq. 10).
+        """Parameters of chromosomes, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
 
         Parameters
         ----------
@@ -71,11 +89,7 @@ class Genome:
         (n, n_parameters)
             Each the double nearest to the decimal number that is encoded.
         """
-        exponent, first, second = (chromosomes[:, gene::3] for gene in range(3))
-        # Both powers are exact doubles, and one of them is 1, so this rounds once.
-        power = exponent + (_LARGEST_POWER - 2)
-        parameters: Array = (10 * first + second) * _MULTIPLIER[power] / _DIVISOR[power]
-        return parameters
+        return np.stack([_decoded(chromosomes[:, own].T) for own in self._own], axis=1)
 
     def code(self, chromosomes: IntArray) -> IntArray:
         """Number chromosomes in the order of their genes; different ones differ.
@@ -108,17 +122,16 @@ class Genome:
         -------
         (..., n_parameters)
         """
-        parameters = np.empty((self.genes // _GENES, *codes.shape[1:]))
+        parameters = np.empty((len(self.sizes), *codes.shape[1:]))
         rest = codes
-        for parameter, values in enumerate(self._parameters_of):
-            last = _GENES * parameter + _GENES - 1
-            word, weight = self._word[last], int(self._weight[last])
-            if parameter == 0 or word != self._word[last - _GENES]:
+        for parameter, (own, values) in enumerate(zip(self._own, self._values_of, strict=True)):
+            word, weight = self._word[own.start], int(self._weight[own.stop - 1])
+            if parameter == 0 or word != self._word[own.start - 1]:
                 rest = codes[word]
             which = rest // weight if weight > 1 else rest
             if weight > 1:
                 rest = rest - which * weight
-            values.take(which, out=parameters[parameter], mode="clip")
+            values(which, parameters[parameter])
         return np.moveaxis(parameters, 0, -1)
 
     def crossed(self, parents: IntArray, cut: IntArray) -> IntArray:
@@ -168,14 +181,20 @@ class Genome:
     def _word(self) -> IntArray:
         """Word of each gene; the genes of a parameter share one."""
         words, filled = [0], 1
-        for genes in self.values.reshape(-1, _GENES).tolist():
-            filled *= prod(genes)
+        for own in self._own:
+            values = prod(self.values[own].tolist())
+            filled *= values
             if filled > 2**WORD_BITS:
                 words.append(words[-1] + 1)
-                filled = prod(genes)
+                filled = values
             else:
                 words.append(words[-1])
-        return np.repeat(words[1:], _GENES)
+        return np.repeat(words[1:], self.sizes)
+
+    @cached_property
+    def _own(self) -> list[slice]:
+        """Where the genes of each parameter are."""
+        return [slice(*ends) for ends in pairwise(accumulate(self.sizes, initial=0))]
 
     @cached_property
     def _words(self) -> int:
@@ -202,27 +221,62 @@ class Genome:
         return moduli
 
     @cached_property
-    def _parameters_of(self) -> list[Array]:
-        """All values of each parameter, by the number that its genes are."""
-        bounds = zip(
-            self.low.reshape(-1, _GENES).tolist(),
-            self.high.reshape(-1, _GENES).tolist(),
-            strict=True,
-        )
-        return [_all_values(tuple(low), tuple(high)) for low, high in bounds]
+    def _values_of(self) -> list["_Values"]:
+        """Looks up values of each parameter by the number that its genes are."""
+        return [
+            _values(tuple(self.low[own].tolist()), tuple(self.high[own].tolist()))
+            for own in self._own
+        ]
+
+
+_Values = Callable[[IntArray, Array], None]
+"""Writes the values of some numbers to an array of their shape."""
 
 
 @lru_cache(maxsize=64)
-def _all_values(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
-    """Values of a parameter in the order of its genes, (n_values,)."""
-    ranges = [np.arange(least, most + 1) for least, most in zip(low, high, strict=True)]
-    genes = np.stack(np.meshgrid(*ranges, indexing="ij"), axis=-1).reshape(-1, _GENES)
-    values: Array = Genome(np.array(low), np.array(high)).decode(genes)[:, 0]
-    return values
+def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
+    """Look up values of a parameter by the number that its genes are."""
+    exponents, mantissas = np.arange(low[0], high[0] + 1), _mantissas(low[1:], high[1:])
+    power = exponents + (_LARGEST_POWER - len(low) + 1)
+    multiplier, divisor = _MULTIPLIER[power], _DIVISOR[power]
+    if len(exponents) * len(mantissas) <= _LARGEST_TABLE:
+        table = (mantissas * multiplier[:, None] / divisor[:, None]).ravel()
+
+        def looked_up(which: IntArray, out: Array) -> None:
+            table.take(which, out=out, mode="clip")
+
+        return looked_up
+
+    def computed(which: IntArray, out: Array) -> None:
+        exponent = which // len(mantissas)
+        mantissas.take(which - exponent * len(mantissas), out=out, mode="clip")
+        out *= multiplier.take(exponent)
+        out /= divisor.take(exponent)
+
+    return computed
 
 
-_GENES = 3
-"""Genes of a parameter."""
+@lru_cache(maxsize=64)
+def _mantissas(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
+    """All digits that there may be, read as a number, ascending."""
+    numbers = np.zeros(1)
+    for least, most in zip(low, high, strict=True):
+        numbers = (10 * numbers[:, None] + np.arange(least, most + 1)).ravel()
+    return numbers
+
+
+def _decoded(genes: IntArray) -> Array:
+    """Numbers of an exponent and digits, (n_genes, n)."""
+    mantissa = np.zeros(genes.shape[1])
+    for digit in genes[1:]:
+        mantissa = 10 * mantissa + digit
+    # Both powers are exact doubles, and one of them is 1, so this rounds once.
+    power = genes[0] + (_LARGEST_POWER - len(genes) + 1)
+    return mantissa * _MULTIPLIER[power] / _DIVISOR[power]
+
+
+# A table of all values of a parameter is looked up in one go; of six digits it would take 100 MB.
+_LARGEST_TABLE = 2**17
 
 WORD_BITS = 48
 """A word of a code is below two to this power."""
@@ -245,18 +299,22 @@ def genome_of(model: SampleModel, ranges: dict[str, GeneRange]) -> Genome:
         Gene ranges by the name of the range, see `Parameter.range_name`.
     """
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
-    low = [gene for r in chosen for gene in (r.exponent[0], r.digit[0], r.digit[0])]
-    high = [gene for r in chosen for gene in (r.exponent[1], r.digit[1], r.digit[1])]
-    return Genome(np.array(low, dtype=np.int64), np.array(high, dtype=np.int64))
+    low = np.concatenate([genes.least for genes in chosen])
+    high = np.concatenate([genes.most for genes in chosen])
+    return Genome(low, high, tuple(genes.digits + 1 for genes in chosen))
 
 
 def nearest_encodable(value: float, genes: GeneRange) -> float:
     """Return the number closest to a positive value that the genes can encode."""
-    digits = range(genes.digit[0], genes.digit[1] + 1)
-    exponents = range(genes.exponent[0], genes.exponent[1] + 1)
-    candidates = (_value(e, a, b) for e in exponents for a in digits for b in digits)
-    return min(candidates, key=lambda candidate: abs(candidate - value))
+    mantissas = _mantissas(genes.least[1:], genes.most[1:])
+    found = []
+    for exponent in range(genes.exponent[0], genes.exponent[1] + 1):
+        wanted = value / 10.0 ** (exponent - genes.digits)
+        nearest = mantissas[np.argmin(np.abs(mantissas - wanted))]
+        found.append(float(f"{nearest:.0f}e{exponent - genes.digits}"))
+    return min(found, key=lambda candidate: abs(candidate - value))
 
 
-def _value(exponent: int, first: int, second: int) -> float:
-    return float(f"{10 * first + second}e{exponent - 2}")
+def _value(genes: tuple[int, ...]) -> float:
+    digits = "".join(map(str, genes[1:]))
+    return float(f"{digits}e{genes[0] - len(digits)}")
