@@ -254,6 +254,8 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
     settings = replace(
         PAPER, mutation_start=2, mutation_probability=1.0, mutated_genes=5, max_generations=2
     )
-    evolve(spying, Single(genome.low, genome.high, genome.sizes), settings, np.random.default_rng(0))
+    evolve(
+        spying, Single(genome.low, genome.high, genome.sizes), settings, np.random.default_rng(0)
+    )
     assert seen[:2] == [1, 1]
     assert seen[2] > 1
