@@ -17,6 +17,8 @@ rule all:
     default_target: True
     input:
         ALL_FILES,
+    message:
+        "All of the study is there"
 
 
 rule all_tables:

@@ -46,6 +46,9 @@ def run(arguments: Sequence[str]) -> int:
     command = [sys.executable, "-m", "snakemake", "--snakefile", str(snakefile()), *rest]
     if not known.cores and not known.profile:
         command += ["--cores", "all"]
+    if not known.dry_run and known.quiet is None:
+        # A reason lists every file that is missing; the log has them.
+        command += ["--quiet", "host", "reason"]
     if configs:
         command += ["--configfile", *map(str, configs)]
     status, stopped = _supervised(command)
@@ -85,6 +88,7 @@ def _known(rest: list[str]) -> argparse.Namespace:
     parser.add_argument("-d", "--directory")
     parser.add_argument("-c", "--cores", "-j", "--jobs", nargs="?", const="all")
     parser.add_argument("--profile", "--workflow-profile")
+    parser.add_argument("-q", "--quiet", nargs="*")
     parser.add_argument("--configfile", "--configfiles", nargs="*")
     known, _ = parser.parse_known_args(rest)
     if known.configfile is not None:
