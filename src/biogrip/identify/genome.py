@@ -1,29 +1,39 @@
 """The chromosome: three integer genes a parameter (eq. 10, Tables 3 and 4)."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from math import prod
+from typing import Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import SampleModel
+from biogrip.keys import Key, Problem
 
 
 @dataclass(frozen=True)
 class GeneRange:
-    """Values that the genes of one parameter may take (Table 3).
+    """Values that the genes of one parameter may take (Table 3)."""
 
-    Parameters
-    ----------
-    exponent
-        Lowest and highest order of magnitude g_1.
-    digit
-        Lowest and highest value of the digits g_2 and g_3.
-    """
+    exponent: Annotated[
+        tuple[Annotated[int, Key(low=-18, high=18)], Annotated[int, Key(low=-18, high=18)]],
+        Key("Lowest and highest order of magnitude g₁ (eq. 10)."),
+    ]
+    digit: Annotated[
+        tuple[Annotated[int, Key(low=1, high=9)], Annotated[int, Key(low=1, high=9)]],
+        Key("Lowest and highest value of the two digits g₂ and g₃ (eq. 10)."),
+    ]
 
-    exponent: tuple[int, int]
-    digit: tuple[int, int]
+    def problems(self) -> Iterator[Problem]:
+        """Find ends in the wrong order, and a range of one value."""
+        for gene, (low, high) in vars(self).items():
+            if low > high:
+                yield (gene,), f"found [{low}, {high}], allowed is [lowest, highest]."
+        if all(low == high for low, high in vars(self).values()):
+            text = "leaves one value, and nothing to search for; allowed are more. What is known is"
+            yield (), f"{text} given under the case's key fixed."
 
     @property
     def low(self) -> float:
