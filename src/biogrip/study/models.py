@@ -46,6 +46,11 @@ def errors_in(shape: Shape, value: Any) -> list[ErrorDetails]:
     return []
 
 
+def json_schema(block: type) -> dict[str, Any]:
+    """Return the JSON Schema of a class whose fields are keys."""
+    return _model(block).model_json_schema()
+
+
 def word(shape: Shape) -> str:
     """Name a kind of value."""
     if shape.options:
@@ -100,9 +105,11 @@ def _annotation(shape: Shape) -> Any:
     limits: dict[str, Any] = {"ge": key.low, "gt": key.above, "le": key.high}
     limits |= {"min_length": key.fewest, "max_length": key.most}
     extra: dict[str, Any] = {"unit": key.unit} if key.unit else {}
+    if key.unique:
+        extra["uniqueItems"] = True
     if key.pattern:
-        # Of a letter, ECMA's expressions have another name.
-        extra["pattern"] = f"^{key.pattern}$".replace(r"\w", r"\p{L}\p{N}_")
+        # To the expressions of a JSON Schema, letters are those of ASCII.
+        extra["pattern"] = f"^{key.pattern}$".replace(r"\w", r"\w\u00aa-\uffff")
     said: list[Any] = [
         Field(
             description=shape.text or None,

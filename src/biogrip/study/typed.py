@@ -99,13 +99,14 @@ def spread(block: Any) -> Entry | None:
 @cache
 def keys(block: type) -> dict[str, Entry]:
     """Return the keys of a block that have names, those of all methods among them."""
-    found = {name: e for name, e in entries(block).items() if not e.shape.key.spread}
-    rest = spread(block)
-    several = getattr(rest.shape.block, "classes", None) if rest else None
-    if several:
-        for name, kind in several().items():
-            needed = any(entry.needed for entry in keys(kind).values())
-            found[name] = Entry(name, Shape(Key(), block=kind), needed)
+    found = {}
+    for name, entry in entries(block).items():
+        if not entry.shape.key.spread:
+            found[name] = entry
+        elif several := getattr(entry.shape.block, "classes", None):
+            for inner, kind in several().items():
+                needed = any(entry.needed for entry in keys(kind).values())
+                found[inner] = Entry(inner, Shape(Key(), block=kind), needed)
     return found
 
 
@@ -140,11 +141,12 @@ def _counted(key: Key, hint: Any) -> Key:
 
 def built(kind: type[T], block: Mapping[str, Any]) -> T:
     """Make the object that a checked plain block says."""
+    known: Any = kind
     given: dict[str, Any] = {}
-    rest = spread(kind)
+    rest = spread(known)
     others: dict[str, Any] = {}
     for name, value in block.items():
-        entry = entries(kind).get(name)
+        entry = entries(known).get(name)
         if entry is None or entry is rest:
             others[name] = value
         else:
@@ -197,7 +199,7 @@ def parts(value: Any) -> Iterator[tuple[str | int, Any]]:
     if hasattr(value, "classes"):
         yield from ((name, value.block(name)) for name in value.classes())
     elif is_dataclass(value):
-        for name, entry in entries(type(value)).items():
+        for name, entry in entries(value.__class__).items():
             inner = getattr(value, name)
             yield from parts(inner) if entry.shape.key.spread else [(name, inner)]
     elif isinstance(value, Mapping):
