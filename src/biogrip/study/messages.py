@@ -9,11 +9,11 @@ from biogrip.errors import nearest
 from biogrip.keys import Key, Problem
 from biogrip.study.models import FORM, TWICE, errors_in, word
 from biogrip.study.typed import Shape, keys, spread
-from biogrip.traces.recordings import nearest_unit
+from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, nearest_unit
 
 MOST_EXPLAINED = 1000
 
-_UNITS = ("time_unit", "rotation_unit")
+_UNITS = (tuple(TIME_UNITS), tuple(ROTATION_UNITS))
 _LONGEST = 40
 _KEY = "[key]"
 
@@ -98,7 +98,7 @@ def _explained(
         case "literal_error":
             # Of a key that is none of those allowed, the block is said that has it.
             place = path[:-1] if above.names is leaf else path
-            known = nearest_unit if path[-1] in _UNITS else nearest
+            known = nearest_unit if key.choices in _UNITS else nearest
             hint = known(found, key.choices)
             return place, f"found {_shown(found)}.{hint} Allowed: {', '.join(key.choices)}."
         case _ if error == FORM and above.names is leaf:
