@@ -13,23 +13,11 @@ from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.reference import file_schema
 from biogrip.study.source import read_config
-from biogrip.study.typed import Shape, keys
+from biogrip.study.typed import keys
+from tests.study.keys import leaves
 
 CONFIG = Path(__file__).parents[2] / "config"
 SCHEMA: dict[str, Any] = json.loads(file_schema())
-
-
-def leaves(block: type, path: str = "") -> dict[str, Shape]:
-    """Every key that a block may have, with what its value may look like."""
-    found: dict[str, Shape] = {}
-    for name, entry in keys(block).items():
-        shape = entry.shape
-        parts = (shape, shape.items, shape.values, *shape.options)
-        inner = next((part.block for part in parts if part and part.block), None)
-        found[f"{path}{name}"] = shape
-        if inner:
-            found |= leaves(inner, f"{path}{name}.")
-    return found
 
 
 def test_every_key_says_what_it_means() -> None:

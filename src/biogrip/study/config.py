@@ -12,6 +12,7 @@ from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.sweeps import SweepBlock
 from biogrip.study.typed import parts
 
+_MOST_BATCHES = 10_000
 _CASE_NAME = Key(
     pattern="[A-Za-z][A-Za-z0-9_-]{0,63}",
     form="a letter, then up to 63 letters, digits, '_' or '-'",
@@ -131,7 +132,13 @@ class StudyConfig(Shared):
     ] = field(default_factory=dict)
 
     def problems(self) -> Iterator[Problem]:
-        """Find samples that do not fit, and keys that are marked and not there."""
+        """Find too many jobs, samples that do not fit, and keys that are marked and not there."""
+        if self.batch_size is not None:
+            tests = (case.identifiability.coverage_seeds for case in self.cases.values())
+            seeds = max(self.seeds, *tests)
+            if seeds > _MOST_BATCHES * self.batch_size:
+                text = f"found {self.batch_size}, which makes {seeds} seeds more than "
+                yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
         for name, case in self.cases.items():
             for path, text in case.contact_problems(self.actuator):
                 yield ("cases", name, *path), text

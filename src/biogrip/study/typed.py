@@ -161,14 +161,14 @@ def built(kind: type[T], block: Mapping[str, Any]) -> T:
 
 def typed(shape: Shape, value: Any) -> Any:
     """Make what a checked plain value says."""
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         if shape.options:
             shape = next(o for o in shape.options if o.block or o.values)
         if shape.block:
             return built(shape.block, value)
         inner = shape.values
         return {n: typed(inner, v) for n, v in value.items()} if inner else dict(value)
-    if isinstance(value, list | tuple):
+    if isinstance(value, list):
         items = next((o.items for o in (shape, *shape.options) if o.items), None)
         if items is None or items.single:
             return tuple(value)
