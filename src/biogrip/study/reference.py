@@ -66,7 +66,10 @@ def _partial(node: Any, name: str = "") -> Any:
     if isinstance(node, Mapping):
         left = {"required", "title", "default"} if name != "properties" else set()
         return {key: _partial(inner, key) for key, inner in node.items() if key not in left}
-    return [_partial(item) for item in node] if isinstance(node, list) else node
+    if isinstance(node, list):
+        return [_partial(item) for item in node]
+    # Versions of pydantic differ in how they write a whole number.
+    return int(node) if isinstance(node, float) and node.is_integer() else node
 
 
 def _section(title: str, text: str, rows: list[_Row]) -> str:
