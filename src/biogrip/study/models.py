@@ -112,7 +112,7 @@ def _annotation(shape: Shape) -> Any:
         extra["pattern"] = f"^{key.pattern}$".replace(r"\w", r"\w\u00aa-\uffff")
     said: list[Any] = [
         Field(
-            description=shape.text or None,
+            description=key.text or None,
             json_schema_extra=extra or None,
             **{name: limit for name, limit in limits.items() if limit is not None},
         )
