@@ -73,7 +73,7 @@ bench: $(BENCH_READY)
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html
 
-# Config keys described from the schema; the tests fail if this is forgotten.
+# Config keys described from their classes, and a JSON Schema for editors; the tests fail if this is forgotten.
 docs: $(READY)
 	$(BIN)/python -m tests.generated_docs
 

@@ -20,7 +20,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import rms
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import METHODS as OURS
-from biogrip.identify.methods import identifier, method_settings
+from biogrip.identify.methods import identifier
 
 Method = Callable[[Problem, np.random.Generator], Array]
 """Finds parameters of low misfit, from the trace on."""
@@ -44,7 +44,7 @@ a share of the trace's RMS. A share of {_RUNS} runs is good to 8 % or better."""
 
 def by_study(p: Problem, rng: np.random.Generator, *, name: str) -> Array:
     """Identify by a method of the study."""
-    (found,) = identifier(name, method_settings(name, p.blocks))([p.posed()], [rng], silent)
+    (found,) = identifier(name, p.settings.of(name))([p.posed()], [rng], silent)
     return found.parameters
 
 

@@ -1,9 +1,8 @@
 """The problem that all benchmarks share: one noisy trace of the default study."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import yaml
@@ -12,7 +11,6 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.experiment.sample import SampleModel, model_named
-from biogrip.identify.genetic import settings_of as genetic_settings
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
@@ -21,6 +19,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import misfit_of
 from biogrip.study.load import load_study
+from biogrip.study.method_blocks import MethodBlocks
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 CASE = "endothelial_cell"
@@ -45,8 +44,8 @@ class Problem:
         RMS of the noise in it.
     ranges, genome, genetic
         Where and how the study searches.
-    blocks
-        All of the case's config.
+    settings
+        Those of the study's methods.
     """
 
     gripper: Gripper
@@ -59,7 +58,7 @@ class Problem:
     ranges: dict[str, GeneRange]
     genome: Genome
     genetic: GeneticSettings
-    blocks: Mapping[str, Any]
+    settings: MethodBlocks
 
     @property
     def interval_s(self) -> float:
@@ -110,6 +109,8 @@ def problem(
     trace = add_noise(clean, chosen.noise, np.random.default_rng(seed))
     model = model_named(chosen.sample.name, branches)
     ranges = chosen.ranges
+    genetic = chosen.method("genetic")
+    assert isinstance(genetic, GeneticSettings)
     return Problem(
         gripper,
         model,
@@ -120,6 +121,6 @@ def problem(
         rms(trace - clean),
         ranges,
         genome_of(model, ranges),
-        genetic_settings(chosen.block),
-        chosen.block,
+        genetic,
+        chosen.block.of_methods,
     )

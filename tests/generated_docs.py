@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from biogrip.study.reference import reference
+from biogrip.study.reference import file_schema, reference
 
 ROOT = Path(__file__).parents[1]
 ERRORS = ROOT / "results" / "published" / "tables" / "errors.csv"
@@ -48,13 +48,17 @@ def _percent(text: str) -> str:
 
 GENERATED = {
     ROOT / "config" / "README.md": ("keys", config_keys),
+    ROOT / "config" / "schema.json": ("", file_schema),
     ROOT / "README.md": ("results", paper_against_study),
 }
+"""Which part of a document is written, all of it if none is named, and by what."""
 
 
 def renewed(path: Path) -> str:
     """Return a document with its generated part as it should be."""
     name, content = GENERATED[path]
+    if not name:
+        return content()
     pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
     return re.sub(
         pattern,

@@ -18,11 +18,11 @@ from biogrip.identifiability.many_profiles import profiles_of
 from biogrip.identifiability.profile import Likelihood, likelihood_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
-from biogrip.identify.methods import identifier, method_settings
+from biogrip.identify.methods import identifier
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.study import build
 from tests.identifiability.definition import rise_at, rises_along
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, problem, run, study_torque
+from tests.identify.test_methods import MODEL, SAMPLES, problem, run, study_torque
+from tests.products.default import STUDY
 
 ALLOWED = 0.01
 # Random starts at a limit; steps on the way to one.
@@ -42,15 +42,15 @@ def likelihood_for(case: str, seed: int) -> Likelihood:
 @functools.cache
 def _example() -> Problem:
     time_s, rotation_rad = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1, unpack=True)
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
-    ranges = build.gene_ranges(CONFIG["search_range"])
+    gripper, torque = STUDY.gripper, study_torque()
+    ranges = STUDY.ranges
     return problem_of(gripper, MODEL, torque, time_s, rotation_rad, ranges)
 
 
 def example(name: str) -> Likelihood:
     """Likelihood of the example trace in a file of some name: its random starts follow from it."""
-    rng = stream(CONFIG["study_seed"], name, 0, "identifiability")
-    identify = identifier("least_squares", method_settings("least_squares", CONFIG))
+    rng = stream(STUDY.study_seed, name, 0, "identifiability")
+    identify = identifier("least_squares", STUDY.config.of_methods.of("least_squares"))
     (found,) = identify([_example()], [rng], silent)
     return likelihood_of(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
 

@@ -26,8 +26,8 @@ from biogrip.identifiability.verdicts import (
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
-from biogrip.study import build
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, problem, run, study_torque
+from tests.identify.test_methods import MODEL, SAMPLES, clean, problem, run, study_torque
+from tests.products.default import STUDY
 
 DAMPER = MODELS["damper"]
 
@@ -35,12 +35,12 @@ DAMPER = MODELS["damper"]
 def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
     """The default study's problem for any model and trace."""
     return problem_of(
-        build.gripper(CONFIG["gripper"]),
+        STUDY.gripper,
         model,
         study_torque(),
         times,
         trace,
-        build.gene_ranges(CONFIG["search_range"]),
+        STUDY.ranges,
     )
 
 
@@ -185,7 +185,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     """A stiff Maxwell liquid, seen slowly: its damper is determined, its spring bounded below."""
 
     times, _ = clean("liquid_drop_1")
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
+    gripper, torque = STUDY.gripper, study_torque()
     response = rotation(step_response(gripper, DAMPER.network([[10.0]])), torque, times)[0]
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     maxwell = MODELS["maxwell"]

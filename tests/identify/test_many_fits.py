@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,13 +20,13 @@ from biogrip.identify.multi_start import screened
 from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.identify.settling import settled
 from biogrip.response.linear import rotation, step_response
-from biogrip.study import build
-from tests.identify.test_methods import CONFIG, MODEL, SAMPLES, clean, study_torque
+from tests.identify.test_methods import MODEL, SAMPLES, clean, study_torque
+from tests.products.default import STUDY
 from tests.response.test_sensitivity import MODEL_PARAMETERS
 
-SETTINGS = least_squares.settings_of(CONFIG)
-GRIPPER, TORQUE = build.gripper(CONFIG["gripper"]), study_torque()
-RANGES = build.gene_ranges(CONFIG["search_range"])
+SETTINGS: Any = STUDY.config.of_methods.of("least_squares")
+GRIPPER, TORQUE = STUDY.gripper, study_torque()
+RANGES = STUDY.ranges
 
 
 def posed(
@@ -210,7 +211,7 @@ def test_answers_are_those_of_one_at_a_time(case: str) -> None:
 
 def test_the_genetic_algorithm_is_polished_alike() -> None:
     problems = of_case("liquid_drop_2", 2)
-    settings = genetic_refined.settings_of(CONFIG)
+    settings: Any = STUDY.config.of_methods.of("genetic_refined")
     rngs = [np.random.default_rng(seed) for seed in range(2)]
     for seed, answer in enumerate(genetic_refined.identify_many(problems, settings, rngs)):
         alone = genetic_refined.identify(problems[seed], settings, np.random.default_rng(seed))

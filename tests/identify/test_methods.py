@@ -2,12 +2,10 @@
 
 import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise, rms
@@ -16,28 +14,25 @@ from biogrip.experiment.sample import MODELS
 from biogrip.identify import many_starts, multi_start
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
-from biogrip.identify.methods import METHODS, identifier, method_settings
+from biogrip.identify.methods import METHODS, identifier
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.residuals import Residuals
-from biogrip.study import build
+from tests.products.default import STUDY
 
-CONFIG: dict[str, Any] = yaml.safe_load(
-    (Path(__file__).parents[2] / "config" / "config.yaml").read_text()
-)
 MODEL = MODELS["generalized_maxwell"]
-SAMPLES = {name: case["sample"] for name, case in CONFIG["cases"].items()}
+SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
 CONTINUOUS = ("genetic_refined", "least_squares")
 
 
 def study_torque() -> TorqueHistory:
     """The default study's protocol."""
-    return torque_history(build.phases(CONFIG["protocol"], CONFIG["actuator"]))
+    return torque_history(STUDY.phases)
 
 
 @functools.cache
 def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
+    gripper, torque = STUDY.gripper, study_torque()
     times = sample_times(400.0, rate_Hz)
     network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
     return times, rotation(step_response(gripper, network), torque, times)[0]
@@ -47,13 +42,13 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
     times, response = clean(case, rate_Hz)
     rng = np.random.default_rng([seed, 7])
     trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
-    ranges = build.gene_ranges(CONFIG["search_range"])
+    gripper, torque = STUDY.gripper, study_torque()
+    ranges = STUDY.ranges
     return problem_of(gripper, MODEL, torque, times, trace, ranges)
 
 
 def run(method: str, posed: Problem, seed: int = 0) -> Identification:
-    identify = identifier(method, method_settings(method, CONFIG))
+    identify = identifier(method, STUDY.config.of_methods.of(method))
     (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
     return answer
 
@@ -62,7 +57,7 @@ def run(method: str, posed: Problem, seed: int = 0) -> Identification:
 def test_an_answer_is_what_it_says(method: str) -> None:
     posed = problem("liquid_drop_2", 0)
     told: list[tuple[int, float]] = []
-    identify = identifier(method, method_settings(method, CONFIG))
+    identify = identifier(method, STUDY.config.of_methods.of(method))
     rng = np.random.default_rng(0)
     (answer,) = identify([posed], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history
@@ -185,8 +180,8 @@ def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
 
 def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
-    ranges = build.gene_ranges(CONFIG["search_range"])
+    gripper, torque = STUDY.gripper, study_torque()
+    ranges = STUDY.ranges
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
     posed = problem_of(gripper, MODEL, torque, times, trace, ranges, offset=True, drift=True)

@@ -130,7 +130,9 @@ def test_the_papers_budget(gripper: Gripper, steps: TorqueHistory) -> None:
 
 
 def test_polished_populations(gripper: Gripper, steps: TorqueHistory) -> None:
-    settings = genetic_refined.RefinedSettings(replace(SMALL, max_generations=8), 2, 1)
+    settings = genetic_refined.RefinedSettings(
+        replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
+    )
     # As in a case of the study, whose traces share what is the same for all.
     shared = condensed_of(steps, np.arange(401.0), offset=False, drift=False)
     problems = posed(gripper, steps, 2, condensed=shared)

@@ -16,30 +16,20 @@ from biogrip.response.linear import phi_function, rotation, rotation_rate, step_
 from biogrip.response.misfit import misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
-from biogrip.study import build
+from biogrip.study.protocol_block import PhaseBlock, ProtocolBlock
 from tests.instrument.test_actuator import TABLE_2
 from tests.response.reference import random_samples
 
-ACTUATOR = {
-    "thickness_m": 40e-6,
-    "finger_width_m": 4e-6,
-    "finger_gap_m": 3e-6,
-    "fingers": 66,
-    "first_radius_m": 321e-6,
-    "finger_angle_deg": 6.0,
-    "stroke_deg": 4.5,
-    "initial_overlap_deg": 1.5,
-}
-PROTOCOL = {
-    "phases": [
-        {"duration_s": 20.0, "torque_Nm": 0.0, "to_torque_Nm": 2e-9},
-        {"duration_s": 30.0, "voltage_V": 12.0, "amplitude_V": 5.0, "frequency_Hz": 0.3},
-        {"duration_s": 10.0, "voltage_V": 3.0, "to_voltage_V": 15.0},
-        {"duration_s": 15.0, "torque_Nm": 1e-9, "amplitude_Nm": 5e-10, "frequency_Hz": 1.1},
-        {"duration_s": 15.0, "torque_Nm": 0.5e-9},
-    ]
-}
-TORQUE = torque_history(build.phases(PROTOCOL, ACTUATOR))
+PROTOCOL = ProtocolBlock(
+    (
+        PhaseBlock(20.0, torque_Nm=0.0, to_torque_Nm=2e-9),
+        PhaseBlock(30.0, voltage_V=12.0, amplitude_V=5.0, frequency_Hz=0.3),
+        PhaseBlock(10.0, voltage_V=3.0, to_voltage_V=15.0),
+        PhaseBlock(15.0, torque_Nm=1e-9, amplitude_Nm=5e-10, frequency_Hz=1.1),
+        PhaseBlock(15.0, torque_Nm=0.5e-9),
+    )
+)
+TORQUE = torque_history(PROTOCOL.torques(TABLE_2))
 EDGES = np.array([0.0, 20.0, 50.0, 60.0, 75.0, 90.0])
 
 

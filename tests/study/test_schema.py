@@ -1,35 +1,78 @@
+"""What is said of every key, and the JSON Schema that follows from it."""
+
+import json
+from pathlib import Path
 from typing import Any
 
-from biogrip.study.validation import OVERRIDABLE, schema
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
 
+from biogrip.identify.methods import METHODS
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
+from biogrip.study.config import StudyConfig
+from biogrip.study.reference import file_schema
+from biogrip.study.source import read_config
+from biogrip.study.typed import keys
+from tests.study.keys import leaves
 
-def keys(node: Any, path: str = "") -> list[tuple[str, dict[str, Any]]]:
-    """Every key that a config may have, with its schema."""
-    found: list[tuple[str, dict[str, Any]]] = []
-    if isinstance(node, dict):
-        for name, inner in node.items():
-            if name == "properties":
-                found += [(f"{path}.{key}", leaf) for key, leaf in inner.items()]
-            found += keys(inner, f"{path}.{name}")
-    return found
+CONFIG = Path(__file__).parents[2] / "config"
+SCHEMA: dict[str, Any] = json.loads(file_schema())
 
 
 def test_every_key_says_what_it_means() -> None:
-    known = keys(schema())
+    known = leaves(StudyConfig)
     assert len(known) > 80
-    bare = [path for path, leaf in known if "$ref" not in leaf and "description" not in leaf]
-    assert bare == []
+    assert [path for path, shape in known.items() if not shape.text] == []
+
+
+def test_every_number_has_bounds() -> None:
+    numbers = {path: s.key for path, s in leaves(StudyConfig).items() if s.scalar in (int, float)}
+    assert len(numbers) > 40
+    assert [path for path, key in numbers.items() if key.high is None] == []
+    assert [p for p, key in numbers.items() if key.low is None and key.above is None] == []
 
 
 def test_every_block_refuses_unknown_keys() -> None:
-    """All but the sample, whose parameters depend on its model and are checked by name."""
-    blocks = {"": schema(), **schema()["$defs"]}
+    """All but those that take names of the user's or of a model's."""
+    blocks = {"": SCHEMA, **SCHEMA["$defs"]}
     with_keys = {name: block for name, block in blocks.items() if "properties" in block}
-    assert [n for n, b in with_keys.items() if b.get("additionalProperties") is not False] == [
-        "sample"
-    ]
+    open_ = [n for n, b in with_keys.items() if b.get("additionalProperties") is not False]
+    assert sorted(open_) == ["SampleBlock", "ValueBlock"]
 
 
-def test_a_case_may_override_what_the_library_says() -> None:
-    case = schema()["$defs"]["case"]["properties"]
-    assert all(case[name] == {"$ref": f"#/$defs/{name}"} for name in OVERRIDABLE)
+def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
+    methods = {block for method in METHODS.values() for block in method.blocks}
+    assert methods < set(OVERRIDABLE)
+    assert set(OVERRIDABLE) == set(keys(CaseBlock)) & set(keys(StudyConfig))
+
+
+def test_the_schema_is_one() -> None:
+    Draft202012Validator.check_schema(SCHEMA)
+
+
+@pytest.mark.parametrize("file", sorted(CONFIG.glob("*.yaml")), ids=lambda file: file.stem)
+def test_the_schema_knows_the_files_that_there_are(file: Path) -> None:
+    assert [e.message for e in Draft202012Validator(SCHEMA).iter_errors(read_config(file))] == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "seedz: 3",
+        "seeds: 0",
+        "gripper: {left: {mass_kg: 1}}",
+        "measurement: {noise: {kind: pink}}",
+        "methods: [guessing]",
+        "least_squares: {starts: many}",
+        "cases: {x: {sample: {model: jelly}}}",
+        "protocol: {phases: []}",
+    ],
+)
+def test_the_schema_marks_what_the_study_refuses(text: str) -> None:
+    assert list(Draft202012Validator(SCHEMA).iter_errors(yaml.safe_load(text)))
+
+
+def test_the_files_name_their_schema() -> None:
+    for file in CONFIG.glob("*.yaml"):
+        assert file.read_text(encoding="utf-8").startswith("# yaml-language-server: $schema=schema")

@@ -1,5 +1,5 @@
-import copy
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +7,7 @@ import pytest
 import yaml
 
 from biogrip.errors import BiogripError
+from biogrip.experiment.noise import Noise
 from biogrip.products.digest import digest
 from biogrip.products.heat_maps import ShownAxis, heat_maps
 from biogrip.products.stages.identification import IDENTIFICATION
@@ -63,19 +64,18 @@ def test_points_are_the_base_case_with_two_values_changed(tmp_path: Path) -> Non
     ]
     base = study.cases["liquid_drop_2"]
     point = study.points["liquid_drop_2--noise--0_02--uniform-peak"]
-    wanted = copy.deepcopy(dict(base.block))
-    wanted["measurement"]["noise"] = {"kind": "uniform", "level": 0.02, "reference": "peak"}
-    assert point.block == wanted
+    noisier = replace(base.block.measurement, noise=Noise("uniform", 0.02, "peak"))
+    assert point.block == replace(base.block, measurement=noisier)
     assert (point.parameters, point.sample) == (base.parameters, base.sample)
-    assert base.block["measurement"]["noise"]["level"] == 0.1
+    assert base.block.measurement.noise.level == 0.1
     assert not set(study.points) & set(study.cases)
 
 
 def test_a_list_of_keys_changes_all_of_them(tmp_path: Path) -> None:
     text = SWEEP.replace("key: measurement.noise.level", f"key: [{', '.join(ARMS)}]")
     study = load(tmp_path, text.replace("[0.1, 2e-2]", "[2.2e-7]"))
-    arms = study.points["endothelial_cell--noise--2_2e-07--uniform-peak"].block["gripper"]
-    assert [arms[arm]["stiffness_Nm_per_rad"] for arm in ("left", "right")] == [2.2e-7] * 2
+    arms = study.points["endothelial_cell--noise--2_2e-07--uniform-peak"].block.gripper
+    assert [arm.stiffness_Nm_per_rad for arm in (arms.left, arms.right)] == [2.2e-7] * 2
 
 
 @pytest.mark.parametrize(

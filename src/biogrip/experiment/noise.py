@@ -1,30 +1,31 @@
 """What the instrument records: the rotation with noise on it."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.keys import Key
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise added to the noise-free rotation.
+    """Noise added to the noise-free rotation."""
 
-    Parameters
-    ----------
-    kind
-        ``"gaussian"`` or ``"uniform"``.
-    level
-        Standard deviation as a share of the reference, for either kind.
-    reference
-        ``"peak"``: the largest noise-free rotation; ``"signal"``: the
-        noise-free rotation at each instant.
-    """
-
-    kind: str
-    level: float
-    reference: str
+    kind: Annotated[str, Key("Distribution of the noise.", choices=("gaussian", "uniform"))]
+    level: Annotated[
+        float,
+        Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
+    ]
+    reference: Annotated[
+        str,
+        Key(
+            "`peak`: the largest rotation of the noise-free trace, the same noise everywhere; "
+            "`signal`: the noise-free rotation at each instant.",
+            choices=("peak", "signal"),
+        ),
+    ]
 
 
 def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Array:

@@ -2,31 +2,44 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Annotated
 
-from biogrip.experiment.sample import Parameter, Sample, SampleModel
+from biogrip.experiment.sample import SINGLE_BRANCH, Parameter, Sample, SampleModel
+from biogrip.keys import Key
+
+_PRINTED = Key(choices=tuple(parameter.name for parameter in SINGLE_BRANCH))
+_SIGNED = Key(
+    pattern=r"[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?",
+    form="a number of at most 12 characters, with < or > before it where the paper has it",
+)
 
 
 @dataclass(frozen=True)
 class Published:
-    """What the paper reports of a sample; data to compare with.
+    """What the paper reports of a sample; data to compare with."""
 
-    Parameters
-    ----------
-    table, figure, generation
-        Numbers of the table and of the figure; generation at which the figure
-        shows the fit. None where the paper has none.
-    axis_rad
-        Ends of the figure's rotation axis.
-    identified, error_percent
-        Identified parameters in SI units, and their errors as printed, by name.
-    """
-
-    table: int | None = None
-    figure: int | None = None
-    generation: int | None = None
-    axis_rad: tuple[float, ...] = ()
-    identified: Mapping[str, float] = field(default_factory=dict)
-    error_percent: Mapping[str, str] = field(default_factory=dict)
+    table: Annotated[
+        int | None, Key("Number of the paper's table.", low=1, high=1000, needed=True)
+    ] = None
+    figure: Annotated[
+        int | None, Key("Number of the paper's figure of the fit.", low=1, high=1000)
+    ] = None
+    generation: Annotated[
+        int | None,
+        Key("Generation at which the paper shows the fit.", low=1, high=1_000_000),
+    ] = None
+    axis_rad: Annotated[
+        tuple[Annotated[float, Key(low=-10, high=10)], ...],
+        Key("Ends of the rotation axis of the paper's figure.", "rad", fewest=2, most=2),
+    ] = ()
+    identified: Annotated[
+        Mapping[Annotated[str, _PRINTED], Annotated[float, Key(low=0, high=1e12)]],
+        Key("Identified parameters as printed, SI units.", needed=True),
+    ] = field(default_factory=dict)
+    error_percent: Annotated[
+        Mapping[Annotated[str, _PRINTED], Annotated[str, _SIGNED]],
+        Key("Their errors in percent as printed, in quotes, for some are no numbers.", needed=True),
+    ] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

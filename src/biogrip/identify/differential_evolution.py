@@ -1,8 +1,7 @@
 """SciPy's differential evolution on log-parameters, a whole generation evaluated at once."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 from scipy import optimize
@@ -10,31 +9,23 @@ from scipy import optimize
 from biogrip.arrays import Array
 from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.problem import Problem
+from biogrip.keys import Key
 
 
 @dataclass(frozen=True)
 class DifferentialEvolutionSettings:
-    """SciPy's settings of the same names.
+    """SciPy's differential evolution, on the logarithms of the parameters."""
 
-    Parameters
-    ----------
-    popsize
-        Individuals per parameter.
-    maxiter
-        Generations at most.
-    tol
-        Stop when the standard deviation of the population's misfits is below
-        this share of their mean.
-    """
-
-    popsize: int
-    maxiter: int
-    tol: float
-
-
-def settings_of(blocks: Mapping[str, Any]) -> DifferentialEvolutionSettings:
-    """Build the settings from the config's ``differential_evolution`` block."""
-    return DifferentialEvolutionSettings(**blocks["differential_evolution"])
+    popsize: Annotated[int, Key("Individuals per parameter.", low=2, high=10_000)]
+    maxiter: Annotated[int, Key("Generations at most.", low=1, high=1_000_000)]
+    tol: Annotated[
+        float,
+        Key(
+            "Stop when the population's misfits scatter by less than this share of their mean.",
+            above=0,
+            high=1,
+        ),
+    ]
 
 
 def identify(

@@ -1,8 +1,7 @@
 """The paper's genetic algorithm (section 4), every reading of it a setting."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,11 +64,6 @@ def identify_many(
     """
     evolutions = evolve_problems(problems, settings, rngs, progress)
     return [evolution.identification for evolution in evolutions]
-
-
-def settings_of(blocks: Mapping[str, Any]) -> GeneticSettings:
-    """Build the settings from the config's ``genetic_algorithm`` block."""
-    return GeneticSettings(**blocks["genetic_algorithm"])
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ The last survivors crowd in one basin. The survivors of the initial population
 are still everywhere, so local fits start from the best of both.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +17,22 @@ from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.many_starts import best_of_many_starts
 from biogrip.identify.multi_start import Row
 from biogrip.identify.problem import Problem
+from biogrip.keys import Key
+
+
+@dataclass(frozen=True)
+class Polishing:
+    """Local fits from survivors of the genetic algorithm."""
+
+    first: Annotated[
+        int,
+        Key(
+            "How many survivors of the initial population are polished, the best.",
+            low=0,
+            high=10_000,
+        ),
+    ]
+    last: Annotated[int, Key("The same of the last population.", low=1, high=10_000)]
 
 
 @dataclass(frozen=True)
@@ -27,18 +43,12 @@ class RefinedSettings:
     ----------
     genetic
         How the population evolves.
-    first, last
-        Number of survivors polished of the initial and of the last population.
+    polishing
+        How many local fits follow.
     """
 
     genetic: GeneticSettings
-    first: int
-    last: int
-
-
-def settings_of(blocks: Mapping[str, Any]) -> RefinedSettings:
-    """Build the settings from the config's ``genetic_algorithm`` and ``genetic_refined`` blocks."""
-    return RefinedSettings(genetic.settings_of(blocks), **blocks["genetic_refined"])
+    polishing: Polishing
 
 
 def identify(
@@ -96,8 +106,8 @@ def _survivors(evolution: genetic.Evolution, settings: RefinedSettings) -> tuple
     coarse = evolution.identification
     starts = np.concatenate(
         (
-            evolution.last_survivors[: settings.last],
-            evolution.first_survivors[: settings.first],
+            evolution.last_survivors[: settings.polishing.last],
+            evolution.first_survivors[: settings.polishing.first],
         )
     )
     median = float(coarse.history.median_misfit[-1])

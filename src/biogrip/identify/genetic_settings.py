@@ -1,45 +1,83 @@
 """How the paper's genetic algorithm is read."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.keys import Key, Problem
+
+_MOST = 1_000_000
 
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """How the population evolves.
+    """How the population evolves (section 4)."""
 
-    Parameters
-    ----------
-    population
-        Individuals in a generation.
-    survivors
-        The best so many live on unchanged and are the parents.
-    mating
-        ``"pairs"``: the survivors form random disjoint pairs; ``"rank"``:
-        parents are drawn with a probability proportional to their rank.
-    first_cut, last_cut
-        Crossover point: the number of genes kept from the first parent is drawn
-        uniformly from this range. Negative numbers count from the end: -1 is one
-        less than the chromosome has.
-    mutation_start
-        First generation in which children mutate.
-    mutation_probability
-        Share of children that mutate.
-    mutated_genes
-        Genes redrawn in a child that mutates.
-    patience
-        Stop after so many generations without a better best misfit.
-    min_generations, max_generations
-        Never stop before, always stop at.
-    """
+    population: Annotated[int, Key("Individuals in a generation.", low=4, high=_MOST)]
+    survivors: Annotated[
+        int,
+        Key(
+            "The best so many live on unchanged and are the parents of the others.",
+            low=2,
+            high=_MOST,
+        ),
+    ]
+    mating: Annotated[
+        str,
+        Key(
+            "`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a "
+            "probability proportional to their rank.",
+            choices=("pairs", "rank"),
+        ),
+    ]
+    first_cut: Annotated[
+        int,
+        Key("Smallest number of genes that a child takes from its first parent.", low=1, high=50),
+    ]
+    last_cut: Annotated[
+        int,
+        Key(
+            "Largest number of genes that a child takes from its first parent. Negative numbers "
+            "count from the end; -1 is one less than the chromosome has, 11 with twelve genes.",
+            low=-50,
+            high=50,
+        ),
+    ]
+    mutation_start: Annotated[
+        int, Key("First generation whose children mutate.", low=1, high=_MOST)
+    ]
+    mutation_probability: Annotated[float, Key("Share of the children that mutate.", low=0, high=1)]
+    mutated_genes: Annotated[
+        int,
+        Key(
+            "How many times a gene of such a child is chosen and redrawn from its range.",
+            low=1,
+            high=50,
+        ),
+    ]
+    patience: Annotated[
+        int,
+        Key(
+            "Stop after so many generations in which the best misfit has not improved.",
+            low=1,
+            high=_MOST,
+        ),
+    ]
+    min_generations: Annotated[int, Key("Do not stop earlier.", low=0, high=_MOST)]
+    max_generations: Annotated[int, Key("Stop then at the latest.", low=1, high=_MOST)]
 
-    population: int
-    survivors: int
-    mating: str
-    first_cut: int
-    last_cut: int
-    mutation_start: int
-    mutation_probability: float
-    mutated_genes: int
-    patience: int
-    min_generations: int
-    max_generations: int
+    def problems(self) -> Iterator[Problem]:
+        """Find what leaves no children, and a stop before the start."""
+        if self.survivors >= self.population:
+            text = f"found {self.survivors}, allowed is less than population"
+            yield ("survivors",), f"{text}, which is {self.population}."
+        if self.min_generations > self.max_generations:
+            text = f"found {self.min_generations}, allowed is at most max_generations"
+            yield ("min_generations",), f"{text}, which is {self.max_generations}."
+
+    def problems_of(self, genes: int) -> Iterator[Problem]:
+        """Find cuts that a chromosome of some length cannot have."""
+        last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
+        if genes and not 1 <= self.first_cut <= last:
+            text = f"found {self.first_cut}, allowed is 1 to last_cut, "
+            yield ("first_cut",), f"{text}which is {last} of {genes} genes here."

@@ -1,35 +1,44 @@
 """The chromosome: an exponent and some digits a parameter, each a gene (eq. 10, Tables 3, 4)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from math import prod
+from typing import Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import SampleModel
+from biogrip.keys import Key, Problem
 
 
 @dataclass(frozen=True)
 class GeneRange:
-    """Values that the genes of one parameter may take (Table 3).
+    """Values that the genes of one parameter may take (Table 3)."""
 
-    Parameters
-    ----------
-    exponent
-        Lowest and highest order of magnitude g_1.
-    digit
-        Lowest and highest value of a digit; the first is never below 1, for numbers with
-        leading zeros would be encoded twice.
-    digits
-        How many there are; in eq. (10) two, g_2 and g_3.
-    """
+    exponent: Annotated[
+        tuple[Annotated[int, Key(low=-16, high=18)], Annotated[int, Key(low=-16, high=18)]],
+        Key("Lowest and highest order of magnitude g₁ (eq. 10)."),
+    ]
+    digit: Annotated[
+        tuple[Annotated[int, Key(low=0, high=9)], Annotated[int, Key(low=1, high=9)]],
+        Key(
+            "Lowest and highest value of the digits g₂, g₃ and so on (eq. 10). The first is never "
+            "below 1, for numbers with leading zeros would be encoded twice."
+        ),
+    ]
+    digits: Annotated[int, Key("How many digits; in eq. (10) two.", low=1, high=6)] = 2
 
-    exponent: tuple[int, int]
-    digit: tuple[int, int]
-    digits: int = 2
+    def problems(self) -> Iterator[Problem]:
+        """Find ends in the wrong order, and a range of one value."""
+        for gene, (low, high) in (("exponent", self.exponent), ("digit", self.digit)):
+            if low > high:
+                yield (gene,), f"found [{low}, {high}], allowed is [lowest, highest]."
+        if self.least == self.most:
+            text = "leaves one value, and nothing to search for; allowed are more. What is known is"
+            yield (), f"{text} given under the case's key fixed."
 
     @property
     def least(self) -> tuple[int, ...]:

@@ -1,8 +1,8 @@
 """Bounded multi-start least squares on log-parameters."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated
 
 import numpy as np
 
@@ -12,27 +12,18 @@ from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.many_starts import best_of_many_starts
 from biogrip.identify.multi_start import Row, screened
 from biogrip.identify.problem import Problem
+from biogrip.keys import Key
 
 
 @dataclass(frozen=True)
 class LeastSquaresSettings:
-    """How many points are tried, and how many of them fitted.
+    """Local fits from random points; also what identifiability is judged with."""
 
-    Parameters
-    ----------
-    candidates
-        Points drawn uniformly in the logarithms of the parameters.
-    starts
-        The best so many of them are starting points of a local fit.
-    """
-
-    candidates: int
-    starts: int
-
-
-def settings_of(blocks: Mapping[str, Any]) -> LeastSquaresSettings:
-    """Build the settings from the config's ``least_squares`` block."""
-    return LeastSquaresSettings(**blocks["least_squares"])
+    candidates: Annotated[
+        int,
+        Key("Points drawn, uniformly in the logarithms of the parameters.", low=1, high=1_000_000),
+    ]
+    starts: Annotated[int, Key("Local fits, from the best of them.", low=1, high=10_000)]
 
 
 def identify(

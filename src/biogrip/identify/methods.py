@@ -1,16 +1,15 @@
 """The identifiers that there are.
 
-Each is a module of its own here, named like the method, with two functions or three:
-``settings_of(blocks)`` reads its config blocks, ``identify(problem, settings,
-rng, progress)`` returns an `Identification`, and ``identify_many(problems, settings,
-rngs, progress)`` those of many traces at once. Ranges and traces are the
-problem's, randomness is the generator's, the budget is in the settings.
+Each is a module of its own here, named like the method. It has the class of its settings,
+whose fields are the keys of its config block (`biogrip.keys.Key`), and a function or two:
+``identify(problem, settings, rng, progress)`` returns an `Identification`, and
+``identify_many(problems, settings, rngs, progress)`` those of many traces at once. Ranges and
+traces are the problem's, randomness is the generator's, the budget is in the settings.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
 
 import numpy as np
 
@@ -32,46 +31,66 @@ class Method:
     name, title
         In the config and in files; in print.
     blocks
-        Config blocks that hold its settings.
+        Config blocks that hold its settings; of each, the class in its module that has the keys.
     step
         What a row of its history follows.
+    settings
+        Class in its module that puts several blocks together, in their order.
     """
 
     name: str
     title: str
-    blocks: tuple[str, ...]
+    blocks: Mapping[str, str]
     step: str
+    settings: str = ""
 
     @property
     def module(self) -> str:
         """Name of its module."""
         return f"biogrip.identify.{self.name}"
 
+    def named(self, name: str) -> type:
+        """Load a class of its module."""
+        found: type = getattr(import_module(self.module), name)
+        return found
+
 
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
-        Method("genetic", "genetic algorithm", ("genetic_algorithm",), "generation"),
+        Method(
+            "genetic",
+            "genetic algorithm",
+            {"genetic_algorithm": "GeneticSettings"},
+            "generation",
+        ),
         Method(
             "genetic_refined",
             "genetic, polished",
-            ("genetic_algorithm", "genetic_refined"),
+            {"genetic_algorithm": "GeneticSettings", "genetic_refined": "Polishing"},
             "generation, then local fit",
+            "RefinedSettings",
         ),
-        Method("least_squares", "multi-start least squares", ("least_squares",), "local fit"),
+        Method(
+            "least_squares",
+            "multi-start least squares",
+            {"least_squares": "LeastSquaresSettings"},
+            "local fit",
+        ),
         Method(
             "differential_evolution",
             "differential evolution",
-            ("differential_evolution",),
+            {"differential_evolution": "DifferentialEvolutionSettings"},
             "generation",
         ),
     )
 }
 
 
-def method_settings(name: str, blocks: Mapping[str, Any]) -> object:
-    """Build a method's settings from config blocks, at least its own."""
-    return import_module(METHODS[name].module).settings_of(blocks)
+def block_class(block: str) -> type:
+    """Load the class that has the keys of a config block of some method."""
+    method = next(method for method in METHODS.values() if block in method.blocks)
+    return method.named(method.blocks[block])
 
 
 def identifier(name: str, settings: object) -> Identify:
@@ -82,7 +101,7 @@ def identifier(name: str, settings: object) -> Identify:
     name
         One of `METHODS`.
     settings
-        What `method_settings` gives for it.
+        Its block, or what puts its blocks together.
     """
     module = import_module(METHODS[name].module)
 

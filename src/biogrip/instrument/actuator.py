@@ -1,43 +1,35 @@
 """The rotary comb drive: capacitance, torque and voltage (eqs. 7-9)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array
+from biogrip.keys import Key
 
 VACUUM_PERMITTIVITY_F_PER_M = 8.8541878128e-12
 
 
 @dataclass(frozen=True)
 class CombDrive:
-    """Geometry of one rotary comb drive (Table 2).
+    """Geometry of one rotary comb drive (Table 2)."""
 
-    Parameters
-    ----------
-    thickness_m
-        Thickness h of the device layer.
-    finger_width_m
-        Width d of a finger.
-    finger_gap_m
-        Gap g between neighbouring fingers.
-    fingers
-        Number n of floating fingers.
-    first_radius_m
-        Radius r_0 of the first finger.
-    finger_angle_deg, stroke_deg, initial_overlap_deg
-        Angle subtended by a finger, largest rotation, overlap at rest.
-    """
-
-    thickness_m: float
-    finger_width_m: float
-    finger_gap_m: float
-    fingers: int
-    first_radius_m: float
-    finger_angle_deg: float
-    stroke_deg: float
-    initial_overlap_deg: float
+    thickness_m: Annotated[float, Key("Thickness h of the device layer.", "m", low=1e-9, high=1e-2)]
+    finger_width_m: Annotated[float, Key("Width d of a finger.", "m", low=1e-9, high=1e-2)]
+    finger_gap_m: Annotated[
+        float, Key("Gap g between neighbouring fingers.", "m", low=1e-9, high=1e-2)
+    ]
+    fingers: Annotated[int, Key("Number n of floating fingers.", low=1, high=10_000)]
+    first_radius_m: Annotated[float, Key("Radius r₀ of the first finger.", "m", low=1e-9, high=1.0)]
+    finger_angle_deg: Annotated[
+        float, Key("Angle that a finger subtends.", "deg", low=1e-6, high=360)
+    ]
+    stroke_deg: Annotated[float, Key("Largest rotation of the drive.", "deg", low=1e-6, high=360)]
+    initial_overlap_deg: Annotated[
+        float, Key("Overlap of the fingers at rest.", "deg", low=0, high=360)
+    ]
 
     @property
     def pitch_m(self) -> float:

@@ -1,6 +1,7 @@
 """No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2)."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
@@ -8,29 +9,27 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.instrument.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.instrument.gripper import Arm
+from biogrip.keys import Key
 
 _FEWEST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
 class CalibrationTest:
-    """The test of both arms without sample.
+    """The test of both arms without sample."""
 
-    Parameters
-    ----------
-    step_torque_Nm, impulse_Nms
-        What is done to a free arm, once each.
-    duration_s, rate_Hz
-        Length and sampling rate of each record.
-    noise_level
-        Standard deviation of the noise as a share of each record's peak.
-    """
-
-    step_torque_Nm: float
-    impulse_Nms: float
-    duration_s: float
-    rate_Hz: float
-    noise_level: float
+    step_torque_Nm: Annotated[
+        float, Key("Torque step on the free arm.", "N m", low=1e-20, high=1.0)
+    ]
+    impulse_Nms: Annotated[
+        float, Key("Torque impulse on the free arm.", "N m s", low=1e-25, high=1.0)
+    ]
+    duration_s: Annotated[float, Key("Length of each of the two records.", "s", low=1e-6, high=1e9)]
+    rate_Hz: Annotated[float, Key("Sampling rate of the records.", "Hz", low=1e-9, high=1e9)]
+    noise_level: Annotated[
+        float,
+        Key("Standard deviation of the noise as a share of each record's peak.", low=0, high=10),
+    ]
 
 
 @dataclass(frozen=True)

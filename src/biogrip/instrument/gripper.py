@@ -1,22 +1,36 @@
 """The two gripper arms and the lever with which they squeeze the sample (Table 1)."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.keys import Key, Problem
+
+_LARGEST_QUALITY = 1e6
 
 
 @dataclass(frozen=True)
 class Arm:
-    """One arm on its flexure hinge, reduced to a rigid body on a pivot.
+    """One arm on its flexure hinge, reduced to a rigid body on a pivot: eqs. (1) and (2)."""
 
-    Parameters
-    ----------
-    inertia_kgm2, damping_Nms_per_rad, stiffness_Nm_per_rad
-        I_i, c_i and k_i of eqs. (1) and (2).
-    """
-
-    inertia_kgm2: float
-    damping_Nms_per_rad: float
-    stiffness_Nm_per_rad: float
+    inertia_kgm2: Annotated[
+        float,
+        Key("Moment of inertia I of the arm about its pivot.", "kg m²", low=1e-20, high=1.0),
+    ]
+    damping_Nms_per_rad: Annotated[
+        float,
+        Key(
+            "Rotational damping c of the arm; at least what makes its quality factor a million.",
+            "N m s/rad",
+            low=1e-20,
+            high=1.0,
+        ),
+    ]
+    stiffness_Nm_per_rad: Annotated[
+        float,
+        Key("Rotational stiffness k of the arm's flexure hinge.", "N m/rad", low=1e-12, high=1e3),
+    ]
 
     @property
     def natural_frequency_Hz(self) -> float:
@@ -28,26 +42,36 @@ class Arm:
         """Quality factor of the free arm."""
         return math.sqrt(self.inertia_kgm2 * self.stiffness_Nm_per_rad) / self.damping_Nms_per_rad
 
+    def problems(self) -> Iterator[Problem]:
+        """Find that it rings for so long that its decay is lost in rounding."""
+        if self.quality_factor > _LARGEST_QUALITY:
+            text = f"makes the arm's quality factor {self.quality_factor:.3g}, "
+            yield ("damping_Nms_per_rad",), f"{text}allowed is at most {_LARGEST_QUALITY:g}."
+
 
 @dataclass(frozen=True)
 class Gripper:
     """The chain A-B-C-D: left arm AB (index 2), right arm DC (index 4), sample BC.
 
-    Parameters
-    ----------
-    arm_length_m
-        Length l of both arms.
-    reference_angle_deg
-        hat-theta_2, the left arm's angle when the jaws just touch the sample;
-        the right arm stands at 180 degrees minus it.
-    left, right
-        The arms.
+    The reference angle is hat-theta_2; the right arm stands at 180 degrees minus it.
     """
 
-    arm_length_m: float
-    reference_angle_deg: float
-    left: Arm
-    right: Arm
+    arm_length_m: Annotated[
+        float, Key("Length l of both arms, from pivot to tip.", "m", low=1e-6, high=1.0)
+    ]
+    reference_angle_deg: Annotated[
+        float,
+        Key(
+            "Angle of the left arm when the jaws just touch the sample; for a case that gives its "
+            "sample's size, the angle in the neutral configuration, from which the other follows. "
+            "Only its sine enters the linear model.",
+            "deg",
+            low=10,
+            high=90,
+        ),
+    ]
+    left: Annotated[Arm, Key()]
+    right: Annotated[Arm, Key()]
 
     @property
     def lever_m(self) -> float:

@@ -9,7 +9,9 @@ from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
 from biogrip.running.manifest import Manifest
 from biogrip.running.wholeness import make_room
+from biogrip.study.config import StudyConfig
 from biogrip.study.study import Study
+from biogrip.study.typed import built, plain
 
 NAME = "study.json"
 
@@ -23,7 +25,7 @@ def write_study(study: Study, results: Path) -> None:
         If a file is in the way that no study wrote.
     """
     file = results / NAME
-    text = json.dumps(study.config, indent=1) + "\n"
+    text = json.dumps(plain(study.config), indent=1) + "\n"
     if os.path.lexists(file):
         manifest = Manifest(results)
         if file.is_symlink() or not file.is_file() or not manifest.knows(NAME):
@@ -48,7 +50,7 @@ def read_study(results: Path) -> Study:
     """
     file = results / NAME
     try:
-        study = Study(json.loads(file.read_text(encoding="utf-8")))
+        study = Study(built(StudyConfig, json.loads(file.read_text(encoding="utf-8"))))
         # What of it is wrong would come to light in the middle of something else.
         _ = study.cases, study.points, study.sweeps, study.shown, study.study_seed
         return study

@@ -4,9 +4,11 @@ from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from biogrip.study.case_blocks import OVERRIDABLE
+from biogrip.study.numbers import with_numbers
 from biogrip.study.source import overlaid, read_config, read_places
 from biogrip.study.study import Study
-from biogrip.study.validation import OVERRIDABLE, check, with_numbers
+from biogrip.study.validation import STUDY, checked
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
@@ -49,9 +51,8 @@ def load_study(
         If anything in the config cannot be used.
     """
     places = read_places(files, command_line)
-    complete = _fill_in(with_numbers(config))
-    check(complete, places, for_workflow=for_workflow)
-    return Study(complete)
+    complete = _fill_in(with_numbers(STUDY, config))
+    return Study(checked(complete, places, for_workflow=for_workflow))
 
 
 def _fill_in(config: dict[str, Any]) -> dict[str, Any]:

@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import Phase, torque_history
@@ -12,14 +11,16 @@ from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import Published, Truth
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import method_settings
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
-from biogrip.study import build
+from biogrip.study.case_blocks import CALIBRATED, CaseBlock
+from biogrip.study.config import StudyConfig
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
+from biogrip.study.typed import built, plain
 from biogrip.traces.recordings import Columns
 
 
@@ -34,25 +35,25 @@ class Case:
     block
         Its config, with the study's blocks filled in.
     actuator
-        The study's comb drive, as the config has it.
+        The study's comb drive.
     study_seeds
         How many seeds a simulated case of the study has.
     """
 
     name: str
-    block: Mapping[str, Any]
-    actuator: Mapping[str, Any]
+    block: CaseBlock
+    actuator: CombDrive
     study_seeds: int
 
     @property
     def title(self) -> str:
         """Name in print."""
-        return str(self.block.get("title", self.name))
+        return self.name if self.block.title is None else self.block.title
 
     @property
     def recorded(self) -> bool:
         """Whether its trace was recorded, not simulated."""
-        return "file" in self.block["measurement"]
+        return self.block.recorded
 
     @property
     def seeds(self) -> int:
@@ -62,33 +63,28 @@ class Case:
     @cached_property
     def sample(self) -> Sample:
         """Constitutive model."""
-        block = self.block["sample"]
-        return Sample(block["model"], block.get("branches", 1))
+        return self.block.sample.sample
 
     @property
     def parameters(self) -> dict[str, float]:
         """True values by name, SI units; nobody knows them of a recorded trace."""
-        block = self.block["sample"]
-        return {name: float(block[name]) for name in self.sample.model.names if name in block}
+        given = self.block.sample.parameters
+        return {name: float(given[name]) for name in self.sample.model.names if name in given}
 
     @property
     def size_m(self) -> float | None:
         """Diameter of the sample, if it is given."""
-        size: float | None = self.block["sample"].get("size_m")
-        return size
+        return self.block.sample.size_m
 
     @property
     def fixed(self) -> dict[str, float]:
         """Parameters that are not identified, by name."""
-        return {name: float(value) for name, value in self.block.get("fixed", {}).items()}
+        return {name: float(value) for name, value in self.block.known.items()}
 
     @property
     def published(self) -> Published:
         """What the paper reports of it."""
-        block = dict(self.block.get("published", {}))
-        if "axis_rad" in block:
-            block["axis_rad"] = tuple(block["axis_rad"])
-        return Published(**block)
+        return self.block.published or Published()
 
     @property
     def truth(self) -> Truth:
@@ -98,40 +94,34 @@ class Case:
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """The protocol."""
-        return build.phases(self.block["protocol"], self.actuator)
+        return self.block.protocol.torques(self.actuator)
 
     @cached_property
     def gripper(self) -> Gripper:
         """The true gripper where its jaws touch the sample."""
-        return build.gripper(self._gripper_block)
-
-    @property
-    def _gripper_block(self) -> dict[str, Any]:
-        block = dict(self.block["gripper"])
-        if self.size_m is not None:
-            touching = build.contact_of(block, self.actuator, self.size_m)
-            block["reference_angle_deg"] = touching.reference_angle_deg
-        return block
+        neutral = self.block.gripper.neutral
+        if self.size_m is None:
+            return neutral
+        touching = self.block.gripper.contact(self.actuator, self.size_m)
+        return replace(neutral, reference_angle_deg=touching.reference_angle_deg)
 
     @property
     def stroke_rad(self) -> float:
         """What the comb drive's stroke leaves for gripping, after closing onto the sample."""
-        stroke = math.radians(self.actuator["stroke_deg"])
+        stroke = math.radians(self.actuator.stroke_deg)
         if self.size_m is None:
             return stroke
-        closed = build.contact_of(self.block["gripper"], self.actuator, self.size_m)
-        return stroke - closed.closing_rad
+        return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
 
     @property
     def noise(self) -> Noise:
         """Noise added to the rotation."""
-        return Noise(**self.block["measurement"]["noise"])
+        return self.block.measurement.noise
 
     @property
     def sampling(self) -> Sampling:
         """When the rotation is sampled."""
-        measurement = self.block["measurement"]
-        return Sampling(measurement["rate_Hz"], tuple(measurement.get("times_s", ())))
+        return Sampling(self.block.measurement.rate_Hz, self.block.measurement.times_s)
 
     @property
     def samples(self) -> int:
@@ -141,73 +131,76 @@ class Case:
     @property
     def nonlinear_target(self) -> bool:
         """Whether the target is made by the nonlinear model."""
-        return bool(self.block["models"]["target"] == "nonlinear")
+        return self.block.models.target == "nonlinear"
 
     @property
     def file(self) -> str:
         """The recorded trace."""
-        return str(self.block["measurement"]["file"])
+        assert self.block.measurement.file is not None
+        return self.block.measurement.file
 
     @property
     def columns(self) -> Columns:
         """Where in its file a recorded trace stands."""
-        block = self.block["measurement"]
-        return Columns(
-            block["time"], block["rotation"], block.get("time_unit"), block.get("rotation_unit")
-        )
+        block = self.block.measurement
+        assert block.time is not None
+        assert block.rotation is not None
+        return Columns(block.time, block.rotation, block.time_unit, block.rotation_unit)
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
         """Range that is searched, by the name of the range."""
-        return build.gene_ranges(self.block["search_range"])
+        return dict(vars(self.block.search_range))
 
     @property
     def is_calibrated(self) -> bool:
         """Whether its identification takes the gripper's arms from a calibration."""
-        return self.block.get("assumed_gripper") == "calibrated"
+        return self.block.assumed_gripper == CALIBRATED
 
     @property
     def calibration(self) -> CalibrationTest:
         """The test without sample."""
-        return CalibrationTest(**self.block["calibration"])
+        return self.block.calibration
 
     @cached_property
     def problem(self) -> CaseProblem:
         """What its identification assumes; a calibration replaces the gripper's arms."""
-        assumed, measurement = self.block.get("assumed_gripper", {}), self.block["measurement"]
+        assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
-        if not isinstance(assumed, str):
-            gripper = build.gripper(overlaid(self._gripper_block, assumed))
+        if isinstance(assumed, Mapping):
+            gripper = built(Gripper, overlaid(plain(gripper), assumed))
         return CaseProblem(
             gripper,
             self.phases,
             self.ranges,
             self.sample,
             self.fixed,
-            nonlinear=self.block["models"]["identification"] == "nonlinear",
-            offset=measurement.get("offset", False),
-            drift=measurement.get("drift", False),
-            noise_rad=measurement.get("noise_rad"),
+            nonlinear=self.block.models.identification == "nonlinear",
+            offset=measurement.offset,
+            drift=measurement.drift,
+            noise_rad=measurement.noise_rad,
         )
 
     def method(self, name: str) -> object:
         """Settings of an identifier."""
-        return method_settings(name, self.block)
+        return self.block.of_methods.of(name)
 
     @property
     def mutation_start(self) -> int:
         """First generation whose children mutate."""
-        return int(self.block["genetic_algorithm"]["mutation_start"])
+        settings = self.block.of_methods.block("genetic_algorithm")
+        assert isinstance(settings, GeneticSettings)
+        return settings.mutation_start
 
     @property
     def confidence(self) -> float:
         """Confidence of all intervals."""
-        return float(self.block["identifiability"]["confidence"])
+        return self.block.identifiability.confidence
 
     @property
     def coverage_seeds(self) -> int:
         """Over how many seeds intervals are held against the truth."""
-        return 0 if self.recorded else int(self.block["identifiability"]["coverage_seeds"])
+        return 0 if self.recorded else self.block.identifiability.coverage_seeds
 
     @property
     def has_valley(self) -> bool:
@@ -227,25 +220,26 @@ class Study:
         The whole config, every case with its blocks filled in.
     """
 
-    config: Mapping[str, Any]
+    config: StudyConfig
 
     @cached_property
     def cases(self) -> dict[str, Case]:
         """Cases by name, in their order."""
-        return self._cases(self.config["cases"])
+        return self._cases(self.config.cases)
 
     @cached_property
     def points(self) -> dict[str, Case]:
         """The cases that the points of the sweeps are, by name."""
-        return self._cases(point_blocks(self.config))
+        blocks = point_blocks(self.sweeps, self.config.cases)
+        return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
 
     @cached_property
     def sweeps(self) -> dict[str, Sweep]:
         """Sweeps by name."""
-        return sweeps_of(self.config)
+        return sweeps_of(self.config.sweeps)
 
-    def _cases(self, blocks: Mapping[str, Any]) -> dict[str, Case]:
-        actuator, seeds = self.config["actuator"], int(self.config["seeds"])
+    def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
+        actuator, seeds = self.config.actuator, self.config.seeds
         return {name: Case(name, block, actuator, seeds) for name, block in blocks.items()}
 
     def case(self, name: str) -> Case:
@@ -255,12 +249,12 @@ class Study:
     @property
     def study_seed(self) -> int:
         """The one seed of the study."""
-        return int(self.config["study_seed"])
+        return self.config.study_seed
 
     @property
     def methods(self) -> list[str]:
         """Identifiers; tables and figures that show one show the first."""
-        return list(self.config["methods"])
+        return list(self.config.methods)
 
     @property
     def shown(self) -> str:
@@ -270,57 +264,56 @@ class Study:
     @property
     def models(self) -> tuple[str, ...]:
         """Sample models that every trace is fitted with."""
-        return tuple(self.config["model_selection"]["models"])
+        return self.config.model_selection.models
 
     @property
     def batch_size(self) -> int | None:
         """Number of seeds a job, if the study says."""
-        size: int | None = self.config.get("batch_size")
-        return size
+        return self.config.batch_size
 
     @property
     def noise_floor_tolerance(self) -> float:
         """By which share a misfit may exceed the noise, to be taken for as good."""
-        return float(self.config["evaluation"]["noise_floor_tolerance"])
+        return self.config.evaluation.noise_floor_tolerance
 
     @property
     def optimum_tolerance(self) -> float:
         """By how much chi-squared may exceed the lowest known, to be taken for as low."""
-        return float(self.config["evaluation"]["optimum_tolerance"])
+        return self.config.evaluation.optimum_tolerance
 
     @property
     def gripper(self) -> Gripper:
         """The gripper in its neutral configuration."""
-        return build.gripper(self.config["gripper"])
+        return self.config.gripper.neutral
 
     @property
     def jaw_gap_m(self) -> float:
         """Distance between the jaws there."""
-        return float(self.config["gripper"]["jaw_gap_m"])
+        return self.config.gripper.jaw_gap_m
 
     @property
     def actuator(self) -> CombDrive:
         """The comb drives."""
-        return CombDrive(**self.config["actuator"])
+        return self.config.actuator
 
     @property
     def phases(self) -> tuple[Phase, ...]:
         """The protocol of cases without one of their own."""
-        return build.phases(self.config["protocol"], self.config["actuator"])
+        return self.config.protocol.torques(self.config.actuator)
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
         """Range that is searched, of cases without one of their own."""
-        return build.gene_ranges(self.config["search_range"])
+        return dict(vars(self.config.search_range))
 
     def reconstructed(self, block: str) -> tuple[str, ...]:
         """Keys of a block, or the block itself, whose values the paper does not give."""
-        marked = self.config["reconstructed"]
+        marked = self.config.reconstructed
         return tuple(key for key in marked if key == block or key.startswith(f"{block}."))
 
     def is_reconstructed(self, key: str) -> bool:
         """Whether the paper does not give the value of a dotted key."""
-        marked = self.config["reconstructed"]
+        marked = self.config.reconstructed
         return any(key == name or key.startswith(f"{name}.") for name in marked)
 
     @property

@@ -1,18 +1,84 @@
 """Sweeps: grids of cases, each a case of the study with two of its values changed."""
 
-import copy
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from biogrip.errors import nearest
-from biogrip.study.meaning import Problem
-from biogrip.study.source import KeyPath
+from biogrip.keys import Key
+from biogrip.study.case_blocks import PRINTED, CaseBlock
+from biogrip.study.typed import plain
 
-_AXES = ("rows", "columns")
-_MOST_POINTS = 2000
-_LONGEST_NAME = 200
+_LARGEST = 1e12
+_LONGEST_TEXT = 60
+
+_Number = Annotated[float, Key(low=-_LARGEST, high=_LARGEST)]
+_Text = Annotated[str, Key(most=_LONGEST_TEXT)]
+
+
+@dataclass(frozen=True)
+class ValueBlock:
+    """Keys that are laid over the block of the axis' key."""
+
+    label: Annotated[
+        str, Key("Name of the value in print.", pattern=PRINTED.pattern, form=PRINTED.form)
+    ]
+    changes: Annotated[Mapping[str, _Number | _Text], Key(spread=True)]
+
+
+@dataclass(frozen=True)
+class AxisBlock:
+    """What changes along one direction of a sweep's grid."""
+
+    label: Annotated[str, Key("Name in print.", pattern=PRINTED.pattern, form=PRINTED.form)]
+    key: Annotated[
+        str | Annotated[tuple[str, ...], Key(fewest=1, most=100, unique=True)],
+        Key(
+            "Dotted key, or list of keys that change together, in any block that a case may "
+            "change, e.g. `measurement.noise.level`."
+        ),
+    ]
+    values: Annotated[
+        tuple[_Number | _Text | ValueBlock, ...],
+        Key(
+            "Values of the key; or blocks that are laid over the block of the key, each with a "
+            "`label` of its own.",
+            fewest=1,
+            most=16,
+            unique=True,
+        ),
+    ]
+    unit: Annotated[
+        str | None, Key("Unit in print.", pattern=PRINTED.pattern, form=PRINTED.form)
+    ] = None
+    unit_in_si: Annotated[
+        float, Key("One such unit in that of the key, by default 1.", low=1e-24, high=1e24)
+    ] = 1.0
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """What changes together."""
+        return (self.key,) if isinstance(self.key, str) else self.key
+
+
+@dataclass(frozen=True)
+class SweepBlock:
+    """Every point of the grid is a case like another, but for the two values."""
+
+    cases: Annotated[
+        tuple[str, ...],
+        Key("Cases of the study that the grid is laid over.", fewest=1, most=16, unique=True),
+    ]
+    rows: Annotated[AxisBlock, Key()]
+    columns: Annotated[AxisBlock, Key()]
+    title: Annotated[
+        str | None,
+        Key(
+            "Name in print; by default the sweep's name.",
+            pattern=PRINTED.pattern,
+            form=PRINTED.form,
+        ),
+    ] = None
 
 
 @dataclass(frozen=True)
@@ -105,99 +171,62 @@ class Sweep:
         ]
 
 
-def sweeps_of(config: Mapping[str, Any]) -> dict[str, Sweep]:
-    """Read the sweeps of a config that fits the schema."""
+def sweeps_of(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
+    """Read the sweeps of a study."""
     return {
         name: Sweep(
-            name,
-            block.get("title", name),
-            tuple(block["cases"]),
-            *(_axis(block[axis]) for axis in _AXES),
+            name, block.title or name, block.cases, axis_of(block.rows), axis_of(block.columns)
         )
-        for name, block in config.get("sweeps", {}).items()
+        for name, block in blocks.items()
     }
 
 
-def point_blocks(config: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Make the case block of every point of every sweep, by name.
+def axis_of(block: AxisBlock) -> Axis:
+    """Read an axis."""
+    unit = f" ({block.unit})" if block.unit is not None else ""
+    return Axis(block.label + unit, tuple(_values(block)))
+
+
+def points_of(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
+    """Points of all sweeps."""
+    for sweep in sweeps.values():
+        for case in sweep.cases:
+            for point in sweep.points(case):
+                yield sweep, point
+
+
+def point_blocks(
+    sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
+) -> dict[str, dict[str, Any]]:
+    """Make the block of every point's case, by name, as a file would have it.
 
     Parameters
     ----------
-    config
-        Complete and without `sweep_problems`.
+    sweeps
+        Without `biogrip.study.sweep_checks.sweep_problems`.
+    cases
+        The study's.
     """
-    return {
-        point.name: _changed(config["cases"][point.case], point.overrides)
-        for _, point in _all_points(config)
-    }
+    found = {}
+    blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
+    for _, point in points_of(sweeps):
+        block = blocks[point.case]
+        for key, value in point.overrides.items():
+            block = _changed(block, key, value)
+        found[point.name] = block
+    return found
 
 
-def sweep_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
-    """Find what is wrong with the sweeps of a config that is else in order.
-
-    Yields
-    ------
-    tuple
-        The path of the key, and what was found and what is allowed.
-    """
-    problems = [
-        problem
-        for name, block in config.get("sweeps", {}).items()
-        for problem in _block_problems(("sweeps", name), block, config)
-    ]
-    points = sum(
-        len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
-        for sweep in sweeps_of(config).values()
-    )
-    if not problems and points > _MOST_POINTS:
-        problems = [(("sweeps",), f"found {points} points, allowed are {_MOST_POINTS} together.")]
-    yield from problems
-    if not problems:
-        yield from _name_problems(config)
-
-
-def placed(config: Mapping[str, Any], problem: Problem) -> Problem:
-    """Return a problem of a point's case as one of the value that makes it.
-
-    Parameters
-    ----------
-    config
-        Complete and without `sweep_problems`.
-    problem
-        Its path starts with ``cases`` and the name of a point.
-    """
-    (_, name, *rest), text = problem
-    key = ".".join(map(str, rest))
-    sweep, point = next(found for found in _all_points(config) if found[1].name == name)
-    for axis, value in zip(_AXES, (point.row, point.column), strict=True):
-        for changed in value.overrides:
-            if key == changed or key.startswith(f"{changed}."):
-                values = getattr(sweep, axis).values
-                index = next(i for i, other in enumerate(values) if other.name == value.name)
-                return ("sweeps", sweep.name, axis, "values", index), f"gives {key}: {text}"
-    shown = f"{point.row.text} and {point.column.text} for {point.case}"
-    return ("sweeps", sweep.name), f"{shown}: gives {key}: {text}"
-
-
-def _axis(block: Mapping[str, Any]) -> Axis:
-    unit = f" ({block['unit']})" if "unit" in block else ""
-    keys = _keys(block)
-    values = tuple(_value(value, keys, block.get("unit_in_si", 1.0)) for value in block["values"])
-    return Axis(block["label"] + unit, values)
-
-
-def _keys(axis: Mapping[str, Any]) -> list[str]:
-    return [axis["key"]] if isinstance(axis["key"], str) else list(axis["key"])
-
-
-def _value(value: Any, keys: list[str], unit_in_si: float) -> Value:
-    if isinstance(value, Mapping):
-        inner = {name: value[name] for name in sorted(value) if name != "label"}
-        label = value["label"]
-        overrides = {f"{key}.{name}": inner[name] for key in keys for name in inner}
-        return Value("-".join(map(_word, inner.values())), label, label, overrides)
-    shown = value if isinstance(value, str) else f"{value / unit_in_si:.4g}"
-    return Value(_word(value), _text(value), shown, dict.fromkeys(keys, value))
+def _values(axis: AxisBlock) -> Iterator[Value]:
+    for value in axis.values:
+        if isinstance(value, ValueBlock):
+            inner = {name: value.changes[name] for name in sorted(value.changes)}
+            overrides = {f"{key}.{name}": inner[name] for key in axis.keys for name in inner}
+            name = "-".join(map(_word, inner.values()))
+            yield Value(name, value.label, value.label, overrides)
+        else:
+            shown = value if isinstance(value, str) else f"{value / axis.unit_in_si:.4g}"
+            yield Value(_word(value), _text(value), shown, dict.fromkeys(axis.keys, value))
 
 
 def _text(value: float | str) -> str:
@@ -209,86 +238,6 @@ def _word(value: float | str) -> str:
     return re.sub(r"[^A-Za-z0-9-]+", "_", _text(value))
 
 
-def _all_points(config: Mapping[str, Any]) -> Iterator[tuple[Sweep, Point]]:
-    for sweep in sweeps_of(config).values():
-        for case in sweep.cases:
-            for point in sweep.points(case):
-                yield sweep, point
-
-
-def _changed(case: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    changed = copy.deepcopy(dict(case))
-    for key, value in overrides.items():
-        *path, last = key.split(".")
-        block = changed
-        for part in path:
-            block = block[part]
-        block[last] = value
-    return changed
-
-
-def _block_problems(
-    path: KeyPath, block: Mapping[str, Any], config: Mapping[str, Any]
-) -> Iterator[Problem]:
-    cases = config["cases"]
-    for index, case in enumerate(block["cases"]):
-        if case not in cases:
-            text = f"found '{case}', allowed is a case of the study.{nearest(case, cases)}"
-            yield (*path, "cases", index), text
-            return
-    for axis in _AXES:
-        for case in block["cases"]:
-            # What a case may change are the blocks that it has from the study.
-            blocks = {key: inner for key, inner in cases[case].items() if key in config}
-            yield from _key_problems((*path, axis), block[axis], blocks)
-        shown = [value.text for value in _axis(block[axis]).values]
-        for index, text in enumerate(shown):
-            if text in shown[:index]:
-                yield (*path, axis, "values", index), f"is called '{text}' like one before it."
-    rows, columns = (_axis(block[axis]) for axis in _AXES)
-    ours = {key for value in rows.values for key in value.overrides}
-    for index, value in enumerate(columns.values):
-        for key in value.overrides:
-            if key in ours:
-                yield (*path, "columns", "values", index), f"sets {key}, which the rows do too."
-
-
-def _key_problems(
-    path: KeyPath, axis: Mapping[str, Any], blocks: Mapping[str, Any]
-) -> Iterator[Problem]:
-    """Every key must lead somewhere: blocks are laid over blocks, single values over others."""
-    with_blocks = all(isinstance(value, Mapping) for value in axis["values"])
-    if not with_blocks and any(isinstance(value, Mapping) for value in axis["values"]):
-        yield (*path, "values"), "holds blocks and single values; allowed is one kind of them."
-        return
-    allowed = [key for key, is_block in _dotted(blocks) if is_block == with_blocks]
-    for key in _keys(axis):
-        if key not in allowed:
-            wanted = "a block" if with_blocks else "a single value"
-            text = f"found '{key}', allowed is the key of {wanted} that a case may change."
-            yield (*path, "key"), text + nearest(key, allowed)
-
-
-def _dotted(block: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, bool]]:
-    """Keys in a block and below, and whether each is a block itself."""
-    for key, value in block.items():
-        is_block = isinstance(value, Mapping)
-        yield f"{path}{key}", is_block
-        if is_block:
-            yield from _dotted(value, f"{path}{key}.")
-
-
-def _name_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
-    seen: set[str] = set()
-    for sweep, point in _all_points(config):
-        if point.name in config["cases"]:
-            text = f"is the name of a point of the sweep {sweep.name}; allowed is another name."
-            yield ("cases", point.name), text
-        if point.name in seen:
-            text = f"has the point {point.name} twice; allowed is every combination once."
-            yield ("sweeps", sweep.name), text
-        seen.add(point.name)
-        if len(point.name) > _LONGEST_NAME:
-            text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
-            yield ("sweeps", sweep.name), f"{text}allowed are {_LONGEST_NAME} (it names files)."
-            return
+def _changed(block: dict[str, Any], key: str, value: float | str) -> dict[str, Any]:
+    name, _, rest = key.partition(".")
+    return {**block, name: _changed(block.get(name, {}), rest, value) if rest else value}

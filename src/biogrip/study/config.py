@@ -1,0 +1,156 @@
+"""The study's keys: those of all cases, and the cases and sweeps themselves."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any
+
+from biogrip.experiment.sample import MODELS
+from biogrip.identify.methods import METHODS
+from biogrip.instrument.actuator import CombDrive
+from biogrip.keys import Key, Problem
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.sweeps import SweepBlock
+from biogrip.study.typed import parts
+
+_MOST_BATCHES = 10_000
+_CASE_NAME = Key(
+    pattern="[A-Za-z][A-Za-z0-9_-]{0,63}",
+    form="a letter, then up to 63 letters, digits, '_' or '-'",
+)
+_SWEEP_NAME = Key(
+    pattern="[A-Za-z][A-Za-z0-9_]{0,31}", form="a letter, then up to 31 letters, digits or '_'"
+)
+
+
+@dataclass(frozen=True)
+class ModelSelection:
+    """The choice of the simplest adequate sample model by AIC and BIC."""
+
+    models: Annotated[
+        tuple[Annotated[str, Key(choices=tuple(MODELS))], ...],
+        Key(
+            "Sample models that every trace is fitted with; an empty list leaves that out.",
+            most=100,
+            unique=True,
+        ),
+    ]
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """How results are judged."""
+
+    optimum_tolerance: Annotated[
+        float,
+        Key(
+            "A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by "
+            "at most this. One is what moving a parameter by its standard deviation costs.",
+            above=0,
+            high=100,
+        ),
+    ]
+    noise_floor_tolerance: Annotated[
+        float,
+        Key(
+            "A seed reaches the noise floor if its misfit exceeds the RMS of the noise in its "
+            "trace by at most this share.",
+            low=0,
+            high=1,
+        ),
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyConfig(Shared):
+    """What a study may say."""
+
+    study_seed: Annotated[
+        int,
+        Key(
+            "The one seed of the study. Noise and genetic algorithm draw from streams derived "
+            "from it, the case's name and the seed's number.",
+            low=0,
+            high=2**64 - 1,
+        ),
+    ]
+    seeds: Annotated[
+        int,
+        Key(
+            "How many noisy traces of each case are made and identified. Raising it keeps what "
+            "is there.",
+            low=1,
+            high=1_000_000,
+        ),
+    ]
+    batch_size: Annotated[
+        int | None,
+        Key(
+            "How many seeds one job takes. If it is not given, 125; for more than 1000 seeds, an "
+            "eighth of them, for more than 8000, 1000. Changes no result, only how much of a job "
+            "is start-up.",
+            low=1,
+            high=100_000,
+        ),
+    ] = None
+    actuator: Annotated[CombDrive, Key("The rotary comb drive (Table 2).")]
+    methods: Annotated[
+        tuple[Annotated[str, Key(choices=tuple(METHODS))], ...],
+        Key(
+            "Identifiers that every trace is given to. Tables 5-7 and the figures of single fits "
+            "show the first.",
+            fewest=1,
+            most=100,
+            unique=True,
+        ),
+    ]
+    model_selection: Annotated[ModelSelection, Key()]
+    evaluation: Annotated[Evaluation, Key()]
+    reconstructed: Annotated[
+        tuple[str, ...],
+        Key(
+            "Keys, or whole blocks, whose values the paper does not give. Tables mark them.",
+            most=1000,
+        ),
+    ]
+    cases: Annotated[
+        Mapping[Annotated[str, _CASE_NAME], CaseBlock],
+        Key(
+            "The samples of the study, by name, at most 2000. Any of the blocks "
+            f"{', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for this "
+            "case alone.",
+            fewest=1,
+            most=2000,
+        ),
+    ]
+    sweeps: Annotated[
+        Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
+        Key(
+            "Grids of cases for heat maps, by name, of at most 2000 points together. Every point "
+            "is a case like another, but for the two values; it is identified, and shown in heat "
+            "maps and their table only."
+        ),
+    ] = field(default_factory=dict)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find too many jobs, samples that do not fit, and keys that are marked and not there."""
+        if self.batch_size is not None:
+            tests = (case.identifiability.coverage_seeds for case in self.cases.values())
+            seeds = max(self.seeds, *tests)
+            if seeds > _MOST_BATCHES * self.batch_size:
+                text = f"found {self.batch_size}, which makes {seeds} seeds more than "
+                yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
+        for name, case in self.cases.items():
+            for path, text in case.contact_problems(self.actuator):
+                yield ("cases", name, *path), text
+        for index, key in enumerate(self.reconstructed):
+            if not _exists(self, key):
+                yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+
+
+def _exists(block: Any, key: str) -> bool:
+    for part in key.split("."):
+        inner = dict(parts(block)) if not isinstance(block, tuple) else {}
+        if inner.get(part) is None:
+            return False
+        block = inner[part]
+    return True

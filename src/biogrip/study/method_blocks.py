@@ -1,0 +1,46 @@
+"""The settings of the methods, as far as somebody asks for them."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from biogrip.identify.methods import METHODS, block_class
+from biogrip.keys import Problem
+from biogrip.study.typed import built
+
+
+@dataclass(frozen=True)
+class MethodBlocks:
+    """Settings of the methods, each made when it is asked for: to load a method takes its time.
+
+    Parameters
+    ----------
+    plain
+        What the config has of them, by block.
+    """
+
+    plain: Mapping[str, Mapping[str, Any]]
+
+    @staticmethod
+    def classes() -> dict[str, type]:
+        """Load what has the keys of each block."""
+        names = [name for method in METHODS.values() for name in method.blocks]
+        return {name: block_class(name) for name in names}
+
+    def block(self, name: str) -> object:
+        """Return the settings of a block."""
+        return built(block_class(name), self.plain.get(name, {}))
+
+    def of(self, method: str) -> object:
+        """Return the settings of a method."""
+        found = [self.block(name) for name in METHODS[method].blocks]
+        together = METHODS[method].settings
+        return METHODS[method].named(together)(*found) if together else found[0]
+
+    def problems_of(self, genes: int) -> Iterator[Problem]:
+        """Find what does not go with a chromosome of some length."""
+        for name in self.classes():
+            settings = self.block(name)
+            if hasattr(settings, "problems_of"):
+                for path, text in settings.problems_of(genes):
+                    yield (name, *path), text

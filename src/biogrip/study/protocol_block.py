@@ -1,0 +1,195 @@
+"""What the comb drives do, as the config says it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+from biogrip.experiment.protocol import Harmonic, Load, Phase
+from biogrip.instrument.actuator import CombDrive, capacitance_slope
+from biogrip.keys import Key, Problem
+
+_LONGEST_S = 1e9
+_MOST_PERIODS = 10_000
+
+
+@dataclass(frozen=True)
+class PhaseBlock:
+    """A hold, a ramp or a sinusoid, in torque or in voltage."""
+
+    duration_s: Annotated[
+        float,
+        Key(
+            "How long the phase lasts; all together at most 1e9 s.", "s", low=1e-6, high=_LONGEST_S
+        ),
+    ]
+    torque_Nm: Annotated[
+        float | None,
+        Key(
+            "Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp.",
+            "N m",
+            low=0,
+            high=1.0,
+        ),
+    ] = None
+    to_torque_Nm: Annotated[
+        float | None, Key("Torque at the end of a ramp.", "N m", low=0, high=1.0)
+    ] = None
+    amplitude_Nm: Annotated[
+        float | None,
+        Key(
+            "Amplitude of a sinusoid on top of a held torque; needs frequency_Hz.",
+            "N m",
+            low=0,
+            high=1.0,
+        ),
+    ] = None
+    torque_right_Nm: Annotated[
+        float | None,
+        Key("Held torque of the right arm, where it differs.", "N m", low=0, high=1.0),
+    ] = None
+    voltage_V: Annotated[
+        float | None,
+        Key(
+            "Voltage on both comb drives, instead of torque_Nm. As in the paper it is turned into "
+            "grip torque by eq. (9) and counted from contact; what closes the jaws onto a sample "
+            "comes on top.",
+            "V",
+            low=0,
+            high=1e4,
+        ),
+    ] = None
+    to_voltage_V: Annotated[
+        float | None, Key("Voltage at the end of a ramp of the voltage.", "V", low=0, high=1e4)
+    ] = None
+    amplitude_V: Annotated[
+        float | None,
+        Key(
+            "Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz.",
+            "V",
+            low=0,
+            high=1e4,
+        ),
+    ] = None
+    voltage_right_V: Annotated[
+        float | None,
+        Key("Held voltage of the right arm, where it differs.", "V", low=0, high=1e4),
+    ] = None
+    frequency_Hz: Annotated[
+        float | None,
+        Key(
+            "Frequency of the sinusoid, which starts at its mean, rising.",
+            "Hz",
+            low=1e-9,
+            high=1e9,
+        ),
+    ] = None
+
+    @property
+    def drives(self) -> bool:
+        """Whether anything moves."""
+        torques = self.torque_Nm, self.to_torque_Nm, self.torque_right_Nm
+        return any((*torques, self.voltage_V, self.to_voltage_V, self.voltage_right_V))
+
+    def phase(self, per_square_volt: float) -> Phase:
+        """Return its torques; a voltage's are `per_square_volt` times its square (eq. 9)."""
+        if self.voltage_V is not None:
+            left = self._load(self.voltage_V, self.to_voltage_V, self.amplitude_V)
+            loads = left, _at(left, self.voltage_right_V)
+            return Phase(self.duration_s, *(_squared(load, per_square_volt) for load in loads))
+        assert self.torque_Nm is not None
+        left = self._load(self.torque_Nm, self.to_torque_Nm, self.amplitude_Nm)
+        return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
+
+    def _load(self, value: float, to: float | None, amplitude: float | None) -> Load:
+        slope = ((value if to is None else to) - value) / self.duration_s
+        harmonics: tuple[Harmonic, ...] = ()
+        if amplitude is not None and self.frequency_Hz is not None:
+            omega = 2 * math.pi * self.frequency_Hz
+            harmonics = (Harmonic(amplitude, omega, -math.pi / 2),)
+        return Load(value, slope, 0.0, harmonics)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find keys that do not go together."""
+        given = {name: value for name, value in vars(self).items() if value is not None}
+        bases = [key for key in ("torque_Nm", "voltage_V") if key in given]
+        if len(bases) != 1:
+            found = " and ".join(bases) or "neither"
+            yield (), f"found {found}, allowed is one of torque_Nm and voltage_V."
+            return
+        by = bases[0]
+        quantity, unit = by.split("_")
+        swing, right, ramp = f"amplitude_{unit}", f"{quantity}_right_{unit}", f"to_{by}"
+        for key in given:
+            if key not in ("duration_s", by, right, ramp, swing, "frequency_Hz"):
+                yield (key,), f"does not go with {by}."
+        if (swing in given) != ("frequency_Hz" in given):
+            yield (), f"has one of {swing} and frequency_Hz; allowed are both or neither."
+        if right in given and ramp in given:
+            yield (right,), "does not go with a ramp; allowed is a held torque."
+        if given.get("frequency_Hz", 0) * self.duration_s > _MOST_PERIODS:
+            text = f"found {self.frequency_Hz}, allowed are at most {_MOST_PERIODS} periods"
+            yield ("frequency_Hz",), f"{text} in a phase."
+        if swing in given and ramp in given:
+            yield (), "has a ramp and a sinusoid; allowed is one of them in a phase."
+        if given.get(swing, 0) > min(given[by], given.get(right, given[by])):
+            text = f"found {given[swing]}, allowed is at most {by}: comb drives only pull."
+            yield (swing,), text
+
+
+@dataclass(frozen=True)
+class ProtocolBlock:
+    """What the comb drives do (Figure 3)."""
+
+    phases: Annotated[
+        tuple[PhaseBlock, ...],
+        Key(
+            "Phases that follow one another from t = 0; the experiment ends with the last.",
+            fewest=1,
+            most=1000,
+        ),
+    ]
+
+    @property
+    def end_s(self) -> float:
+        """When the experiment ends."""
+        return sum(phase.duration_s for phase in self.phases)
+
+    def torques(self, comb: CombDrive) -> tuple[Phase, ...]:
+        """Return the torques of all phases, voltages turned into torques (eq. 9)."""
+        per_square_volt = 0.5 * capacitance_slope(comb)
+        return tuple(phase.phase(per_square_volt) for phase in self.phases)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find a protocol that is too long, and one in which nothing moves."""
+        if self.end_s > _LONGEST_S:
+            text = f"found {self.end_s:g} s in all phases together, allowed is at most "
+            yield ("phases",), f"{text}{_LONGEST_S:g} s."
+        if not any(phase.drives for phase in self.phases):
+            text = "no phase has a torque, so nothing would move; allowed is at least one above"
+            yield ("phases",), f"{text} 0 N m."
+
+
+def _at(load: Load, value: float | None) -> Load:
+    return load if value is None else replace(load, value_Nm=value)
+
+
+def _squared(volts: Load, per_square_volt: float) -> Load:
+    """Torque of a voltage V + r t, or V + A sin(omega t), by tau = kappa V^2.
+
+    The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
+    """
+    kappa, value = per_square_volt, volts.value_Nm
+    mean = value**2
+    harmonics: list[Harmonic] = []
+    for h in volts.harmonics:
+        a, omega = h.amplitude_Nm, h.omega_rad_per_s
+        mean += a**2 / 2
+        harmonics.append(Harmonic(2 * kappa * value * a, omega, h.phase_rad))
+        harmonics.append(Harmonic(kappa * a**2 / 2, 2 * omega, math.pi))
+    return Load(
+        kappa * mean,
+        2 * kappa * value * volts.slope_Nm_per_s,
+        2 * kappa * volts.slope_Nm_per_s**2,
+        tuple(harmonics),
+    )

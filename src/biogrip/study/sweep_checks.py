@@ -1,0 +1,143 @@
+"""What is wrong with the sweeps of a study that is else in order."""
+
+from collections.abc import Iterator, Mapping
+
+from biogrip.errors import nearest
+from biogrip.keys import Problem
+from biogrip.study.case_blocks import CaseBlock, Shared
+from biogrip.study.sweeps import (
+    AxisBlock,
+    Point,
+    Sweep,
+    SweepBlock,
+    ValueBlock,
+    axis_of,
+    points_of,
+    sweeps_of,
+)
+from biogrip.study.typed import keys
+
+_AXES = ("rows", "columns")
+_MOST_POINTS = 2000
+_LONGEST_NAME = 200
+
+
+def sweep_problems(
+    blocks: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
+) -> Iterator[Problem]:
+    """Find what does not go with the cases.
+
+    Parameters
+    ----------
+    blocks, cases
+        Sweeps and cases of a study.
+
+    Yields
+    ------
+    tuple
+        The path of the key, and what was found and what is allowed.
+    """
+    problems = [
+        (("sweeps", name, *path), text)
+        for name, block in blocks.items()
+        for path, text in _block_problems(block, cases)
+    ]
+    sweeps = sweeps_of(blocks)
+    points = sum(
+        len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
+        for sweep in sweeps.values()
+    )
+    if not problems and points > _MOST_POINTS:
+        problems = [(("sweeps",), f"found {points} points, allowed are {_MOST_POINTS} together.")]
+    yield from problems
+    if not problems:
+        yield from _name_problems(sweeps, cases)
+
+
+def placed(by_name: Mapping[str, tuple[Sweep, Point]], problem: Problem) -> Problem:
+    """Return a problem of a point's case as one of the value that makes it.
+
+    Parameters
+    ----------
+    by_name
+        Points and their sweeps, by the name of the point.
+    problem
+        Its path starts with ``cases`` and the name of a point.
+    """
+    (_, name, *rest), text = problem
+    key = ".".join(map(str, rest))
+    sweep, point = by_name[str(name)]
+    for axis, value in zip(_AXES, (point.row, point.column), strict=True):
+        for changed in value.overrides:
+            if key == changed or key.startswith(f"{changed}."):
+                values = getattr(sweep, axis).values
+                index = next(i for i, other in enumerate(values) if other.name == value.name)
+                return ("sweeps", sweep.name, axis, "values", index), f"gives {key}: {text}"
+    shown = f"{point.row.text} and {point.column.text} for {point.case}"
+    return ("sweeps", sweep.name), f"{shown}: gives {key}: {text}"
+
+
+def _block_problems(block: SweepBlock, cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
+    for index, case in enumerate(block.cases):
+        if case not in cases:
+            text = f"found '{case}', allowed is a case of the study.{nearest(case, cases)}"
+            yield ("cases", index), text
+            return
+    axes = dict(zip(_AXES, (block.rows, block.columns), strict=True))
+    for name, axis in axes.items():
+        for path, text in _key_problems(axis):
+            yield (name, *path), text
+        shown = [value.text for value in axis_of(axis).values]
+        for index, value in enumerate(shown):
+            if value in shown[:index]:
+                yield (name, "values", index), f"is called '{value}' like one before it."
+    rows, columns = (axis_of(axis) for axis in axes.values())
+    ours = {key for value in rows.values for key in value.overrides}
+    for index, changing in enumerate(columns.values):
+        for key in changing.overrides:
+            if key in ours:
+                yield ("columns", "values", index), f"sets {key}, which the rows do too."
+
+
+def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
+    """Every key must lead somewhere: blocks are laid over blocks, single values over others."""
+    kinds = {isinstance(value, ValueBlock) for value in axis.values}
+    if len(kinds) > 1:
+        yield ("values",), "holds blocks and single values; allowed is one kind of them."
+        return
+    (with_blocks,) = kinds
+    allowed = [key for key, is_block in _dotted(Shared) if is_block == with_blocks]
+    for key in axis.keys:
+        if key not in allowed:
+            wanted = "a block" if with_blocks else "a single value"
+            text = f"found '{key}', allowed is the key of {wanted} that a case may change."
+            yield ("key",), text + nearest(key, allowed)
+
+
+def _dotted(block: type, path: str = "") -> Iterator[tuple[str, bool]]:
+    """Keys in a block and below, and whether each is a block itself."""
+    for name, entry in keys(block).items():
+        inner = entry.shape.block
+        if inner:
+            yield f"{path}{name}", True
+            yield from _dotted(inner, f"{path}{name}.")
+        elif entry.shape.scalar:
+            yield f"{path}{name}", False
+
+
+def _name_problems(
+    sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
+) -> Iterator[Problem]:
+    seen: set[str] = set()
+    for sweep, point in points_of(sweeps):
+        if point.name in cases:
+            text = f"is the name of a point of the sweep {sweep.name}; allowed is another name."
+            yield ("cases", point.name), text
+        if point.name in seen:
+            text = f"has the point {point.name} twice; allowed is every combination once."
+            yield ("sweeps", sweep.name), text
+        seen.add(point.name)
+        if len(point.name) > _LONGEST_NAME:
+            text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
+            yield ("sweeps", sweep.name), f"{text}allowed are {_LONGEST_NAME} (it names files)."
+            return

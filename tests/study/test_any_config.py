@@ -1,0 +1,163 @@
+"""Whatever a config says: it is planned if it passes the checks, else it ends in one message."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, event, given, settings
+from hypothesis import strategies as st
+
+from biogrip.errors import BiogripError
+from biogrip.experiment.sample import MODELS
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.sheet import sheets_of
+from biogrip.study.case_blocks import Shared
+from biogrip.study.config import StudyConfig
+from biogrip.study.load import load_study
+from biogrip.study.source import overlaid, read_config
+from biogrip.study.study import Study
+from biogrip.study.typed import Shape, built, plain
+from tests.study.keys import leaves
+
+DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
+DEFAULTS = read_config(DEFAULT)
+LINE = re.compile(r"[^:]+: .+: (.|\n)+\.")
+# As many jobs as are planned in no time.
+MOST = {"seeds": 300, "coverage_seeds": 300}
+# Keys with a value of their own, outside of what the user names.
+SINGLE = {
+    path: shape
+    for path, shape in leaves(StudyConfig).items()
+    if not shape.block and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
+}
+OF_A_CASE = sorted(path for path in leaves(Shared) if path in SINGLE)
+
+JUNK = st.one_of(
+    st.none(),
+    st.booleans(),
+    st.integers(),
+    st.floats(),
+    st.text(max_size=20),
+    st.sampled_from(["1e5", "1e999", "-1", 10**60, [], {}, [[]], {"a": 1}, "calibrated"]),
+    st.lists(st.integers(), max_size=3),
+    st.dictionaries(st.text(max_size=5), st.integers(), max_size=2),
+)
+
+
+def allowed(shape: Shape, name: str = "") -> st.SearchStrategy[Any]:
+    """Values that a key may have by itself."""
+    key = shape.key
+    if shape.options:
+        return st.one_of(*(allowed(option) for option in shape.options))
+    if key.choices:
+        return st.sampled_from(key.choices)
+    if shape.items:
+        few, many = key.fewest or 0, min(key.most or 4, 4)
+        items = allowed(shape.items)
+        return st.lists(items, min_size=few, max_size=many, unique=key.unique)
+    if shape.names and shape.values:
+        return st.dictionaries(allowed(shape.names), allowed(shape.values), max_size=3)
+    if shape.scalar is int:
+        return st.integers(int(key.low or 0), MOST.get(name, int(key.high or 0)))
+    if shape.scalar is float:
+        low = key.above if key.low is None else key.low
+        return st.floats(low, key.high, exclude_min=key.low is None, allow_subnormal=False)
+    if shape.scalar is bool:
+        return st.booleans()
+    return st.from_regex(key.pattern, fullmatch=True) if key.pattern else st.text(max_size=20)
+
+
+def block_of(path: str, value: Any) -> dict[str, Any]:
+    """The config that has one key."""
+    name, _, rest = path.partition(".")
+    return {name: block_of(rest, value) if rest else value}
+
+
+@st.composite
+def some_keys(draw: st.DrawFn, paths: list[str], *, junk: bool) -> dict[str, Any]:
+    """A few keys changed, one of them to nonsense if need be."""
+    config: dict[str, Any] = {}
+    for path in draw(st.lists(st.sampled_from(paths), max_size=3, unique=True)):
+        value = draw(allowed(SINGLE[path], path.rpartition(".")[2]))
+        config = overlaid(config, block_of(path, value))
+    if junk:
+        path = draw(st.sampled_from(paths))
+        # At the key, in a block above it, or under a name that is like it.
+        parts = path.split(".")[: draw(st.integers(1, path.count(".") + 1))]
+        odd = ".".join(parts) + draw(st.sampled_from(["", "", "x"]))
+        config = overlaid(config, block_of(odd, draw(JUNK)))
+    return config
+
+
+@st.composite
+def overlays(draw: st.DrawFn) -> dict[str, Any]:
+    """Some keys of the study, perhaps a case with keys of its own, and perhaps a sweep over it."""
+    wrong = draw(st.sampled_from(["", "", "study", "case"]))
+    config = draw(some_keys(sorted(SINGLE), junk=wrong == "study"))
+    if draw(st.booleans()):
+        case = draw(some_keys(OF_A_CASE, junk=wrong == "case"))
+        model = draw(st.sampled_from(sorted(MODELS)))
+        values = st.floats(1e-6, 1e6)
+        parameters = {name: draw(values) for name in MODELS[model].names}
+        name = draw(st.sampled_from(["unit", "title", "label", "my-case_1", "x" * 65]))
+        config["cases"] = {name: {**case, "sample": {"model": model, **parameters}}}
+        if draw(st.booleans()):
+            levels = draw(st.lists(st.floats(0, 11), min_size=1, max_size=3, unique=True))
+            key = draw(st.sampled_from(["measurement.noise.level", "least_squares.starts"]))
+            rows = {"label": "a", "key": key, "values": levels}
+            columns = {"label": "b", "key": "gripper.arm_length_m", "values": [1e-3, 2e-3]}
+            config["sweeps"] = {"s": {"cases": [name], "rows": rows, "columns": columns}}
+    return config
+
+
+def planned(study: Study) -> int:
+    """Plan what a study makes; return how many jobs that is."""
+    plan = Plan(study, Path("nowhere"))
+    count = 0
+    for sheet in sheets_of(products().values(), plan):
+        jobs = sheet.jobs
+        count += len(jobs)
+        for job in jobs[:2] + jobs[-2:]:
+            assert sheet.digest(job)
+            assert sheet.command(job)
+            sheet.inputs(job)
+    return count
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large],
+)
+@given(overlays())
+def test_any_config_is_planned_or_ends_in_one_message(overlay: dict[str, Any]) -> None:
+    try:
+        study = load_study(overlaid(DEFAULTS, overlay), [DEFAULT])
+    except BiogripError as error:
+        event("refused")
+        first, *lines = str(error).split("\n")
+        assert first == "The study's configuration cannot be used."
+        assert 1 <= len(lines) <= 7
+        assert all(LINE.fullmatch(line) or line.startswith("... and ") for line in lines), lines
+    else:
+        event("planned")
+        assert planned(study) > 30
+        # Jobs read it from a file.
+        assert built(StudyConfig, plain(study.config)) == study.config
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(st.sampled_from(sorted(SINGLE)), st.data())
+def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataObject) -> None:
+    key, scalar = SINGLE[path].key, SINGLE[path].scalar
+    if scalar not in (int, float) or key.high is None:
+        return
+    beyond: Any = st.floats(key.high, exclude_min=True, allow_infinity=False)
+    if scalar is int:
+        beyond = st.integers(int(key.high) + 1)
+    overlay = block_of(path, data.draw(beyond))
+    with pytest.raises(BiogripError, match=re.escape(f": {path}: found ")):
+        load_study(overlaid(DEFAULTS, overlay), [DEFAULT])
