@@ -20,11 +20,19 @@ class Noise:
     reference
         ``"peak"``: the largest noise-free rotation; ``"signal"``: the
         noise-free rotation at each instant.
+    level_rad
+        Standard deviation in rad, instead of the level: an instrument's, whatever the sample.
     """
 
     kind: str
-    level: float
+    level: float | None
     reference: str
+    level_rad: float | None = None
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is none."""
+        return not (self.level if self.level_rad is None else self.level_rad)
 
 
 def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Array:
@@ -67,6 +75,8 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
     (n_samples,)
     """
     magnitude = np.abs(rotation_rad)
+    if noise.level_rad is not None or noise.level is None:
+        return np.full_like(magnitude, noise.level_rad or 0.0)
     scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())
     deviation: Array = noise.level * scale
     return deviation

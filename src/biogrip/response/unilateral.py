@@ -254,13 +254,13 @@ def _grid(fastest_per_s: float, omega_rad_per_s: Array, length_s: float) -> Iter
         longest = 2 * np.pi / float(omega_rad_per_s.max()) / _PER_PERIOD
     first = min(1e-2 / fastest_per_s, length_s)
     count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH))) + 1
-    here = np.append(0.0, first * _GROWTH ** np.arange(count))
+    here: Array = np.append(0.0, first * _GROWTH ** np.arange(count))
     near = here[: int(np.searchsorted(np.diff(here), longest)) + 1]
     near = near[near < length_s]
     yield near
     reached = float(near[-1])
     while np.isfinite(longest) and reached + longest < length_s:
-        some = reached + longest * np.arange(1, _AT_ONCE + 1)
+        some = reached + longest * np.arange(1.0, _AT_ONCE + 1)
         some = some[some < length_s]
         yield some
         reached = float(some[-1])

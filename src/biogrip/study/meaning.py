@@ -41,6 +41,8 @@ def meaning_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     for name, case in config["cases"].items():
         path = ("cases", name)
         found = list(_recording_problems((*path, "measurement"), case["measurement"]))
+        found += _noise_problems((*path, "measurement", "noise"), case["measurement"]["noise"])
+        found += _contact_problems((*path, "contact"), case)
         found += _sample_problems((*path, "sample"), case)
         found += _phase_problems((*path, "protocol", "phases"), case["protocol"]["phases"])
         found += _genetic_problems((*path, "genetic_algorithm"), case["genetic_algorithm"])
@@ -89,6 +91,21 @@ def _recording_problems(path: KeyPath, measurement: Mapping[str, Any]) -> Iterat
             yield (*path, key), f"is missing: a recorded trace needs the name of its {key} column."
     if problem := trace_file_problem(measurement["file"]):
         yield (*path, "file"), problem
+
+
+def _noise_problems(path: KeyPath, noise: Mapping[str, Any]) -> Iterator[Problem]:
+    given = [key for key in ("level", "level_rad") if noise.get(key) is not None]
+    if len(given) != 1:
+        found = " and ".join(given) or "neither"
+        yield path, f"found {found}, allowed is one of level and level_rad; null takes one away."
+
+
+def _contact_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:
+    if "contact" in case and "file" in case["measurement"]:
+        yield path, "is only for a simulated case; of a recorded trace leave out what follows."
+    elif case.get("contact") == "unilateral" and case["models"]["target"] != "linear":
+        text = "found unilateral and a nonlinear target, allowed is models.target: linear with it."
+        yield path, text
 
 
 def _sample_problems(path: KeyPath, case: Mapping[str, Any]) -> Iterator[Problem]:

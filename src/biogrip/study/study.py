@@ -125,7 +125,7 @@ class Case:
     @property
     def noise(self) -> Noise:
         """Noise added to the rotation."""
-        return Noise(**self.block["measurement"]["noise"])
+        return Noise(**{"level": None, **self.block["measurement"]["noise"]})
 
     @property
     def sampling(self) -> Sampling:
@@ -142,6 +142,11 @@ class Case:
     def nonlinear_target(self) -> bool:
         """Whether the target is made by the nonlinear model."""
         return bool(self.block["models"]["target"] == "nonlinear")
+
+    @property
+    def unilateral(self) -> bool:
+        """Whether the jaws of its target press only, and let go where they would have to pull."""
+        return bool(self.block.get("contact") == "unilateral")
 
     @property
     def file(self) -> str:
