@@ -24,7 +24,7 @@ class Grip:
     largest_N, largest_at_s
         The hardest press, and when.
     lowest_N, lowest_at_s
-        The hardest pull, negative, or the gentlest press; and when.
+        The hardest pull, negative; or the gentlest press after the hardest. And when.
     pulls_from_s
         Since when the jaws would have to pull; None if they press throughout.
     """
@@ -65,8 +65,9 @@ def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlin
     force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
     least_told = _NOTHING * float(np.abs(force).max()) or 1.0
     told = np.round(force / least_told)
-    most, least = int(np.argmax(told)), int(np.argmin(told))
-    negative = np.flatnonzero(told < 0)
+    most, negative = int(np.argmax(told)), np.flatnonzero(told < 0)
+    first = 0 if len(negative) else most
+    least = first + int(np.argmin(told[first:]))
     return Grip(
         float(told[most] * least_told),
         float(time_s[most]),

@@ -13,7 +13,7 @@ def rows_of(study: object = STUDY) -> list[dict[str, object]]:
 
 
 def test_springs_alone_tell_what_statics_says() -> None:
-    """A spring of the gripper's own stiffness halves what the torque would press rigid jaws with."""
+    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with."""
     own = STUDY.gripper.jaw_stiffness_N_per_m
     study = study_of(
         f"""
