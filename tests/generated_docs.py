@@ -1,6 +1,8 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
@@ -8,7 +10,8 @@ import pandas as pd
 from biogrip.study.reference import reference
 
 ROOT = Path(__file__).parents[1]
-ERRORS = ROOT / "results" / "published" / "tables" / "errors.csv"
+PUBLISHED = ROOT / "results" / "published"
+ERRORS = PUBLISHED / "tables" / "errors.csv"
 
 
 def config_keys() -> str:
@@ -46,22 +49,40 @@ def _percent(text: str) -> str:
         return f"{text} %"
 
 
-GENERATED = {
-    ROOT / "config" / "README.md": ("keys", config_keys),
-    ROOT / "README.md": ("results", paper_against_study),
+def published_table(name: str) -> str:
+    """A published table, caption and all; until it is published, its name."""
+    file = PUBLISHED / "tables" / f"{name}.md"
+    if not file.is_file():
+        return (
+            f"(Table `{name}`: in `results/tables/` after a run, not yet among the published ones.)"
+        )
+    return file.read_text(encoding="utf-8").strip()
+
+
+GENERATED: dict[Path, dict[str, Callable[[], str]]] = {
+    ROOT / "config" / "README.md": {"keys": config_keys},
+    ROOT / "README.md": {"results": paper_against_study},
+    ROOT / "docs" / "model.md": {
+        name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
+    },
 }
 
 
 def renewed(path: Path) -> str:
-    """Return a document with its generated part as it should be."""
-    name, content = GENERATED[path]
-    pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
-    return re.sub(
-        pattern,
-        lambda match: f"{match[1]}\n{content()}\n\n{match[2]}",
-        path.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
+    """Return a document with its generated parts as they should be."""
+    text = path.read_text(encoding="utf-8")
+    for name, content in GENERATED[path].items():
+        pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
+        part = content()
+        text, count = re.subn(
+            pattern,
+            lambda match, part=part: f"{match[1]}\n{part}\n\n{match[2]}",
+            text,
+            flags=re.DOTALL,
+        )
+        if count != 1:
+            raise ValueError(f"{path}: has no part {name} to be written.")
+    return text
 
 
 if __name__ == "__main__":
