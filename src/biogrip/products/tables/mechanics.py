@@ -82,8 +82,8 @@ def mechanics(settings: list[CaseSettings]) -> Table:
         "stiffness of the sample at once (all springs) and in the end (the parallel one), of the "
         "gripper (both hinges, at the jaws), and the first of these over the last. The modulus is "
         "that of an incompressible sphere between two flat jaws (Hertz) with force and shortening "
-        "of the end of the first phase; single cells have some 0.1 to 10 kPa. A case that gives "
-        "no size has a row for the smallest and the largest sample that the gripper takes."
+        "of the end of the first phase; cells have about 1 kPa, give or take a factor of 30 by the "
+        "method of measurement. A case that gives no size has a row for the smallest and the largest sample that the gripper takes."
     )
     return Table(caption, _COLUMNS, [row for case in settings for row in _rows(case)])
 
