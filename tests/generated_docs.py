@@ -1,14 +1,18 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pandas as pd
 
 from biogrip.study.reference import file_schema, reference
+from tests.published_numbers import renewed_numbers
 
 ROOT = Path(__file__).parents[1]
-ERRORS = ROOT / "results" / "published" / "tables" / "errors.csv"
+PUBLISHED = ROOT / "results" / "published"
+ERRORS = PUBLISHED / "tables" / "errors.csv"
 
 
 def config_keys() -> str:
@@ -46,26 +50,47 @@ def _percent(text: str) -> str:
         return f"{text} %"
 
 
-GENERATED = {
-    ROOT / "config" / "README.md": ("keys", config_keys),
-    ROOT / "config" / "schema.json": ("", file_schema),
-    ROOT / "README.md": ("results", paper_against_study),
+def published_table(name: str) -> str:
+    """A published table, caption and all; until it is published, its name."""
+    file = PUBLISHED / "tables" / f"{name}.md"
+    if not file.is_file():
+        return (
+            f"(Table `{name}`: in `results/tables/` after a run, not yet among the published ones.)"
+        )
+    return file.read_text(encoding="utf-8").strip()
+
+
+PARTS: dict[Path, dict[str, Callable[[], str]]] = {
+    ROOT / "config" / "README.md": {"keys": config_keys},
+    ROOT / "README.md": {"results": paper_against_study},
+    ROOT / "docs" / "model.md": {
+        name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
+    },
 }
-"""Which part of a document is written, all of it if none is named, and by what."""
+"""Parts of documents that are written, by what."""
+
+SCHEMA = ROOT / "config" / "schema.json"
+GENERATED = (
+    SCHEMA,
+    ROOT / "config" / "README.md",
+    ROOT / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+)
 
 
 def renewed(path: Path) -> str:
-    """Return a document with its generated part as it should be."""
-    name, content = GENERATED[path]
-    if not name:
-        return content()
-    pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
-    return re.sub(
-        pattern,
-        lambda match: f"{match[1]}\n{content()}\n\n{match[2]}",
-        path.read_text(encoding="utf-8"),
-        flags=re.DOTALL,
-    )
+    """Return a document with its generated parts, and its numbers, as they should be."""
+    if path == SCHEMA:
+        return file_schema()
+    text = path.read_text(encoding="utf-8")
+    for name, content in PARTS.get(path, {}).items():
+        match = re.search(
+            rf"<!-- {name}: begin[^\n]*-->\n(.*)<!-- {name}: end -->", text, re.DOTALL
+        )
+        if match is None:
+            raise ValueError(f"{path}: has no part {name} to be written.")
+        text = f"{text[: match.start(1)]}\n{content()}\n\n{text[match.end(1) :]}"
+    return renewed_numbers(text)
 
 
 if __name__ == "__main__":

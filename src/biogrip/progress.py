@@ -1,5 +1,6 @@
-"""How far a long job has come, said every few seconds and not at all in a short one."""
+"""How far a long job has come, said every few seconds and not at all in a short one; warnings."""
 
+import sys
 import time
 
 _EVERY_S = 5.0
@@ -46,3 +47,11 @@ class Progress:
             print(
                 f"{self._what}: {self._done} of {self._total} done{self._phase}{more}", flush=True
             )
+
+
+def warn(text: str) -> None:
+    """Say what should be doubted: to whoever waits at the terminal, and in the job's log."""
+    line = f"biogrip: warning: {text}"
+    print(line, flush=True)
+    if not sys.stderr.isatty():
+        print(line, file=sys.stderr, flush=True)

@@ -17,7 +17,7 @@ from biogrip.experiment.sample import (
     with_fixed,
 )
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.linear import _sample_polynomials, rotation, step_response
+from biogrip.response.linear import rotation, sample_polynomials, step_response
 
 TIMES = np.linspace(0.1, 400, 300)
 
@@ -98,7 +98,7 @@ def series(*impedances: complex) -> complex:
 
 def impedance(network: Network, s: complex) -> complex:
     """The library's sample, P/Q, at a complex frequency."""
-    p, q = _sample_polynomials(network)
+    p, q = sample_polynomials(network)
     return complex(np.polyval(p[::-1, 0], s) / np.polyval(q[::-1, 0], s))
 
 
@@ -160,5 +160,5 @@ def test_the_printed_equation_6_runs_away_and_the_corrected_one_relaxes() -> Non
         )
         assert solved.y[0, -1] == pytest.approx(start * np.exp(sign * k / c * 20), rel=1e-6)
     # The library's sample has the relaxing pole, -k/c, alone: strain it, hold it, watch the force.
-    _, q = _sample_polynomials(generalized_maxwell([k, 12.3, c, 1e-3]))
+    _, q = sample_polynomials(generalized_maxwell([k, 12.3, c, 1e-3]))
     np.testing.assert_allclose(-q[0, 0] / q[1, 0], -k / c, rtol=1e-15)

@@ -1,10 +1,12 @@
 import math
 
+import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.instrument.contact import contact
 from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.linkage import displacement_of_tip, rotation_of_tip
 from tests.instrument.test_actuator import TABLE_2
 
 
@@ -37,3 +39,20 @@ def test_what_cannot_be_gripped_is_refused(
 ) -> None:
     with pytest.raises(BiogripError, match=message):
         contact(gripper, 1e-6 * gap_um, TABLE_2, 1e-6 * size_um)
+
+
+def test_the_gripper_yields_as_two_springs_in_a_row(unequal_gripper: Gripper) -> None:
+    """Jaws pushed apart by a force turn each hinge by F b/k and open by b times that."""
+    force, b = 1e-6, unequal_gripper.lever_m
+    opening = sum(b * force * b / k for k in (4.4e-7, 5.5e-7))
+    assert unequal_gripper.jaw_stiffness_N_per_m == pytest.approx(force / opening)
+
+
+def test_a_tip_goes_where_its_rotation_takes_it(gripper: Gripper) -> None:
+    turns = np.array([1e-9, 1e-3, 0.07])
+    there = displacement_of_tip(gripper, turns)
+    np.testing.assert_allclose(rotation_of_tip(gripper, there), turns, rtol=1e-14)
+    coordinates = [
+        1.5e-3 * (math.cos(math.radians(75) - t) - math.cos(math.radians(75))) for t in turns
+    ]
+    np.testing.assert_allclose(there[1:], coordinates[1:], rtol=1e-11)

@@ -17,6 +17,19 @@ def rotation_50_digits(
     gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:
     """phi_2 of one sample (k, k_p, c, c_p) with inertia, shape (n_times,)."""
+    return _output_50_digits(gripper, parameters, steps, time_s, of_force=False)
+
+
+def jaw_force_50_digits(
+    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
+) -> Array:
+    """Force of the springs and dampers on the tips in N, shape (n_times,)."""
+    return _output_50_digits(gripper, parameters, steps, time_s, of_force=True)
+
+
+def _output_50_digits(
+    gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array, *, of_force: bool
+) -> Array:
     with mp.workdps(50):
         k, k_p, c, c_p = (mpf(float(value)) for value in parameters)
         b = mpf(gripper.arm_length_m) * mp.sin(mp.radians(mpf(gripper.reference_angle_deg)))
@@ -37,7 +50,8 @@ def rotation_50_digits(
         # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
         a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
         rates, vectors = mp.eig(a)
-        phi = [mpf(0)] * len(time_s)
+        seen = mp.matrix([force if of_force else [1, 0, 0, 0, 0]])
+        found = [mpf(0)] * len(time_s)
         for start, left, right in zip(
             steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True
         ):
@@ -45,14 +59,13 @@ def rotation_50_digits(
             load[2], load[3] = mpf(float(left)) / inertia[0], mpf(float(right)) / inertia[1]
             rest = mp.lu_solve(a, -load)
             weights = mp.lu_solve(vectors, -rest)
+            amplitudes = [(seen * vectors[:, j])[0] * weights[j] for j in range(5)]
             for i, t in enumerate(time_s):
                 elapsed = mpf(float(t)) - mpf(float(start))
                 if elapsed >= 0:
-                    terms = (
-                        vectors[0, j] * weights[j] * mp.exp(rates[j] * elapsed) for j in range(5)
-                    )
-                    phi[i] += rest[0] + mp.re(mp.fsum(terms))
-        return np.array([float(value) for value in phi])
+                    terms = (amplitudes[j] * mp.exp(rates[j] * elapsed) for j in range(5))
+                    found[i] += (seen * rest)[0] + mp.re(mp.fsum(terms))
+        return np.array([float(value) for value in found])
 
 
 def random_samples(count: int, seed: int) -> Array:

@@ -94,10 +94,17 @@ def symmetric_radau(
     gripper: Gripper, sample: Array, torques: list[tuple[float, float]], time_s: Array, peak: float
 ) -> Array:
     """The same for equal arms and torques, where one rotation stands for both."""
+    return symmetric_states(gripper, sample, torques, time_s, peak)[0]
+
+
+def symmetric_states(
+    gripper: Gripper, sample: Array, torques: list[tuple[float, float]], time_s: Array, peak: float
+) -> Array:
+    """Rotation and jaw force, (2, n_times), of equal arms under equal torques."""
     k, k_p, c, c_p = (float(value) for value in sample)
     arm = gripper.left
 
-    def slope(_: float, state: Array, tau: float) -> list[float]:
+    def slope(_: float, state: Array | tuple[float, ...], tau: float) -> list[float]:
         phi, y = state
         u, b = tip(gripper, phi)
         rest = tau - arm.stiffness_Nm_per_rad * phi - b * (k_p * 2 * u + k * (2 * u - y))
@@ -118,9 +125,13 @@ def symmetric_radau(
             atol=[1e-13 * peak, 1e-13 * peak * gripper.arm_length_m],
         )
         assert solved.success, solved.message
-        found.append(solved.y[0, : len(here)])
+        phi, y = solved.y[:, : len(here)]
+        phi_rate = [slope(0.0, states, tau)[0] for states in zip(phi, y, strict=True)]
+        u, b = np.array([tip(gripper, angle) for angle in phi]).T
+        force = k_p * 2 * u + c_p * 2 * b * phi_rate + k * (2 * u - y)
+        found.append(np.stack((phi, force)))
         state, start = solved.y[:, -1], end
-    return np.concatenate(found)
+    return np.concatenate(found, axis=1)
 
 
 @pytest.mark.parametrize("case", range(50))

@@ -90,7 +90,7 @@ def test_a_setting_reruns_what_depends_on_it(
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(study: Path) -> None:
     run = snakemake(study, "-n", config=SMALL + NEW_CASE)
     assert run.status == 0, run.output
-    together = {"tables", "model_difference", "linearisation_map", "overview"}
+    together = {"tables", "model_difference", "study_figures", "contact_loss"}
     jobs = run.all_jobs()
     assert together <= set(jobs)
     assert {rule: jobs.pop(rule) for rule in together} == dict.fromkeys(together, 1)
@@ -98,8 +98,7 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(study: Path)
     batches = {"measurement": 2, "identification": 6, "model_fits": 2, "intervals": 3}
     assert {rule: jobs.pop(rule) for rule in batches} == batches
     once = {"target", "identifications", "all_times", "all_intervals", "all_model_fits"}
-    once |= {"judgement", "expectation", "summary", "case_tables", "judgement_tables"}
-    once |= {"case_figures", "simulated_figures", "judgement_figures"}
+    once |= {"judgement", "expectation", "case_tables", "case_figures"}
     assert jobs == dict.fromkeys(once, 1)
 
 
@@ -125,7 +124,7 @@ def tree(finished: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
     ("file", "jobs"),
     [
         ("workflow/report/product.rst", {}),
-        ("src/biogrip/products/figures/fit.py", {"case_figures": 2, "summary": 2}),
+        ("src/biogrip/products/figures/fit.py", {"case_figures": 2}),
         ("src/biogrip/products/tables/models.py", {"tables": 1}),
     ],
 )
@@ -142,7 +141,7 @@ def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree
     jobs = run.all_jobs()
     assert (jobs["identification"], jobs["identifications"], jobs["case_tables"]) == (4, 2, 2)
     untouched = {"target", "measurement", "judgement", "expectation", "model_fits", "intervals"}
-    untouched |= {"model_difference", "input_tables", "input_figures"}
+    untouched |= {"model_difference"}
     assert not untouched & set(jobs)
 
 

@@ -1,12 +1,13 @@
 """What the instrument records: the rotation with noise on it."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.keys import Key
+from biogrip.keys import Key, Problem
 
 
 @dataclass(frozen=True)
@@ -15,17 +16,44 @@ class Noise:
 
     kind: Annotated[str, Key("Distribution of the noise.", choices=("gaussian", "uniform"))]
     level: Annotated[
-        float,
-        Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
+        float | None,
+        Key(
+            "Standard deviation of the noise, as a share of the reference; `null` where "
+            "`level_rad` is given.",
+            low=0,
+            high=10,
+        ),
     ]
     reference: Annotated[
         str,
         Key(
-            "`peak`: the largest rotation of the noise-free trace, the same noise everywhere; "
-            "`signal`: the noise-free rotation at each instant.",
+            "What `level` is a share of. `peak`: the largest rotation of the noise-free trace, the "
+            "same noise everywhere; `signal`: the noise-free rotation at each instant.",
             choices=("peak", "signal"),
         ),
     ]
+    level_rad: Annotated[
+        float | None,
+        Key(
+            "Standard deviation of the noise as an instrument has it, the same whatever the "
+            "sample: `{level: null, level_rad: 3.0e-6}`.",
+            "rad",
+            low=0,
+            high=10,
+        ),
+    ] = None
+
+    def problems(self) -> Iterator[Problem]:
+        """Its size is given once."""
+        given = [key for key in ("level", "level_rad") if getattr(self, key) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "neither"
+            yield (), f"found {found}, allowed is one of level and level_rad; null takes one away."
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is none."""
+        return not (self.level if self.level_rad is None else self.level_rad)
 
 
 def add_noise(rotation_rad: Array, noise: Noise, rng: np.random.Generator) -> Array:
@@ -68,6 +96,8 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
     (n_samples,)
     """
     magnitude = np.abs(rotation_rad)
+    if noise.level_rad is not None or noise.level is None:
+        return np.full_like(magnitude, noise.level_rad or 0.0)
     scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())
     deviation: Array = noise.level * scale
     return deviation

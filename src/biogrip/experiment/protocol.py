@@ -8,6 +8,7 @@ voltage, as voltage.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -214,6 +215,15 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
         elapsed = t - start
         torque += np.where(elapsed >= 0, (a * np.exp(1j * omega * elapsed)).real, 0.0)
     return torque
+
+
+def largest_torque(history: TorqueHistory) -> float:
+    """Largest torque of either arm in N m, to what a thousand instants of every phase show."""
+    starts = np.append(history.time_s, history.end_s)
+    inside = np.concatenate(
+        [np.linspace(start, np.nextafter(end, 0), 1000) for start, end in pairwise(starts)]
+    )
+    return max(float(torque_at(history, inside, arm).max()) for arm in ("left", "right"))
 
 
 def sample_times(duration_s: float, rate_Hz: float) -> Array:

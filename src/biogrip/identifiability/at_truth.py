@@ -39,7 +39,7 @@ def bounds_percent(
     """
     model = problem.searched
     quantities = parameters_and_sum(model)
-    if noise.level == 0:
+    if noise.absent:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
     rotation, sensitivity = rotation_and_sensitivity(

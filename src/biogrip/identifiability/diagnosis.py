@@ -10,6 +10,7 @@ from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
+from biogrip.response.grip import Grip
 
 # A misfit that exceeds what neighbouring samples scatter by so much is not noise.
 _TOO_MUCH = 1.2
@@ -33,6 +34,8 @@ class Diagnosis:
         A verdict on every parameter and on the sum of the exchangeable ones.
     trades
         Parameters of which only a combination is determined.
+    grip
+        Force of the jaws on the sample of the best fit.
     notes
         What should be doubted, in sentences.
     """
@@ -40,6 +43,7 @@ class Diagnosis:
     likelihood: Likelihood
     findings: list[Finding]
     trades: list[Trade]
+    grip: Grip
     notes: list[str]
 
 
@@ -81,7 +85,20 @@ def diagnose(
             break
         best, misfit_rad = fit.log_parameters, fit.misfit_rad
     trades = trades_of(likelihood, model, findings)
-    return Diagnosis(likelihood, findings, trades, _notes(likelihood))
+    grip = problem.residuals.grip(likelihood.best)
+    notes = [*_notes(likelihood), *_pulling(grip, problem.residuals.duration_s)]
+    return Diagnosis(likelihood, findings, trades, grip, notes)
+
+
+def _pulling(grip: Grip, last_s: float) -> list[str]:
+    """Doubt samples at which the jaws would have to pull what was identified."""
+    words = grip.words()
+    if words is None or grip.pulls_from_s is None or grip.pulls_from_s > last_s:
+        return []
+    return [
+        f"With the best fit {words}. Unless it sticks to them they left it there, and what "
+        "follows is no response of the sample: identify it from the samples before."
+    ]
 
 
 def _notes(likelihood: Likelihood) -> list[str]:

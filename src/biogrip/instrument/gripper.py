@@ -77,3 +77,9 @@ class Gripper:
     def lever_m(self) -> float:
         """Tip displacement per closing rotation at the reference, l sin(hat-theta_2)."""
         return self.arm_length_m * math.sin(math.radians(self.reference_angle_deg))
+
+    @property
+    def jaw_stiffness_N_per_m(self) -> float:
+        """Stiffness of both hinges as the sample meets it: force over the closing of the jaws."""
+        yielding = 1 / self.left.stiffness_Nm_per_rad + 1 / self.right.stiffness_Nm_per_rad
+        return 1 / (self.lever_m**2 * yielding)

@@ -19,3 +19,11 @@ def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
     with np.errstate(invalid="ignore"):
         new_sin = np.sqrt(sin * sin - rest)
     return np.arctan2(sin * x + cos * rest / (sin + new_sin), cos * (cos + x) + sin * new_sin)
+
+
+def displacement_of_tip(gripper: Gripper, rotation_rad: Array) -> Array:
+    """Displacement u in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
+    angle = np.radians(gripper.reference_angle_deg)
+    half = 0.5 * rotation_rad
+    moved: Array = 2 * gripper.arm_length_m * np.sin(angle - half) * np.sin(half)
+    return moved

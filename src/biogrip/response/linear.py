@@ -115,21 +115,21 @@ def transfer_functions(
 
     Parameters may be complex: nothing but arithmetic is done to them.
     """
-    p, q = _sample_polynomials(network)
-    z_2 = _arm_polynomial(gripper.left, inertia)
-    z_4 = _arm_polynomial(gripper.right, inertia)
+    p, q = sample_polynomials(network)
+    z_2 = arm_polynomial(gripper.left, inertia)
+    z_4 = arm_polynomial(gripper.right, inertia)
     coupling = gripper.lever_m**2
     if symmetric and gripper.left == gripper.right:
         numerators = [[q.T]] * (2 if both_arms else 1)
-        return TransferFunctions(numerators, _add(_multiply(z_2, q), 2 * coupling * p).T)
-    left, right = _multiply(z_4, q), _multiply(z_2, q)
+        return TransferFunctions(numerators, add(multiply(z_2, q), 2 * coupling * p).T)
+    left, right = multiply(z_4, q), multiply(z_2, q)
     numerators = [
         [left.T, coupling * p.T],
-        [right.T, -_add(right, coupling * p).T],
+        [right.T, -add(right, coupling * p).T],
     ]
     numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
-    arms = _multiply(z_2, z_4)
-    denominator = _add(_multiply(arms, q), coupling * _multiply(p, _add(z_2, z_4)))
+    arms = multiply(z_2, z_4)
+    denominator = add(multiply(arms, q), coupling * multiply(p, add(z_2, z_4)))
     return TransferFunctions(numerators, denominator.T)
 
 
@@ -206,7 +206,7 @@ def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
     return np.where(small, series, value)
 
 
-def _sample_polynomials(network: Network) -> tuple[Array, Array]:
+def sample_polynomials(network: Network) -> tuple[Array, Array]:
     """P and Q of the sample's impedance P/Q, ascending powers, shape (terms, n).
 
     Each branch enters as c_j s / (1 + T_j s) with its relaxation time T_j = c_j/k_j.
@@ -214,19 +214,21 @@ def _sample_polynomials(network: Network) -> tuple[Array, Array]:
     one = np.ones((1, len(network.k_p)))
     factors = [np.concatenate((one, t[None])) for t in (network.c / network.k).T]
     q = _product(factors, one)
-    p = _multiply(np.array((network.k_p, network.c_p)), q)
+    p = multiply(np.array((network.k_p, network.c_p)), q)
     for j, c_j in enumerate(network.c.T):
         others = _product(factors[:j] + factors[j + 1 :], one)
         p[1 : 1 + len(others)] += c_j * others
     return p, q
 
 
-def _arm_polynomial(arm: Arm, inertia: bool) -> Array:
+def arm_polynomial(arm: Arm, inertia: bool) -> Array:
+    """Impedance Z of a free arm, ascending powers, shape (terms, 1)."""
     coefficients = [arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2]
     return np.array(coefficients if inertia else coefficients[:2])[:, None]
 
 
-def _multiply(a: Array, b: Array) -> Array:
+def multiply(a: Array, b: Array) -> Array:
+    """Multiply polynomials in ascending powers, shape (terms, n) each."""
     terms, n = len(a) + len(b) - 1, max(a.shape[1], b.shape[1])
     product = np.zeros((terms, n), dtype=np.result_type(a, b))
     for i, a_i in enumerate(a):
@@ -234,7 +236,8 @@ def _multiply(a: Array, b: Array) -> Array:
     return product
 
 
-def _add(a: Array, b: Array) -> Array:
+def add(a: Array, b: Array) -> Array:
+    """Add polynomials in ascending powers, shape (terms, n) each."""
     terms, n = max(len(a), len(b)), max(a.shape[1], b.shape[1])
     total = np.zeros((terms, n), dtype=np.result_type(a, b))
     total[: len(a)] += a
@@ -243,7 +246,7 @@ def _add(a: Array, b: Array) -> Array:
 
 
 def _product(factors: list[Array], one: Array) -> Array:
-    return reduce(_multiply, factors) if factors else one
+    return reduce(multiply, factors) if factors else one
 
 
 def poles(denominator: Array, *, real: bool) -> NDArray[Any]:

@@ -84,17 +84,28 @@ class Correction:
         The mesh.
     values_rad : (n, n_arms, n_elements, STAGES + 1)
         At the start of each element and at its nodes.
+    force_N : (n, n_elements, STAGES + 1)
+        Nonlinear minus linear jaw force there; after a jump of the torque, at the start.
     converged : (n,)
         Whether the sweeps came to rest.
     """
 
     edges_s: Array
     values_rad: Array
+    force_N: Array
     converged: np.ndarray
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate at ascending times, shape (n, n_times)."""
-        values = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
+        return self._interpolated(
+            self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)], time_s
+        )
+
+    def force_at(self, time_s: Array) -> Array:
+        """Evaluate nonlinear minus linear jaw force in N at ascending times, (n, n_times)."""
+        return self._interpolated(self.force_N, time_s)
+
+    def _interpolated(self, values: Array, time_s: Array) -> Array:
         parts = [
             values[:, element] @ np.ascontiguousarray(on_piece)
             for element, on_piece in enumerate(_interpolation(self.edges_s, time_s))
@@ -145,14 +156,28 @@ def nonlinear_rotation(
     BiogripError
         If the torque closes the arms beyond what the model describes.
     """
-    found = correction(gripper, network, torque, FINE)
+    found = computed_correction(gripper, network, torque, FINE)
+    linear = step_response(gripper, network, symmetric=torque.symmetric, both_arms=arm == RIGHT)
+    return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
+
+
+def computed_correction(
+    gripper: Gripper, network: Network, torque: TorqueHistory, accuracy: Accuracy
+) -> Correction:
+    """Compute what `correction` does, and make sure that it could be.
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the model describes.
+    """
+    found = correction(gripper, network, torque, accuracy)
     if not np.all(found.converged):
         raise BiogripError(
             "the nonlinear response could not be computed: the torque closes the arms so far "
             "that they lose their lever on the sample. Allowed are smaller torques."
         )
-    linear = step_response(gripper, network, symmetric=torque.symmetric, both_arms=arm == RIGHT)
-    return rotation(linear, torque, time_s, arm) + found.at(time_s, arm)
+    return found
 
 
 def correction(
@@ -199,14 +224,14 @@ def correction(
         times[:, None, None, None] * each for each in (linear, linear_rate, tau)
     )
     peak = np.abs(linear).max(axis=(1, 2, 3))
-    extra, extra_rate = np.zeros(shape), np.zeros(shape)
+    extra, extra_rate, loads = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     converged = np.zeros(shape[0], dtype=bool)
     # What has come to rest stays, lest it depended on the others how often it is swept.
     left = np.arange(shape[0])
     for _ in range(accuracy.most_sweeps):
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
-        load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
+        loads[left] = load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
         found, extra_rate[left] = modes.respond(_as_drives(load), left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
@@ -218,7 +243,21 @@ def correction(
     at_nodes = phi - linear
     values = np.concatenate((np.zeros((*shape[:3], 1)), at_nodes), axis=3)
     values[:, :, 1:, 0] = at_nodes[:, :, :-1, -1]
-    return Correction(edges, values, converged)
+    arm = gripper.left
+    force = loads - arm.damping_Nms_per_rad * extra_rate - arm.stiffness_Nm_per_rad * extra
+    return Correction(edges, values, _from_starts(force[:, 0] / b_0, edges, torque), converged)
+
+
+def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
+    """Complete values at the nodes by those at the starts of the elements.
+
+    The force goes on as it was, but where the torque jumps; the element that follows
+    a jump is short, and what its nodes say is extended to its start.
+    """
+    starts = np.concatenate((force[:, :1, 0], force[:, :-1, -1]), axis=1)
+    sets_in = np.isin(edges_s[:-1], np.concatenate((torque.time_s, torque.harmonic_time_s)))
+    starts[:, sets_in] = force[:, sets_in] @ _polynomials(_radau()[0], np.zeros(1))[:, 0]
+    return np.concatenate((starts[..., None], force), axis=2)
 
 
 def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
@@ -323,7 +362,11 @@ def _nodes(edges: Array) -> Array:
 
 def _lagrange(x: Array) -> Array:
     """Values at x of the polynomials that are 1 at one of 0 and the nodes, (STAGES + 1, n)."""
-    points = np.concatenate(([0.0], _radau()[0]))
+    return _polynomials(np.concatenate(([0.0], _radau()[0])), x)
+
+
+def _polynomials(points: Array, x: Array) -> Array:
+    """Values at x of the polynomials that are 1 at one of some points, (n_points, n)."""
     values = np.ones((len(points), len(x)))
     for i, point in enumerate(points):
         for other in np.delete(points, i):

@@ -10,6 +10,7 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.grip import Grip, grip_of
 from biogrip.response.linear import LEFT
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import (
@@ -70,6 +71,11 @@ class Residuals:
     def free(self) -> int:
         """Degrees of freedom that samples and nuisance leave to parameters and noise."""
         return self.samples - len(self._nuisance)
+
+    def grip(self, log_parameters: Array) -> Grip:
+        """Force of the jaws on a sample, with which they press it or would have to pull."""
+        network = self._model.network(np.exp(log_parameters))
+        return grip_of(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
     def of_model(self, model: SampleModel) -> "Residuals":
         """Return the same trace for another model."""

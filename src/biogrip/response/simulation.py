@@ -1,10 +1,11 @@
-"""The rotation that a sample gives, by whichever model is asked for."""
+"""The rotation that a sample gives, and its shortening, by whichever model is asked for."""
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.linear import rotation, step_response
+from biogrip.instrument.linkage import displacement_of_tip
+from biogrip.response.linear import LEFT, RIGHT, rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 
 
@@ -30,3 +31,16 @@ def simulated_rotation(
     if nonlinear:
         return nonlinear_rotation(gripper, network, torque, time_s)
     return rotation(step_response(gripper, network, symmetric=torque.symmetric), torque, time_s)
+
+
+def simulated_shortening(
+    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
+) -> Array:
+    """Shortening of the sample in m, shape (n, n_times); arguments as of `simulated_rotation`."""
+    if nonlinear:
+        turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
+        left, right = (displacement_of_tip(gripper, turn) for turn in turns)
+        return left + right
+    response = step_response(gripper, network, symmetric=torque.symmetric, both_arms=True)
+    both = rotation(response, torque, time_s, LEFT) + rotation(response, torque, time_s, RIGHT)
+    return gripper.lever_m * both

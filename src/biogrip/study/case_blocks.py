@@ -312,6 +312,16 @@ class CaseBlock(Shared):
         Mapping[str, Annotated[float, Key(low=0, high=_LARGEST_PARAMETER)]] | None,
         Key("Parameters that are known and not identified, by name, with their values."),
     ] = None
+    contact: Annotated[
+        str | None,
+        Key(
+            "`bilateral`: the jaws hold the sample even where they have to pull it (it sticks), as "
+            "the paper's equations have it; `unilateral`: where the force reaches zero they leave "
+            "it, it recovers by itself and may be met again. Of the target alone, whose model is "
+            "linear; identification always takes contact for bilateral. By default bilateral.",
+            choices=("bilateral", "unilateral"),
+        ),
+    ] = None
     assumed_gripper: Annotated[
         Mapping[str, Any] | str | None,
         Key(
@@ -349,6 +359,7 @@ class CaseBlock(Shared):
             for path, text in self.sample.missing():
                 yield ("sample", *path), text
         yield from self._fixed_problems()
+        yield from self._contact_problems()
         yield from self.of_methods.problems_of(self._genes)
         if not self.recorded:
             yield from self._sampling_problems()
@@ -366,6 +377,14 @@ class CaseBlock(Shared):
                 self.gripper.contact(comb, self.sample.size_m)
             except BiogripError as error:
                 yield ("sample", "size_m"), str(error)
+
+    def _contact_problems(self) -> Iterator[Problem]:
+        if self.contact is not None and self.recorded:
+            text = "is only for a simulated case; of a recorded trace leave out what follows."
+            yield ("contact",), text
+        elif self.contact == "unilateral" and self.models.target != "linear":
+            text = "found unilateral and a nonlinear target, allowed is models.target: linear"
+            yield ("contact",), f"{text} with it."
 
     def _fixed_problems(self) -> Iterator[Problem]:
         model = self.sample.sample.model

@@ -134,6 +134,11 @@ class Case:
         return self.block.models.target == "nonlinear"
 
     @property
+    def unilateral(self) -> bool:
+        """Whether the jaws of its target press only, and let go where they would have to pull."""
+        return self.block.contact == "unilateral"
+
+    @property
     def file(self) -> str:
         """The recorded trace."""
         assert self.block.measurement.file is not None

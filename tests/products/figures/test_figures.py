@@ -28,7 +28,12 @@ def test_torque_shows_the_protocol_and_its_voltages() -> None:
     left, right = drawn(torque).axes
     assert (left.get_ylabel(), right.get_ylabel()) == ("torque (nN m)", "voltage (V)")
     assert [text.get_text() for text in left.texts] == ["1.6 nN m", "0.32 nN m"]
-    assert [text.get_text() for text in right.texts] == ["16.3 V", "7.28 V"]
+    # 27 to 55 V to touch a sample, whose squares add up with those of the grip.
+    volts = [text.get_text() for text in right.texts]
+    assert volts == ["57.4 V", "55.6 V", "31.9 V", "28.4 V", "16.3 V", "7.28 V"]
+    legend = right.get_legend()
+    assert legend
+    assert [t.get_text() for t in legend.get_texts()] == ["30 µm", "120 µm", "from contact"]
 
 
 def test_linkage_is_to_scale() -> None:
@@ -36,6 +41,12 @@ def test_linkage_is_to_scale() -> None:
     arm = whole.lines[0].get_xydata()
     assert np.hypot(*np.diff(np.asarray(arm), axis=0)[0]) == pytest.approx(1.5)
     assert whole.get_aspect() == 1.0
+
+
+def test_linkage_names_what_changes() -> None:
+    names = drawn(linkage).axes[2]
+    texts = {text.get_text() for text in names.texts}
+    assert {"$x$", "$u_B$", "$u_C$", r"$\hat\theta_2$", r"$\tilde\theta_4$", r"$\phi_2$"} <= texts
 
 
 def test_comb_has_every_finger_where_it_is() -> None:

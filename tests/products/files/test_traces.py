@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.products.files.traces import read_target, write_target
+from biogrip.products.files.traces import read_jaw_force, read_target, write_target
 
 TIMES = np.arange(5.0)
+# Rounding is all that is in the second.
+FORCE = np.array([0.0, -3.1e-23, 1e-6 / 3, -7e-7 / 3, 1e-12 / 7])
 
 
 def written(tmp_path: Path) -> Path:
-    write_target(tmp_path / "t.csv", TIMES, 1e-9 * np.ones(5), 1e-5 * TIMES / 3)
+    write_target(tmp_path / "t.csv", TIMES, 1e-9 * np.ones(5), 1e-5 * TIMES / 3, FORCE)
     return tmp_path / "t.csv"
 
 
@@ -19,14 +21,23 @@ def test_a_target_is_read_back_to_nine_digits(tmp_path: Path) -> None:
     np.testing.assert_array_equal(time_s, TIMES)
     np.testing.assert_array_equal(torque, 1e-9)
     np.testing.assert_allclose(rotation, 1e-5 * TIMES / 3, rtol=5e-9)
+    force = read_jaw_force(written(tmp_path))[2]
+    np.testing.assert_allclose(force, FORCE, rtol=0, atol=5e-16)
+    assert force[1] == 0
+    assert ",-0" not in written(tmp_path).read_text()
+
+
+def test_no_force_at_all_is_written_as_none(tmp_path: Path) -> None:
+    write_target(tmp_path / "t.csv", TIMES, TIMES, TIMES, np.zeros(5))
+    assert np.all(read_jaw_force(tmp_path / "t.csv")[2] == 0)
 
 
 @pytest.mark.parametrize(
     ("line", "text", "message"),
     [
-        (3, "2,1e-9,nan", "line 4, rotation_rad: found nan, allowed is a finite number"),
-        (2, "1,inf,1e-6", "line 3, torque_Nm: found inf, allowed is a finite number"),
-        (1, "0,1e-9,abc", "cannot be read as a target: could not convert string"),
+        (3, "2,1e-9,nan,0", "line 4, rotation_rad: found nan, allowed is a finite number"),
+        (2, "1,inf,1e-6,0", "line 3, torque_Nm: found inf, allowed is a finite number"),
+        (1, "0,1e-9,abc,0", "cannot be read as a target: could not convert string"),
         (0, "t,tau,phi", "line 1: found the columns t, tau, phi"),
     ],
 )

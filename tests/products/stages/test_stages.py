@@ -5,21 +5,24 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import held
+from biogrip.experiment.protocol import Phase, held
 from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
+from biogrip.products.files.traces import read_jaw_force, read_target
 from biogrip.products.stages import joined, target
 from tests.products.default import STUDY
 
 
-def settings(torque_Nm: float) -> target.Settings:
+def settings(torque_Nm: float, *more: Phase, unilateral: bool = False) -> target.Settings:
     return target.Settings(
+        "Drop",
         STUDY.gripper,
-        (held(100.0, torque_Nm),),
+        (held(100.0, torque_Nm), *more),
         Sampling(rate_Hz=1.0),
         Sample("maxwell"),
         {"k": 1.0, "c": 1.0},
         nonlinear=False,
+        unilateral=unilateral,
         stroke_rad=0.0785,
     )
 
@@ -32,6 +35,34 @@ def test_arms_cannot_turn_further_than_their_combs(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
     target.simulate(settings(3e-8), tmp_path / "t.csv")
     assert len((tmp_path / "t.csv").read_text().splitlines()) == 102
+
+
+def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "t.csv"
+    target.simulate(settings(1e-9), file)
+    assert capsys.readouterr().out == ""
+    target.simulate(settings(1e-9, held(100.0, 1e-10)), file)
+    said = capsys.readouterr()
+    assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
+    assert "from 100 s on" in said.err
+    time_s, _, force = read_jaw_force(file)
+    assert np.all(force[time_s < 100] >= 0)
+    assert force[time_s > 100].max() < 0
+    bilateral = read_target(file)[2]
+    target.simulate(settings(1e-9, held(100.0, 1e-10), unilateral=True), file)
+    assert "they leave it there" in capsys.readouterr().out
+    time_s, _, force = read_jaw_force(file)
+    assert np.all(force[time_s > 100] == 0)
+    rotation = read_target(file)[2]
+    # Left to their hinges, the arms open at once.
+    np.testing.assert_allclose(rotation[time_s > 100], 1e-10 / 4.4e-7, rtol=1e-8)
+    # Below 100 s only inertia differs, by less than 4e-6 of the peak.
+    until = (time_s > 0) & (time_s < 100)
+    np.testing.assert_allclose(
+        rotation[until], bilateral[until], rtol=0, atol=1e-5 * rotation.max()
+    )
 
 
 def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:

@@ -9,22 +9,26 @@ from matplotlib.patches import Arc, Circle
 
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
+from biogrip.products.figures.elements import damper, spring
+from biogrip.products.figures.nomenclature import nomenclature
+from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
 
 # Section 2: the largest sample the gripper is made for; the model itself needs no size.
 _SAMPLE_M = 120e-6
 
 
 def draw(gripper: Gripper) -> Figure:
-    """Draw linkage, tips and networks."""
-    drawn = figure(PAGE_IN, 2.6)
-    whole, tips, networks = drawn.subplots(1, 3, width_ratios=[1, 1, 1.3])
+    """Draw linkage, tips, names and networks."""
+    drawn = figure(PAGE_IN, 4.8)
+    (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
     _linkage(whole, gripper)
     panel(whole, "a", "linkage A-B-C-D, to scale")
     _tips(tips, gripper)
     panel(tips, "b", "tips B and C, to scale")
+    nomenclature(names)
+    panel(names, "c", "angles and displacements, not to scale", most_letters=40)
     _networks(networks)
-    panel(networks, "c", "the sample BC")
+    panel(networks, "d", "the sample BC")
     return drawn
 
 
@@ -136,45 +140,26 @@ def _networks(axes: Axes) -> None:
             axes.annotate(name, (x + offset, mid), ha="center", va="center")
         for y, row in zip(heights, rows, strict=True):
             if row == "kc":
-                _spring(axes, 0.2, 2.5, y, "$k$")
-                _damper(axes, 2.5, 4.8, y, "$c$")
+                spring(axes, 0.2, 2.5, y, "$k$")
+                damper(axes, 2.5, 4.8, y, "$c$")
             elif row == "k_p":
-                _spring(axes, 0.2, 4.8, y, "$k_p$")
+                spring(axes, 0.2, 4.8, y, "$k_p$")
             else:
-                _damper(axes, 0.2, 4.8, y, "$c_p$")
+                damper(axes, 0.2, 4.8, y, "$c_p$")
     axes.set_xlim(-0.2, 5.2)
     axes.set_ylim(-0.5, 5.2)
     axes.set_axis_off()
-
-
-def _spring(axes: Axes, x0: float, x1: float, y: float, label: str) -> None:
-    middle = 0.5 * (x0 + x1)
-    x = np.linspace(middle - 0.5, middle + 0.5, 9)
-    zigzag = y + 0.14 * np.array([0, 1, -1, 1, -1, 1, -1, 1, 0])
-    axes.plot([x0, *x, x1], [y, *zigzag, y], color=BLUE, linewidth=1)
-    axes.annotate(label, (middle, y + 0.18), ha="center", va="bottom", fontsize=7)
-
-
-def _damper(axes: Axes, x0: float, x1: float, y: float, label: str) -> None:
-    middle, half, height = 0.5 * (x0 + x1), 0.3, 0.15
-    axes.plot([x0, middle], [y, y], color=SKY, linewidth=1)
-    axes.plot([middle, middle], [y - 0.1, y + 0.1], color=SKY, linewidth=1.5)
-    axes.plot(
-        [middle - half, middle + half, middle + half, middle - half],
-        [y + height, y + height, y - height, y - height],
-        color=SKY,
-        linewidth=1,
-    )
-    axes.plot([middle + half, x1], [y, y], color=SKY, linewidth=1)
-    axes.annotate(label, (middle, y + 0.18), ha="center", va="bottom", fontsize=7)
 
 
 LINKAGE = drawing(
     draw,
     name="linkage",
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
-    "of 120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) the "
-    "constitutive models. Arm length and angle are those of the config; in the default study they "
+    "of 120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) "
+    "what the angles and displacements are called: reference (hat, soft lines), deformed (tilde, "
+    "hard lines), increments theta = tilde - hat and the closing rotations phi, displacements u of "
+    "the tips and x of the node between spring and damper, all to the right; (d) the constitutive "
+    "models. Arm length and angle are those of the config; in the default study they "
     "are reconstructed.",
     settings=lambda study: study.gripper,
     sheet="study_figures",

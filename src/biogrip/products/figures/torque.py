@@ -1,67 +1,64 @@
 """Figure 3: the torque that the comb drives exert, and the voltage it takes."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, torque_at, torque_history
 from biogrip.instrument import actuator
 from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, figure
+from biogrip.products.figures.style import BLUE, COLUMN_IN, GREEN, ORANGE, PURPLE, figure
 from biogrip.study.study import Study
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The protocol, and the comb drives."""
+    """The protocol, the comb drives, and the gripper in its neutral configuration."""
 
     phases: tuple[Phase, ...]
     actuator: CombDrive
+    gripper: Gripper
+    jaw_gap_m: float
 
 
 def settings(study: Study) -> Settings:
-    """Choose protocol and comb drives."""
-    return Settings(study.phases, study.actuator)
+    """Choose protocol, comb drives and gripper."""
+    return Settings(study.phases, study.actuator, study.gripper, study.jaw_gap_m)
 
 
 def draw(settings: Settings) -> Figure:
-    """Draw torque and voltage of the left arm against time."""
+    """Draw torque and voltage of both arms against time."""
     comb = settings.actuator
     history = torque_history(settings.phases)
     # Both sides of every jump, and enough points for ramps and sinusoids.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
-    torque = torque_at(history, time_s)
-    right = torque_at(history, time_s, "right")
-    volts = actuator.voltage(comb, np.maximum(torque, 0))
-    drawn = figure(COLUMN_IN, 2.2)
-    upper, lower = drawn.subplots(2, 1, sharex=True)
+    arms = [np.maximum(torque_at(history, time_s, arm), 0) for arm in ("left", "right")]
     ends = np.append(history.time_s, history.end_s)
-    for axes, values, unit, colour in (
-        (upper, 1e9 * torque, "nN m", BLUE),
-        (lower, volts, "V", ORANGE),
-    ):
-        axes.plot(time_s, values, color=colour, linewidth=1.4)
-        axes.set_ylim(0, 1.35 * values.max())
-        for start, end in pairwise(ends):
-            here = values[(time_s >= start) & (time_s < end)]
-            if np.ptp(here) < 1e-9 * values.max():
-                axes.annotate(
-                    f"{here[0]:.3g} {unit}",
-                    (0.5 * (start + end), here[0]),
-                    xytext=(0, 3),
-                    textcoords="offset points",
-                    ha="center",
-                    fontsize=7,
-                )
+    drawn = figure(COLUMN_IN, 3.0)
+    upper, lower = drawn.subplots(2, 1, sharex=True, height_ratios=[1, 1.6])
+    _line(upper, time_s, ends, [1e9 * torque for torque in arms], "nN m", BLUE, "")
+    most = 1e9 * max(float(torque.max()) for torque in arms)
+    upper.set_ylim(0, 1.4 * most)
+
+    highest = 0.0
+    for touching_Nm, colour, label in _touching(settings):
+        volts = [actuator.voltage(comb, touching_Nm + torque) for torque in arms]
+        _line(lower, time_s, ends, volts, "V", colour, label)
+        highest = max(highest, *(float(v.max()) for v in volts))
+    lower.set_ylim(0, 1.5 * highest)
+    lower.legend(loc="upper center", ncols=3, columnspacing=1.0)
     if not history.symmetric:
-        upper.plot(time_s, 1e9 * right, "--", color=BLUE, linewidth=1, label="right arm")
-        lower.plot(time_s, actuator.voltage(comb, np.maximum(right, 0)), "--", color=ORANGE)
-        upper.set_ylim(0, 1.35e9 * max(torque.max(), right.max()))
-        lower.set_ylim(0, 1.35 * float(actuator.voltage(comb, max(torque.max(), right.max()))))
+        upper.plot([], [], "--", color=BLUE, linewidth=1, label="right arm")
         upper.legend()
     upper.set_ylabel("torque (nN m)")
     lower.set_ylabel("voltage (V)")
@@ -70,11 +67,51 @@ def draw(settings: Settings) -> Figure:
     return drawn
 
 
+def _touching(settings: Settings) -> Iterator[tuple[float, str, str]]:
+    """Torques that hold the jaws at a sample: none as the paper counts, and of the extremes."""
+    for size_m, colour in ((SMALLEST_M, PURPLE), (LARGEST_M, GREEN)):
+        try:
+            found = contact(settings.gripper, settings.jaw_gap_m, settings.actuator, size_m)
+        except BiogripError:
+            # This gripper does not reach such a sample.
+            continue
+        yield found.torque_Nm, colour, f"{1e6 * size_m:g} µm"
+    yield 0.0, ORANGE, "from contact"
+
+
+def _line(
+    axes: Axes,
+    time_s: Array,
+    ends: Array,
+    arms: list[Array],
+    unit: str,
+    colour: str,
+    label: str,
+) -> None:
+    """Draw what both arms have, and write down what is held."""
+    left, right = arms
+    axes.plot(time_s, left, color=colour, linewidth=1.4, label=label)
+    if not np.array_equal(left, right):
+        axes.plot(time_s, right, "--", color=colour, linewidth=1)
+    for start, end in pairwise(ends):
+        here = left[(time_s >= start) & (time_s < end)]
+        if np.ptp(here) < 1e-9 * left.max():
+            axes.annotate(
+                f"{here[0]:.3g} {unit}",
+                (0.5 * (start + end), here[0]),
+                xytext=(0, 2),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7,
+            )
+
+
 TORQUE = drawing(
     draw,
     name="torque",
     caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
-    "takes by eq. (9).",
+    "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
+    "the smallest and at the largest sample that the gripper takes.",
     settings=settings,
     sheet="study_figures",
 )

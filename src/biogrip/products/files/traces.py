@@ -1,5 +1,6 @@
 """Targets and measurements as files."""
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,9 @@ TARGETS = "results/targets/{case}.csv"
 MEASUREMENTS = "results/measurements/{case}/{batch}.parquet"
 SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 
-TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad")
+TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
+
+_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -36,14 +39,22 @@ class Measurements:
     rotation_rad: dict[int, Array]
 
 
-def write_target(path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array) -> None:
+def write_target(
+    path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array, jaw_force_N: Array
+) -> None:
     """Write a noise-free trace as CSV.
 
     The rotation is written to nine significant digits: fewer than those in which
-    two processors differ, more than any instrument gives.
+    two processors differ, more than any instrument gives. So is the force, of its
+    largest value: where it passes zero, what is left is rounding.
     """
-    samples = zip(time_s, torque_Nm, rotation_rad, strict=True)
-    rows = ((f"{t:.10g}", f"{torque:.10g}", f"{phi:.8e}") for t, torque, phi in samples)
+    largest = float(np.max(np.abs(jaw_force_N)))
+    digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
+    force = np.round(jaw_force_N / digit) + 0.0
+    samples = zip(time_s, torque_Nm, rotation_rad, force * digit, strict=True)
+    rows = (
+        (f"{t:.10g}", f"{torque:.10g}", f"{phi:.8e}", f"{f:.8e}") for t, torque, phi, f in samples
+    )
     write_rows(path, TARGET_COLUMNS, rows)
 
 
@@ -55,6 +66,23 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
     BiogripError
         If the file is missing, is no target, or holds what is no finite number.
     """
+    time_s, torque, rotation, _ = _target_columns(path)
+    return time_s, torque, rotation
+
+
+def read_jaw_force(path: Path) -> tuple[Array, Array, Array]:
+    """Read time, torque and jaw force of a target.
+
+    Raises
+    ------
+    BiogripError
+        As of `read_target`.
+    """
+    time_s, torque, _, force = _target_columns(path)
+    return time_s, torque, force
+
+
+def _target_columns(path: Path) -> Array:
     try:
         with path.open() as stream:
             header = tuple(stream.readline().strip().split(","))
@@ -67,14 +95,15 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
     if values.shape[1] != len(TARGET_COLUMNS):
-        raise BiogripError(f"{path}: found {values.shape[1]} columns in the rows, allowed are 3.")
+        allowed = f"allowed are {len(TARGET_COLUMNS)}"
+        raise BiogripError(f"{path}: found {values.shape[1]} columns in the rows, {allowed}.")
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
         raise BiogripError(
             f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "
             "allowed is a finite number."
         )
-    time_s, torque, rotation = values.T
-    return time_s, torque, rotation
+    columns: Array = values.T
+    return columns
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:

@@ -34,8 +34,13 @@ def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
             }
             for trade in diagnosis.trades
         ],
+        "jaw_force": {key: _known(value) for key, value in vars(diagnosis.grip).items()},
         "notes": diagnosis.notes,
     }
+
+
+def _known(value: float | None) -> float | None:
+    return None if value is None else rounded(value)
 
 
 def read_verdicts(path: Path) -> dict[str, Any]:

@@ -144,7 +144,7 @@ def _succeeded(
     Where there is no noise, the floor is what the genome can do: the misfit of the
     truth when it is rounded to two digits.
     """
-    if point.noise.level == 0:
+    if point.noise.absent:
         floor = _resolution_rad(point.problem, settings.parameters, time_s)
         found = found.assign(noise_rms_rad=floor)
     return at_noise_floor(found, settings.noise_floor_tolerance)

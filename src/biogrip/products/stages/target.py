@@ -1,4 +1,4 @@
-"""Stage 1: the noise-free response of a case."""
+"""Stage 1: the noise-free response of a case, and the force of the jaws on its sample."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,14 +8,18 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, torque_at, torque_history
-from biogrip.experiment.sample import Sample
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_at, torque_history
+from biogrip.experiment.sample import Network, Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import TARGETS, write_target
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, wildcards_of
+from biogrip.progress import warn
+from biogrip.response.grip import grip_of
+from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_rotation
+from biogrip.response.unilateral import unilateral_response
 from biogrip.study.study import Study
 
 
@@ -25,22 +29,26 @@ class Settings:
 
     Parameters
     ----------
+    title
+        Name of the case in print.
     gripper, phases, sampling
         With what, under what, and when.
     sample, parameters
         Of what: the model, and true values in SI units by name.
-    nonlinear
-        Whether the nonlinear model is solved.
+    nonlinear, unilateral
+        Whether the nonlinear model is solved; whether the jaws can only press.
     stroke_rad
         How far the comb drives can turn the arms.
     """
 
+    title: str
     gripper: Gripper
     phases: tuple[Phase, ...]
     sampling: Sampling
     sample: Sample
     parameters: Mapping[str, float]
     nonlinear: bool
+    unilateral: bool
     stroke_rad: float
 
 
@@ -48,12 +56,14 @@ def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what a case's target depends on."""
     case = study.case(job["case"])
     return Settings(
+        case.title,
         case.gripper,
         case.phases,
         case.sampling,
         case.sample,
         case.parameters,
         case.nonlinear_target,
+        case.unilateral,
         case.stroke_rad,
     )
 
@@ -67,17 +77,37 @@ def simulate(settings: Settings, target: Path) -> None:
         If the rotation is not finite, or the arms turn further than the comb drives can.
     """
     torque, model = torque_history(settings.phases), settings.sample.model
-    parameters = [settings.parameters[name] for name in model.names]
+    network = model.network(np.array([[settings.parameters[name] for name in model.names]]))
     time_s = settings.sampling.over(torque.end_s)
-    simulated = simulated_rotation(
-        settings.gripper,
-        model.network(np.array([parameters])),
-        torque,
-        time_s,
-        nonlinear=settings.nonlinear,
-    )[0]
-    _check(settings, time_s, simulated)
-    write_target(target, time_s, torque_at(torque, time_s), simulated)
+    rotation, force = _response(settings, network, torque, time_s)
+    _check(settings, time_s, rotation)
+    _say_if_contact_is_lost(settings, network, torque)
+    write_target(target, time_s, torque_at(torque, time_s), rotation, force)
+
+
+def _response(
+    settings: Settings, network: Network, torque: TorqueHistory, time_s: Array
+) -> tuple[Array, Array]:
+    """Rotation of the left arm and jaw force."""
+    gripper, nonlinear = settings.gripper, settings.nonlinear
+    if settings.unilateral:
+        found = unilateral_response(gripper, network, torque, time_s)
+        return found.rotation_rad[0], found.jaw_force_N
+    rotation = simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)
+    return rotation[0], jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
+
+
+def _say_if_contact_is_lost(settings: Settings, network: Network, torque: TorqueHistory) -> None:
+    grip = grip_of(settings.gripper, network, torque, nonlinear=settings.nonlinear)
+    words = grip.words()
+    if words is None:
+        return
+    then = (
+        "they leave it there, which its identification does not know"
+        if settings.unilateral
+        else "unless it sticks to them, contact is lost there (contact: unilateral simulates that)"
+    )
+    warn(f"{settings.title}: under this protocol {words}; {then}.")
 
 
 def _check(settings: Settings, time_s: Array, simulated: Array) -> None:

@@ -14,7 +14,12 @@ from biogrip.instrument import actuator
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.identifications import PATH, read_identifications
-from biogrip.products.files.traces import MEASUREMENTS, read_measurements
+from biogrip.products.files.traces import (
+    MEASUREMENTS,
+    TARGETS,
+    read_jaw_force,
+    read_measurements,
+)
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
@@ -60,18 +65,24 @@ def settings(study: Study) -> Settings:
     return Settings(cases, study.shown, study.gripper, study.actuator, study.ranges)
 
 
-def evidence(settings: Settings, identifications: list[Path], measurements: list[Path]) -> Table:
+def evidence(
+    settings: Settings,
+    identifications: list[Path],
+    measurements: list[Path],
+    targets: list[Path],
+) -> Table:
     """Hold statements of the paper against what the study computes.
 
     Parameters
     ----------
     settings
         What they are held against.
-    identifications, measurements
-        Of the cases, CSV and Parquet.
+    identifications, measurements, targets
+        Of the cases, CSV, Parquet and CSV.
     """
     rows = [*_actuator_rows(settings), *_gripper_rows(settings), *_gene_rows(settings)]
     for name, case in settings.cases.items():
+        rows += [row for path in targets if path.stem == name for row in _grip_rows(case, path)]
         traces = [path for path in measurements if path.parent.name == name]
         identified = [path for path in identifications if path.stem == name]
         rows += _axis_rows(case, traces)
@@ -136,6 +147,19 @@ def _gene_rows(settings: Settings) -> list[tuple[Cell, ...]]:
     return rows
 
 
+def _grip_rows(case: Truth, target: Path) -> list[tuple[Cell, ...]]:
+    """Section 2 reduces the torque "in order to maintain the grip with the sample"."""
+    time_s, torque, force = read_jaw_force(target)
+    # The first sample at the lower torque may be the instant of the step itself.
+    reduced = np.flatnonzero(torque < torque.max())[1:]
+    if not len(reduced):
+        return []
+    lowest = reduced[np.argmin(force[reduced])]
+    remark = f"the lowest, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
+    quantity = f"{case.title}: jaw force at the lower torque"
+    return [(quantity, "uN", "maintains the grip", 1e6 * float(force[lowest]), remark)]
+
+
 def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
     axis = case.published.axis_rad
     if not axis or not traces:
@@ -190,6 +214,9 @@ EVIDENCE = table(
     settings=settings,
     reads={
         "identifications": of_cases(PATH, lambda study: study.published),
+        "targets": of_cases(
+            TARGETS, lambda study: [name for name in study.published if name in study.simulated]
+        ),
         "measurements": Reads(
             lambda plan, _: [
                 file

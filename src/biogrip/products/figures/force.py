@@ -1,0 +1,131 @@
+"""The force of the jaws on the sample, and what becomes of the trace if they cannot pull."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.sample import Sample
+from biogrip.instrument.gripper import Gripper
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.results import scale_of
+from biogrip.products.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, figure
+from biogrip.products.files.traces import TARGETS, read_target
+from biogrip.products.product import the
+from biogrip.response.jaw_force import jaw_force
+from biogrip.response.unilateral import UnilateralResponse, unilateral_response
+from biogrip.study.study import Case, Study
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A case in print, and all that its target is made of but for the sampling.
+
+    Parameters
+    ----------
+    title
+        In print.
+    gripper, phases, sample, parameters, nonlinear, unilateral
+        As of the target.
+    """
+
+    title: str
+    gripper: Gripper
+    phases: tuple[Phase, ...]
+    sample: Sample
+    parameters: Mapping[str, float]
+    nonlinear: bool
+    unilateral: bool
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the force in a case depends on."""
+    return Settings(
+        case.title,
+        case.gripper,
+        case.phases,
+        case.sample,
+        case.parameters,
+        case.nonlinear_target,
+        case.unilateral,
+    )
+
+
+def draw(settings: Settings, target: Path) -> Figure:
+    """Draw the force of jaws that hold the sample, and the rotation with and without adhesion.
+
+    Parameters
+    ----------
+    settings
+        The case.
+    target
+        Its target, CSV.
+    """
+    time_s, _, rotation = read_target(target)
+    torque, model = torque_history(settings.phases), settings.sample.model
+    network = model.network(np.array([[settings.parameters[name] for name in model.names]]))
+    # At a step: what follows it; the jaws jump within less than the first sample.
+    held = jaw_force(
+        settings.gripper, network, torque, time_s, nonlinear=settings.nonlinear, inertia=False
+    )[0]
+    drawn = figure(COLUMN_IN, 3.2)
+    forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
+    factor, unit = scale_of(held, "N")
+    forces.axhline(0, color=BLACK, linewidth=0.6)
+    forces.plot(time_s, factor * held, color=BLUE, label="jaws that hold the sample")
+    negative = np.minimum(factor * held, 0)
+    pulling = bool(negative.min() < -1e-9 * factor * np.abs(held).max())
+    if pulling:
+        forces.fill_between(
+            time_s, negative, 0, color=ORANGE, alpha=0.35, linewidth=0, hatch="////",
+            label="the jaws would have to pull",
+        )  # fmt: skip
+    apart = None
+    if pulling and not settings.nonlinear:
+        apart = unilateral_response(settings.gripper, network, torque, time_s)
+        shown = _from_loss(apart, apart.jaw_force_N)
+        forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+    forces.set_ylabel(f"jaw force ({unit})")
+    low, high = float(negative.min()), factor * float(held.max())
+    forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
+    forces.legend(loc="upper right")
+    forces.set_title(settings.title)
+
+    factor, unit = scale_of(rotation, "rad")
+    name = "target" + (", jaws that let go" if settings.unilateral else "")
+    rotations.plot(time_s, factor * rotation, color=BLACK, label=name)
+    if apart and not settings.unilateral:
+        shown = _from_loss(apart, apart.rotation_rad[0])
+        rotations.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
+    rotations.set_ylabel(f"rotation ({unit})")
+    low, high = (factor * float(end) for end in (min(rotation.min(), 0), rotation.max()))
+    rotations.set_ylim(low, high + 0.4 * (high - low))
+    rotations.set_xlabel("time (s)")
+    rotations.set_xlim(time_s[0], time_s[-1])
+    rotations.legend(loc="upper right", ncols=2)
+    drawn.align_ylabels()
+    return drawn
+
+
+def _from_loss(found: UnilateralResponse, values: Array) -> Array:
+    """Values from the last sample before contact is first lost."""
+    lost = np.flatnonzero(~found.touching)
+    start = max(lost[0] - 1, 0) if len(lost) else len(values)
+    return np.where(np.arange(len(values)) >= start, values, np.nan)
+
+
+FORCE = drawing(
+    draw,
+    name="force",
+    caption="The force of the jaws on the sample if they hold it throughout, as the model has it. "
+    "Where it is negative the sample would have to stick to jaws that pull it; below, the target "
+    "and, where a linear model allows, the rotation of jaws that let go there.",
+    settings=settings,
+    reads={"target": the(TARGETS)},
+    cases=lambda study: study.simulated,
+    sheet="case_figures",
+)

@@ -1,0 +1,192 @@
+"""What is identified if the jaws let go of the sample and nobody notices."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sampling import Sampling
+from biogrip.experiment.truth import Truth
+from biogrip.identify.answer import Identification
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
+from biogrip.instrument.gripper import Gripper
+from biogrip.products.product import Weight
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.response.grip import grip_of
+from biogrip.response.simulation import simulated_rotation
+from biogrip.response.unilateral import unilateral_response
+from biogrip.study.study import Study
+
+_MOST_SEEDS = 20
+_MEANS_LITTLE = 1000.0
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("lost_at_s", "Contact lost at (s)"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target"),
+    Column("held", "Held throughout"),
+    Column("let_go", "Let go"),
+    Column("error_percent", "Error (%)"),
+    Column("until_lost", "Let go, until then"),
+    Column("until_lost_error_percent", "Error (%)"),
+)
+
+
+@dataclass(frozen=True)
+class CaseSettings:
+    """A simulated case of the linear model.
+
+    Parameters
+    ----------
+    truth, gripper, phases, sampling, noise
+        What makes its traces.
+    problem, least_squares
+        How they are identified.
+    seeds
+        How many are.
+    """
+
+    truth: Truth
+    gripper: Gripper
+    phases: tuple[Phase, ...]
+    sampling: Sampling
+    noise: Noise
+    problem: CaseProblem
+    least_squares: object
+    seeds: int
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Whose random streams, and the cases by name."""
+
+    study_seed: int
+    cases: Mapping[str, CaseSettings]
+
+
+def settings(study: Study) -> Settings:
+    """Choose the simulated cases that the linear model makes and identifies."""
+    linear = [
+        (name, study.cases[name])
+        for name in study.simulated
+        if not (study.cases[name].nonlinear_target or study.cases[name].problem.nonlinear)
+    ]
+    return Settings(
+        study.study_seed,
+        {
+            name: CaseSettings(
+                case.truth,
+                case.gripper,
+                case.phases,
+                case.sampling,
+                case.noise,
+                case.problem,
+                case.method("least_squares"),
+                min(case.seeds, _MOST_SEEDS),
+            )
+            for name, case in linear
+        },
+    )
+
+
+def contact_loss(settings: Settings) -> Table:
+    """Identify traces of jaws that hold the sample, and of jaws that only press."""
+    rows = [
+        row
+        for name, case in settings.cases.items()
+        for row in _rows(settings.study_seed, name, case)
+    ]
+    caption = (
+        "Cases in which the jaws would have to pull: what least squares identifies, on the "
+        "assumption that they hold the sample, in traces in which they do, in traces in which they "
+        "let go where the force reaches zero, and in the samples of the latter up to there. "
+        f"Medians over the same noise of at most {_MOST_SEEDS} seeds; the misfit is over the RMS "
+        "of the noise. Errors are (target - identified)/target; empty if there is no meaning in "
+        f"them, beyond {_MEANS_LITTLE:g} %."
+    )
+    return Table(caption, _COLUMNS, rows)
+
+
+def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
+    torque, model = torque_history(case.phases), case.truth.model
+    network = model.network(np.array([[case.truth.parameters[p] for p in model.names]]))
+    if grip_of(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
+        return []
+    time_s = case.sampling.over(torque.end_s)
+    held = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+    free = unilateral_response(case.gripper, network, torque, time_s)
+    if not free.parted_s:
+        return []
+    noise = [
+        add_noise(held, case.noise, stream(study_seed, name, seed, "noise")) - held
+        for seed in range(case.seeds)
+    ]
+    lost = free.parted_s[0]
+    whole, until = np.ones(len(time_s), dtype=bool), time_s < lost
+    traces = ((held, whole), (free.rotation_rad[0], whole), (free.rotation_rad[0], until))
+    found = [
+        _medians(study_seed, name, case, time_s[kept], [(rotation + n)[kept] for n in noise])
+        for rotation, kept in traces
+    ]
+    rms = [float(np.sqrt(np.mean(np.square([n[kept] for n in noise])))) for _, kept in traces]
+    rows: list[tuple[Cell, ...]] = []
+    for index, quantity in enumerate(model.quantities):
+        label = " + ".join(parameter.name for parameter in quantity)
+        target = case.truth.target(quantity)
+        given, let_go, cut = (None if values is None else values[index] for values in found)
+        errors = [_error(target, value) for value in (let_go, cut)]
+        unit = quantity[0].unit
+        rows.append((name, lost, label, unit, target, given, let_go, errors[0], cut, errors[1]))
+    misfits = [
+        None if values is None or not level else values[-1] / level
+        for values, level in zip(found, rms, strict=True)
+    ]
+    rows.append((name, lost, "misfit", "noise", 1.0, *misfits[:2], None, misfits[2], None))
+    return rows
+
+
+def _medians(
+    study_seed: int, name: str, case: CaseSettings, time_s: Array, traces: Sequence[Array]
+) -> list[float] | None:
+    """Median of every quantity, and last of the misfit in rad; None of too few samples."""
+    searched, model = case.problem.searched, case.problem.model
+    nuisance = case.problem.offset + case.problem.drift
+    if len(time_s) <= len(searched.names) + nuisance + 1:
+        return None
+    assert isinstance(case.least_squares, LeastSquaresSettings)
+    problems = [case.problem.of(time_s, trace) for trace in traces]
+    rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
+    found: list[Identification] = identify_many(problems, case.least_squares, rngs)
+    values = [
+        {**case.problem.fixed, **dict(zip(searched.names, one.parameters, strict=True))}
+        for one in found
+    ]
+    medians = [
+        float(np.median([sum(value[p.name] for p in quantity) for value in values]))
+        for quantity in model.quantities
+    ]
+    return [*medians, float(np.median([one.misfit_rad for one in found]))]
+
+
+def _error(target: float | None, value: float | None) -> float | None:
+    error = 100 * (target - value) / target if target and value is not None else None
+    return None if error is None or abs(error) > _MEANS_LITTLE else error
+
+
+CONTACT_LOSS = table(
+    contact_loss,
+    name="contact_loss",
+    item="contact loss",
+    caption="How wrong an identification is that takes the jaws to hold a sample that they have "
+    "let go of, and what the samples up to there tell.",
+    settings=settings,
+    when=lambda study: bool(settings(study).cases),
+    weight=Weight(60, 1000),
+)

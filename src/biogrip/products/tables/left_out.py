@@ -1,0 +1,116 @@
+"""What the model leaves out, with its size."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.experiment.protocol import Phase, largest_torque, torque_history
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.contact import LARGEST_M
+from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.left_out import (
+    drag_of_arm,
+    drag_of_sample,
+    fringing_of_comb,
+    mass_of_sample,
+    rolling_of_contact,
+)
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.study.study import Case, Study
+
+_COLUMNS = (
+    Column("effect", "Left out"),
+    Column("size", "Size", 2),
+    Column("unit", "Unit"),
+    Column("beside", "Beside"),
+    Column("beside_size", "which is", 2),
+    Column("share_percent", "Share (%)", 2),
+    Column("remark", "Remark"),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What estimates are made of.
+
+    Parameters
+    ----------
+    gripper, actuator, phases
+        The study's.
+    least_damping_Ns_per_m
+        All dampers of the sample that has least of them, if one has any.
+    """
+
+    gripper: Gripper
+    actuator: CombDrive
+    phases: tuple[Phase, ...]
+    least_damping_Ns_per_m: float | None
+
+
+def settings(study: Study) -> Settings:
+    """Choose what estimates are made of."""
+    dampings = [_damping(study.cases[name]) for name in study.simulated]
+    least = min((damping for damping in dampings if damping > 0), default=None)
+    return Settings(study.gripper, study.actuator, study.phases, least)
+
+
+def _damping(case: Case) -> float:
+    model = case.sample.model
+    network = model.network(np.array([[case.parameters[name] for name in model.names]]))
+    return float(network.c_p[0] + network.c[0].sum())
+
+
+def left_out(settings: Settings) -> Table:
+    """Estimate what the model leaves out, for the largest sample."""
+    gripper, comb, least = settings.gripper, settings.actuator, settings.least_damping_Ns_per_m
+    b, arm = gripper.lever_m, gripper.left
+    turn = largest_torque(torque_history(settings.phases)) / arm.stiffness_Nm_per_rad
+    rows: list[tuple[Cell, ...]] = []
+    if least is not None:
+        drag = drag_of_sample(LARGEST_M)
+        remark = "the sample in water, Stokes; of the case with the least damping"
+        rows.append(_row("drag on the sample", drag, "N s/m", "its dampers", least, remark))
+    drag = drag_of_arm(gripper, comb.thickness_m)
+    remark = "all of an arm in water; the paper keeps the device out of it"
+    beside = "the hinge's damping"
+    damping = arm.damping_Nms_per_rad
+    rows.append(_row("drag on an arm", drag, "N m s/rad", beside, damping, remark))
+    if least is not None:
+        remark = "the same, beside what a rotation trace is made of"
+        beside, share = "the sample's, 2 b^2 c", 2 * b * b * least
+        rows.append(_row("drag on an arm", drag, "N m s/rad", beside, share, remark))
+    length = 1e3 * gripper.arm_length_m
+    moved = length * rolling_of_contact(gripper, LARGEST_M, turn)
+    remark = "a sphere that rolls on the jaw, at the free arm's rotation under the largest torque"
+    rows.append(_row("contact point along the jaw", moved, "mm", "the arm length", length, remark))
+    remark = "at most: fingers shield each other; the voltage for a torque is less by half of it"
+    fringing = fringing_of_comb(comb)
+    rows.append(_row("fringing of the comb", fringing, "", "its capacitance", 1.0, remark))
+    remark = "felt for milliseconds after a step, as the arms' own"
+    beside, mass = "an arm's at the jaw, I/b^2", arm.inertia_kgm2 / b**2
+    rows.append(
+        _row("inertia of the sample", mass_of_sample(LARGEST_M), "kg", beside, mass, remark)
+    )
+    caption = (
+        f"What the model leaves out, estimated for a sample of {1e6 * LARGEST_M:g} um: its size, "
+        "and its share of what it would add to."
+    )
+    return Table(caption, _COLUMNS, rows)
+
+
+def _row(
+    effect: str, size: float, unit: str, beside: str, whole: float, remark: str
+) -> tuple[Cell, ...]:
+    return effect, size, unit, beside, whole, 100 * size / whole, remark
+
+
+LEFT_OUT = table(
+    left_out,
+    name="left_out",
+    item="left out",
+    caption="What the model leaves out, with its size: drag, rolling, fringing, the sample's "
+    "inertia.",
+    settings=settings,
+    sheet="tables",
+)

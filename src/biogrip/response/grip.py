@@ -1,0 +1,91 @@
+"""Whether the jaws press throughout a protocol, or would have to pull."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.jaw_force import jaw_force
+
+# Less than this share of the largest force is rounding, and not told.
+_NOTHING = 1e-9
+_A_PHASE, _A_PERIOD, _MOST = 200, 32, 200_000
+
+
+@dataclass(frozen=True)
+class Grip:
+    """The force of the jaws on a sample that they hold throughout a protocol.
+
+    Parameters
+    ----------
+    largest_N, largest_at_s
+        The hardest press, and when.
+    lowest_N, lowest_at_s
+        The hardest pull, negative; or the gentlest press after the hardest. And when.
+    pulls_from_s
+        Since when the jaws would have to pull; None if they press throughout.
+    """
+
+    largest_N: float
+    largest_at_s: float
+    lowest_N: float
+    lowest_at_s: float
+    pulls_from_s: float | None
+
+    def words(self) -> str | None:
+        """Say since when and how hard the jaws would have to pull, if they would."""
+        if self.pulls_from_s is None:
+            return None
+        return (
+            f"the jaws would have to pull the sample from {self.pulls_from_s:.4g} s on "
+            f"(with {-1e6 * self.lowest_N:.2g} µN at {self.lowest_at_s:.4g} s, where they press "
+            f"with {1e6 * self.largest_N:.2g} µN at most)"
+        )
+
+
+def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool) -> Grip:
+    """Compute by how much the jaws press or pull one sample, without inertia.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        What is simulated; the first sample of the network.
+    nonlinear
+        Whether to solve the nonlinear model.
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the nonlinear model describes.
+    """
+    time_s = _instants(torque)
+    force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
+    least_told = _NOTHING * float(np.abs(force).max()) or 1.0
+    told = np.round(force / least_told)
+    most, negative = int(np.argmax(told)), np.flatnonzero(told < 0)
+    first = 0 if len(negative) else most
+    least = first + int(np.argmin(told[first:]))
+    return Grip(
+        float(told[most] * least_told),
+        float(time_s[most]),
+        float(told[least] * least_told),
+        float(time_s[least]),
+        float(time_s[negative[0]]) if len(negative) else None,
+    )
+
+
+def _instants(torque: TorqueHistory) -> Array:
+    """Instants dense after everything that sets in, and within every period."""
+    starts = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s)))
+    starts = starts[starts < torque.end_s]
+    lengths = np.diff(np.append(starts, torque.end_s))
+    share = np.geomspace(1e-9, 1.0, _A_PHASE)[:-1]
+    pieces = [start + length * share for start, length in zip(starts, lengths, strict=True)]
+    if len(torque.omega_rad_per_s):
+        periods = torque.end_s * float(torque.omega_rad_per_s.max()) / (2 * np.pi)
+        count = int(min(_MOST, _A_PERIOD * np.ceil(periods)))
+        pieces.append(np.linspace(0, torque.end_s, count))
+    return np.unique(np.append(np.concatenate(pieces), torque.end_s))

@@ -1,0 +1,148 @@
+"""The force that the jaws exert on the sample, F = G delta, positive while they press.
+
+In the linear model it is a rational function of the torques like the rotations,
+
+    F = [b P (Z_2 + Z_4) tau_2 - b P Z_2 (tau_2 - tau_4)] / D
+
+(with equal arms and torques 2 b P tau / (Z Q + 2 b^2 P)), so its modes have the
+rates of the rotations and weights of their own. The arm's equation gives it too,
+b F = tau - Z phi, but where a liquid has given way that is a difference of nearly
+equal torques; here the constant and every mode are products of what is positive,
+and late in a phase only what is left of the slow modes is summed.
+
+What the nonlinear model adds follows from its correction, divided by the lever:
+F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction, all of
+them of second order, so that again no large terms cancel.
+"""
+
+from math import factorial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.linear import (
+    StepResponse,
+    TransferFunctions,
+    add,
+    arm_polynomial,
+    multiply,
+    partial_fractions,
+    phi_function,
+    poles,
+    sample_polynomials,
+    transfer_functions,
+)
+from biogrip.response.nonlinear import FINE, computed_correction
+
+
+def jaw_force_response(
+    gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
+) -> StepResponse:
+    """Jaw force of n samples after unit torque steps, in N per N m.
+
+    Parameters
+    ----------
+    gripper, network, symmetric, inertia
+        As of `step_response`. Without inertia a parallel damper makes the force jump
+        with the torque.
+
+    Returns
+    -------
+    StepResponse
+        The force takes the place of an arm.
+    """
+    denominator = transfer_functions(
+        gripper, network, symmetric=symmetric, inertia=inertia
+    ).denominator
+    p = gripper.lever_m * sample_polynomials(network)[0]
+    z_2 = arm_polynomial(gripper.left, inertia)
+    if symmetric and gripper.left == gripper.right:
+        numerators = [2 * p.T]
+    else:
+        both = add(z_2, arm_polynomial(gripper.right, inertia))
+        numerators = [multiply(p, both).T, -multiply(p, z_2).T][: 1 if symmetric else 2]
+    transfer = TransferFunctions([numerators], denominator)
+    return partial_fractions(transfer, poles(denominator, real=not inertia))
+
+
+def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
+    """Jaw force in N, shape (n, n_times), at any times, of the linear model.
+
+    Parameters
+    ----------
+    response
+        From `jaw_force_response`.
+    torque
+        The protocol.
+    time_s : (n_times,)
+        At the instant of a step: what follows it.
+    """
+    force = np.zeros((len(response.rates), len(time_s)))
+    rates, static, weights = (
+        response.rates[:, :, None],
+        response.static[:, 0],
+        response.weights[:, 0],
+    )
+    for start, order, heights in torque.jumps:
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
+        growth = elapsed**order * _growth(order, rates * elapsed)
+        rest = constant[:, None] * elapsed**order / factorial(order)
+        force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
+    for start, omega, a in torque.swings:
+        after = time_s >= start
+        elapsed = time_s[after] - start
+        amplitude = np.einsum("ndj,d->nj", weights, a)
+        steady = static @ a + np.sum(amplitude * 1j * omega / (1j * omega - response.rates), axis=1)
+        fading = amplitude * response.rates / (response.rates - 1j * omega)
+        swing = steady[:, None] * np.exp(1j * omega * elapsed)
+        force[:, after] += (swing + np.einsum("nj,njt->nt", fading, np.exp(rates * elapsed))).real
+    return force
+
+
+def _growth(order: int, z: NDArray[Any]) -> NDArray[Any]:
+    """Response of a mode, over its weight and t^order, to t^order/order!."""
+    return np.exp(z) if order == 0 else phi_function(order, z)
+
+
+def jaw_force(
+    gripper: Gripper,
+    network: Network,
+    torque: TorqueHistory,
+    time_s: Array,
+    *,
+    nonlinear: bool,
+    inertia: bool = True,
+) -> Array:
+    """Force that the jaws exert on the sample in N, positive while they press, (n, n_times).
+
+    Parameters
+    ----------
+    gripper, network, torque
+        What is simulated.
+    time_s : (n_times,)
+        Ascending times; at the instant of a step: what follows it.
+    nonlinear
+        Whether to solve corrected eqs. (1)-(3), or the linear (4)-(6).
+    inertia
+        Whether the arms ring for milliseconds after a step; if they do not, the force may jump.
+
+    Raises
+    ------
+    BiogripError
+        If the torque closes the arms beyond what the nonlinear model describes.
+    """
+    response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
+    force = linear_jaw_force(response, torque, time_s)
+    if nonlinear:
+        # Arms with inertia have not moved yet at the instant of a step.
+        instants = np.nextafter(time_s, -np.inf) if inertia else time_s
+        more = computed_correction(gripper, network, torque, FINE).force_at(instants)
+        force += np.where(instants < 0, 0, more)
+    return force

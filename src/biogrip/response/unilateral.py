@@ -1,0 +1,293 @@
+"""The linear model of jaws that press but do not pull: they leave the sample, and meet it again.
+
+While the jaws touch, arms and sample are one system without inertia. Where the force
+between them reaches zero they part: each arm turns against its own hinge, and the
+sample recovers by itself from the state it was left in, with no force on it. Where
+the gap between them closes they touch again. Every stretch is solved exactly; only
+the instants at which one ends are sought.
+
+Parting and meeting leave every state as it is. That they do not follow at once upon
+one another is a matter of the equations: what the force would be if they touched and
+the rate at which the gap would open if they did not are proportional, with opposite
+signs. The sample may shift between the jaws freely, so that only the sum of both
+tips' displacements counts.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import TorqueHistory, torque_at
+from biogrip.experiment.sample import Network
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.free_recovery import Forcing, Modes, Motion, smooth_pieces
+
+_MOST_EVENTS = 100_000
+# Shares of the largest force and closing: less is rounding, and no contact lost or found.
+_NOTHING = 1e-11
+# The grid on which an end of a stretch is looked for: growth, points a period, points at once.
+_GROWTH, _PER_PERIOD, _AT_ONCE = 1.1, 48, 2048
+
+
+@dataclass(frozen=True)
+class UnilateralResponse:
+    """What gripper and sample do when the jaws can only press.
+
+    Parameters
+    ----------
+    rotation_rad : (2, n_times)
+        Closing rotations of the left and the right arm.
+    jaw_force_N : (n_times,)
+        Never negative.
+    touching : (n_times,)
+        Whether the jaws touch the sample.
+    shortening_m : (n_times,)
+        Of the sample.
+    dampers_m : (n_branches, n_times)
+        Shortening of the damper of each Maxwell branch.
+    parted_s, met_s
+        When contact was lost, and when it was regained.
+    """
+
+    rotation_rad: Array
+    jaw_force_N: Array
+    touching: BoolArray
+    shortening_m: Array
+    dampers_m: Array
+    parted_s: tuple[float, ...]
+    met_s: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """From an instant on, with or without contact.
+
+    Parameters
+    ----------
+    state
+        phi_2, phi_4, delta and the branches' dampers at times since then, (n, n_times).
+    margin
+        What may not become negative: the force, or the gap.
+    fastest_per_s
+        Largest rate.
+    """
+
+    state: Callable[[Array], Array]
+    margin: Callable[[Array], Array]
+    fastest_per_s: float
+
+
+class _System:
+    """Gripper and one sample, touching or apart."""
+
+    def __init__(self, gripper: Gripper, network: Network) -> None:
+        self._b = b = gripper.lever_m
+        arms = gripper.left, gripper.right
+        self._c = np.array([arm.damping_Nms_per_rad for arm in arms])
+        self._k = np.array([arm.stiffness_Nm_per_rad for arm in arms])
+        k_p, c_p, k, c = network.k_p[0], network.c_p[0], network.k[0], network.c[0]
+        n = len(k)
+        tips = np.array([b, b])
+        hinges = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
+        branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
+        side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
+        self._touching = Modes(
+            np.vstack((hinges, side, branches)), _block(_coupled(self._c, b * b * c_p), np.sqrt(c))
+        )
+        self._arms = Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
+        self._has_damper = bool(c_p > 0)
+        if self._has_damper:
+            own = np.concatenate(([np.sqrt(k_p)], np.zeros(n)))
+            rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
+            self._sample = Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
+        elif n:
+            # Without a damper of its own the sample is where its springs balance.
+            whole = k_p + k.sum()
+            self._balance = k / whole
+            apart = np.tile(self._balance, (n, 1))
+            others = k_p + np.array([np.delete(k, j).sum() for j in range(n)])
+            apart[np.diag_indices(n)] = -others / whole
+            springs = np.vstack((np.sqrt(k_p) * self._balance, np.sqrt(k)[:, None] * apart))
+            self._sample = Modes(springs, np.diag(np.sqrt(c)))
+        self._branches = n
+
+    def stretch(self, touching: bool, state: Array, torque: Forcing) -> _Stretch:
+        """Go on from a state."""
+        return self._in_contact(state, torque) if touching else self._apart(state, torque)
+
+    def _in_contact(self, state: Array, torque: Forcing) -> _Stretch:
+        motion = self._touching.follow(np.delete(state, 2), torque)
+
+        def states(elapsed_s: Array) -> Array:
+            z = motion.at(elapsed_s)
+            return np.insert(z, 2, self._b * (z[0] + z[1]), axis=0)
+
+        def force(elapsed_s: Array) -> Array:
+            phi, rate = motion.at(elapsed_s)[0], motion.rate(elapsed_s)[0]
+            return (torque.at(elapsed_s)[0] - self._k[0] * phi - self._c[0] * rate) / self._b
+
+        return _Stretch(states, force, float(self._touching.rates.max()))
+
+    def _apart(self, state: Array, torque: Forcing) -> _Stretch:
+        arms = self._arms.follow(state[:2], torque)
+        sample = self._recovery(state)
+
+        def states(elapsed_s: Array) -> Array:
+            return np.vstack((arms.at(elapsed_s), sample(elapsed_s)))
+
+        def gap(elapsed_s: Array) -> Array:
+            z = states(elapsed_s)
+            return z[2] - self._b * (z[0] + z[1])
+
+        return _Stretch(states, gap, float(self._arms.rates.max()))
+
+    def _recovery(self, state: Array) -> Callable[[Array], Array]:
+        """Shortening and dampers of the sample alone."""
+        if not self._has_damper and not self._branches:
+            return lambda elapsed_s: np.zeros((1, len(elapsed_s)))
+        nothing = Forcing(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 0), complex))
+        begin = state[2:] if self._has_damper else state[3:]
+        motion: Motion = self._sample.follow(begin, nothing)
+        if self._has_damper:
+            return motion.at
+
+        def balanced(elapsed_s: Array) -> Array:
+            dampers = motion.at(elapsed_s)
+            return np.vstack((self._balance @ dampers, dampers))
+
+        return balanced
+
+
+def unilateral_response(
+    gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
+) -> UnilateralResponse:
+    """Simulate one sample between jaws that do not pull, without inertia.
+
+    Parameters
+    ----------
+    gripper, network, torque
+        What is simulated; the first sample of the network.
+    time_s : (n_times,)
+        Ascending times; at the instant of a step: what follows it.
+
+    Raises
+    ------
+    BiogripError
+        If the jaws leave the sample too often to be followed.
+    """
+    system = _System(gripper, network)
+    pieces = smooth_pieces(torque)
+    most_torque, softest = _scales(gripper, torque, pieces)
+    least = {
+        True: _NOTHING * most_torque / gripper.lever_m,
+        False: _NOTHING * 2 * gripper.lever_m * most_torque / softest,
+    }
+    branches = network.k.shape[1]
+    states = np.zeros((3 + branches, len(time_s)))
+    force, touches = np.zeros(len(time_s)), np.zeros(len(time_s), dtype=bool)
+    touching, state = True, np.zeros(3 + branches)
+    changes: tuple[list[float], list[float]] = ([], [])
+    for start, length, loads in pieces:
+        done = 0.0
+        while True:
+            stretch = system.stretch(touching, state, loads.later(done))
+            grid = _grid(stretch.fastest_per_s, loads.omega_rad_per_s, length - done)
+            lasts = _first_below(stretch.margin, grid, least[touching])
+            begin, end = start + done, start + (length if lasts is None else done + lasts)
+            final = lasts is None and start + length >= torque.end_s
+            here = (time_s >= begin) & ((time_s <= end) if final else (time_s < end))
+            elapsed = time_s[here] - begin
+            if len(elapsed):
+                states[:, here] = stretch.state(elapsed)
+                touches[here] = touching
+                if touching:
+                    force[here] = np.maximum(stretch.margin(elapsed), 0.0)
+            over = np.array([length - done if lasts is None else lasts])
+            state = stretch.state(over)[:, 0]
+            if lasts is None:
+                break
+            done += lasts
+            changes[not touching].append(start + done)
+            touching = not touching
+            if len(changes[0]) > _MOST_EVENTS:
+                raise BiogripError(
+                    f"the jaws leave the sample more than {_MOST_EVENTS} times; allowed are "
+                    "protocols with fewer periods."
+                )
+    return UnilateralResponse(
+        states[:2], force, touches, states[2], states[3:], tuple(changes[0]), tuple(changes[1])
+    )
+
+
+def _scales(
+    gripper: Gripper, torque: TorqueHistory, pieces: list[tuple[float, float, Forcing]]
+) -> tuple[float, float]:
+    """Largest torque, and the softer arm's stiffness."""
+    instants = np.concatenate(
+        [start + length * np.linspace(0, 1, 65)[:-1] for start, length, _ in pieces]
+    )
+    most = max(float(np.max(np.abs(torque_at(torque, instants, arm)))) for arm in ("left", "right"))
+    return most, min(arm.stiffness_Nm_per_rad for arm in (gripper.left, gripper.right))
+
+
+def _coupled(arms: Array, shared: float) -> Array:
+    """Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, without a difference."""
+    c_2, c_4 = arms
+    first = np.sqrt(c_2 + shared)
+    return np.array([[first, 0], [shared / first, np.sqrt(c_4 + shared * c_2 / (c_2 + shared))]])
+
+
+def _block(corner: Array, diagonal: Array) -> Array:
+    whole = np.diag(np.concatenate(([0.0, 0.0], diagonal)))
+    whole[:2, :2] = corner
+    return whole
+
+
+def _grid(fastest_per_s: float, omega_rad_per_s: Array, length_s: float) -> Iterator[Array]:
+    """Times from 0 to the end: ever further apart, but never further than part of a period."""
+    longest = np.inf
+    if len(omega_rad_per_s):
+        longest = 2 * np.pi / float(omega_rad_per_s.max()) / _PER_PERIOD
+    first = min(1e-2 / fastest_per_s, length_s)
+    count = int(np.ceil(np.log(length_s / first) / np.log(_GROWTH))) + 1
+    here: Array = np.append(0.0, first * _GROWTH ** np.arange(count))
+    near = here[: int(np.searchsorted(np.diff(here), longest)) + 1]
+    near = near[near < length_s]
+    yield near
+    reached = float(near[-1])
+    while np.isfinite(longest) and reached + longest < length_s:
+        some = reached + longest * np.arange(1.0, _AT_ONCE + 1)
+        some = some[some < length_s]
+        yield some
+        reached = float(some[-1])
+    yield np.array([length_s])
+
+
+def _first_below(
+    margin: Callable[[Array], Array], grid: Iterator[Array], least: float
+) -> float | None:
+    """First time at which a margin falls to zero, on its way to clearly below."""
+    before, last = None, 0.0
+    for times in grid:
+        values = margin(times)
+        below = np.flatnonzero(values < -least)
+        if len(below):
+            at = int(below[0])
+            if at > 0:
+                before, last = float(times[at - 1]), float(values[at - 1])
+            if before is None or last <= 0:
+                return before or 0.0
+            return float(
+                brentq(
+                    lambda t: float(margin(np.array([t]))[0]),
+                    before,
+                    float(times[at]),
+                    xtol=1e-14 * float(times[at]),
+                )
+            )
+        before, last = float(times[-1]), float(values[-1])
+    return None

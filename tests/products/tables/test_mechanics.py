@@ -1,0 +1,57 @@
+from dataclasses import replace
+
+import pytest
+
+from biogrip.products.tables import mechanics
+from tests.products.default import STUDY, study_of
+
+
+def rows_of(study: object = STUDY) -> list[dict[str, object]]:
+    found = mechanics.mechanics(mechanics.settings(study))  # type: ignore[arg-type]
+    names = [column.name for column in found.columns]
+    return [dict(zip(names, row, strict=True)) for row in found.rows]
+
+
+def test_springs_alone_tell_what_statics_says() -> None:
+    """A spring of the gripper's own stiffness halves what rigid jaws would be pressed with."""
+    own = STUDY.gripper.jaw_stiffness_N_per_m
+    study = study_of(
+        f"""
+        cases:
+          endothelial_cell: null
+          liquid_drop_1: null
+          liquid_drop_2: null
+          spring: {{sample: {{model: kelvin_voigt, k_p: {own!r}, c_p: 0}}}}
+          sized: {{sample: {{model: kelvin_voigt, k_p: 0.05, c_p: 0, size_m: 90e-6}}}}
+        """
+    )
+    small, large, sized = rows_of(study)
+    force = 0.5 * 1.6e-9 / STUDY.gripper.lever_m
+    assert small["largest_force_uN"] == pytest.approx(1e6 * force)
+    assert small["shortening_um"] == pytest.approx(1e6 * force / own)
+    assert small["stiffness_over_gripper"] == pytest.approx(1)
+    assert (small["size_um"], large["size_um"]) == (pytest.approx(30), pytest.approx(120))
+    assert small["strain_percent"] == pytest.approx(100 * force / own / 30e-6)
+    assert sized["size_um"] == pytest.approx(90)
+    assert small["lowest_force_uN"] == pytest.approx(1e6 * force / 5)
+
+
+def test_the_papers_samples() -> None:
+    """Drops of 30 to 120 um shorten by 8 to 30 %, and the jaws would have to pull them."""
+    cell, _, drop, drop_large, *_ = rows_of()
+    assert drop["strain_percent"] == pytest.approx(30, abs=1)
+    assert drop_large["strain_percent"] == pytest.approx(8, abs=0.5)
+    assert drop["lowest_force_uN"] == pytest.approx(-0.74, abs=0.01)
+    assert cell["gripper_stiffness_N_per_m"] == pytest.approx(0.105, abs=1e-3)
+    # A thousand times what cells have, at the least.
+    assert isinstance(cell["apparent_modulus_kPa"], float)
+    assert cell["apparent_modulus_kPa"] > 1e4
+
+
+def test_the_nonlinear_model_differs_little() -> None:
+    linear = mechanics.settings(STUDY)
+    nonlinear = [replace(case, nonlinear=True) for case in linear]
+    for one, other in zip(
+        mechanics.mechanics(linear).rows, mechanics.mechanics(nonlinear).rows, strict=True
+    ):
+        assert one[2:6] == pytest.approx(other[2:6], rel=5e-3)
