@@ -83,7 +83,8 @@ def mechanics(settings: list[CaseSettings]) -> Table:
         "gripper (both hinges, at the jaws), and the first of these over the last. The modulus is "
         "that of an incompressible sphere between two flat jaws (Hertz) with force and shortening "
         "of the end of the first phase; cells have about 1 kPa, give or take a factor of 30 by the "
-        "method of measurement. A case that gives no size has a row for the smallest and the largest sample that the gripper takes."
+        "method of measurement. A case that gives no size has a row for the smallest and the "
+        "largest sample that the gripper takes."
     )
     return Table(caption, _COLUMNS, [row for case in settings for row in _rows(case)])
 
