@@ -1,61 +1,22 @@
 """All identifiers on the same problems."""
 
-import functools
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import yaml
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise, rms
-from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.noise import rms
 from biogrip.identify import many_starts, multi_start
-from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
 from biogrip.identify.methods import METHODS, identifier, method_settings
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.response.linear import rotation, step_response
 from biogrip.response.residuals import Residuals
 from biogrip.study import build
+from tests.helpers.problems import CONFIG, MODEL, SAMPLES, clean, problem, run, study_torque
 
-CONFIG: dict[str, Any] = yaml.safe_load(
-    (Path(__file__).parents[2] / "config" / "config.yaml").read_text()
-)
-MODEL = MODELS["generalized_maxwell"]
-SAMPLES = {name: case["sample"] for name, case in CONFIG["cases"].items()}
 CONTINUOUS = ("genetic_refined", "least_squares")
-
-
-def study_torque() -> TorqueHistory:
-    """The default study's protocol."""
-    return torque_history(build.phases(CONFIG["protocol"], CONFIG["actuator"]))
-
-
-@functools.cache
-def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
-    times = sample_times(400.0, rate_Hz)
-    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
-    return times, rotation(step_response(gripper, network), torque, times)[0]
-
-
-def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
-    times, response = clean(case, rate_Hz)
-    rng = np.random.default_rng([seed, 7])
-    trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
-    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
-    ranges = build.gene_ranges(CONFIG["search_range"])
-    return problem_of(gripper, MODEL, torque, times, trace, ranges)
-
-
-def run(method: str, posed: Problem, seed: int = 0) -> Identification:
-    identify = identifier(method, method_settings(method, CONFIG))
-    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
-    return answer
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -19,7 +19,7 @@ from biogrip.products.stages import sweep_points as stage
 from biogrip.products.tables.robustness import robustness
 from biogrip.response.linear import rotation, step_response
 from biogrip.study.study import Study
-from tests.products.default import study_of
+from tests.helpers.default import study_of
 
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])

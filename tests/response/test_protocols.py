@@ -17,8 +17,8 @@ from biogrip.response.misfit import misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.study import build
+from tests.helpers.responses import random_samples
 from tests.instrument.test_actuator import TABLE_2
-from tests.response.reference import random_samples
 
 ACTUATOR = {
     "thickness_m": 40e-6,

@@ -9,7 +9,7 @@ from biogrip.experiment.protocol import held
 from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.products.stages import joined, target
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
 
 
 def settings(torque_Nm: float) -> target.Settings:

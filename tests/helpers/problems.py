@@ -1,0 +1,98 @@
+"""Problems of the default study: its samples, protocol and settings, and traces to be fitted."""
+
+import functools
+from typing import Any
+
+import numpy as np
+import yaml
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.experiment.sample import MODELS, SampleModel
+from biogrip.identify import least_squares
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.methods import identifier, method_settings
+from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.response.linear import rotation, step_response
+from biogrip.study import build
+from tests.helpers.places import CONFIG as CONFIG_FILE
+
+CONFIG: dict[str, Any] = yaml.safe_load(CONFIG_FILE.read_text(encoding="utf-8"))
+MODEL = MODELS["generalized_maxwell"]
+SAMPLES = {name: case["sample"] for name, case in CONFIG["cases"].items()}
+
+
+def study_torque() -> TorqueHistory:
+    """The default study's protocol."""
+    return torque_history(build.phases(CONFIG["protocol"], CONFIG["actuator"]))
+
+
+@functools.cache
+def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
+    times = sample_times(400.0, rate_Hz)
+    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
+    return times, rotation(step_response(gripper, network), torque, times)[0]
+
+
+def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
+    times, response = clean(case, rate_Hz)
+    rng = np.random.default_rng([seed, 7])
+    trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
+    gripper, torque = build.gripper(CONFIG["gripper"]), study_torque()
+    ranges = build.gene_ranges(CONFIG["search_range"])
+    return problem_of(gripper, MODEL, torque, times, trace, ranges)
+
+
+def run(method: str, posed: Problem, seed: int = 0) -> Identification:
+    identify = identifier(method, method_settings(method, CONFIG))
+    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
+    return answer
+
+
+SETTINGS = least_squares.settings_of(CONFIG)
+GRIPPER, TORQUE = build.gripper(CONFIG["gripper"]), study_torque()
+RANGES = build.gene_ranges(CONFIG["search_range"])
+
+
+def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
+    """The default study's problem for any model and trace."""
+    return problem_of(
+        build.gripper(CONFIG["gripper"]),
+        model,
+        study_torque(),
+        times,
+        trace,
+        build.gene_ranges(CONFIG["search_range"]),
+    )
+
+
+def posed(
+    times: Array,
+    response: Array,
+    count: int,
+    model: SampleModel = MODEL,
+    level: float = 0.1,
+    *,
+    nonlinear: bool = False,
+) -> list[Problem]:
+    """Problems that share everything but the noise."""
+    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
+    noise = Noise("gaussian", level, "peak")
+    traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
+    return [
+        problem_of(
+            GRIPPER, model, TORQUE, times, trace, RANGES, condensed=condensed, nonlinear=nonlinear
+        )
+        for trace in traces
+    ]
+
+
+def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
+    return posed(*clean(case), count, level=level)
+
+
+def identified(problems: list[Problem], seeds: list[int]) -> list[Identification]:
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    return least_squares.identify_many(problems, SETTINGS, rngs)
