@@ -14,6 +14,16 @@ from biogrip.instrument.gripper import Arm, Gripper
 from tests.helpers.runs import SMALL, TINY, built_once, made_without_snakemake, snakemake
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--pin", action="store_true", help="draw the pinned pictures of figures anew")
+
+
+@pytest.fixture(scope="session")
+def pinning(request: pytest.FixtureRequest) -> bool:
+    """Whether pinned pictures are drawn anew instead of compared."""
+    return bool(request.config.getoption("--pin"))
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the test that mostly waits, for Slurm: the others run beside it."""
     items.sort(key=lambda item: item.path.name != "test_slurm.py")
