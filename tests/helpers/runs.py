@@ -68,6 +68,12 @@ class Run:
         return {rule: jobs for rule, jobs in table.items() if rule not in ("all", "total")}
 
 
+def replaced(text: str, old: str, new: str) -> str:
+    """Replace a part of a text that is there: what was renamed would change nothing otherwise."""
+    assert old in text, old
+    return text.replace(old, new)
+
+
 def snakemake(
     folder: Path,
     *arguments: str,

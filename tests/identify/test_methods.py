@@ -153,7 +153,8 @@ def test_offset_and_drift_are_fitted_along() -> None:
     posed = problem_of(gripper, MODEL, torque, times, trace, ranges, offset=True, drift=True)
     for method in METHODS:
         answer = run(method, posed)
-        assert answer.misfit_rad < 1.1 * rms(noise) or method == "genetic"
+        # The genetic algorithm has two digits a parameter, and misses the noise floor by more.
+        assert answer.misfit_rad < (2.0 if method == "genetic" else 1.1) * rms(noise)
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.15 if method == "genetic" else 0.05)
         assert c + c_p == pytest.approx(10.0, rel=0.03)

@@ -13,7 +13,7 @@ from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.places import CONFIG, EXAMPLE, ROOT
-from tests.helpers.runs import snakemake
+from tests.helpers.runs import replaced, snakemake
 
 RECORDED = f"""
 methods: [least_squares]
@@ -62,7 +62,7 @@ def test_the_example_is_what_its_truth_makes(tmp_path: Path) -> None:
 def test_a_bad_recording_stops_with_its_place(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("time_s,rotation_rad\n" + "".join(f"{t},{1e-3 * t}\n" for t in range(401)))
-    config = RECORDED.replace(str(EXAMPLE), str(bad))
+    config = replaced(RECORDED, str(EXAMPLE), str(bad))
     run = snakemake(tmp_path, "results/measurements/my_trace/seeds_0-0.parquet", config=config)
     assert run.status != 0
     assert "bad.csv, line 402, column 'rotation_rad': found" in run.output
@@ -91,7 +91,7 @@ def test_what_a_recording_cannot_be_is_named(
 ) -> None:
     assert old in RECORDED
     file = tmp_path / "overlay.yaml"
-    file.write_text(RECORDED.replace(old, new))
+    file.write_text(replaced(RECORDED, old, new))
     with pytest.raises(BiogripError) as error:
         load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
     assert [message for message in messages if message not in str(error.value)] == []

@@ -10,7 +10,7 @@ import pytest
 
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
-from tests.helpers.runs import SMALL, Tree, copied_tree, snakemake, tables
+from tests.helpers.runs import SMALL, Tree, copied_tree, replaced, snakemake, tables
 
 # Tables that put cases together and have a row, or a few, for each.
 JOINT = ("errors", "linearisation", "methods", "models", "coverage")
@@ -52,7 +52,9 @@ def test_other_numbers_of_seeds_rerun_no_finished_job_and_change_no_number(
     target = "results/identifications/liquid_drop_2.csv"
     before = (finished_copy / target).read_text().splitlines()
     for seeds, fresh in ((5, 1), (8, 2), (3, 0)):
-        run = snakemake(finished_copy, target, config=SMALL.replace("seeds: 4", f"seeds: {seeds}"))
+        run = snakemake(
+            finished_copy, target, config=replaced(SMALL, "seeds: 4", f"seeds: {seeds}")
+        )
         assert run.status == 0, run.output
         done = run.jobs("target"), run.jobs("measurement"), run.jobs("identification")
         assert done == (0, fresh, 3 * fresh)
@@ -74,7 +76,7 @@ def test_other_numbers_of_seeds_rerun_no_finished_job_and_change_no_number(
 def test_a_setting_reruns_what_depends_on_it(
     finished_copy: Path, old: str, new: str, rerun: set[str]
 ) -> None:
-    run = snakemake(finished_copy, "-n", config=SMALL.replace(old, new))
+    run = snakemake(finished_copy, "-n", config=replaced(SMALL, old, new))
     assert run.status == 0, run.output
     stages = {"target", "measurement", "identification"}
     assert {stage for stage in stages if run.jobs(stage)} == rerun
@@ -98,7 +100,7 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(finished_cop
 
 
 def test_a_setting_of_the_genetic_algorithm_leaves_other_methods_alone(finished_copy: Path) -> None:
-    run = snakemake(finished_copy, "-n", config=SMALL.replace("population: 60", "population: 62"))
+    run = snakemake(finished_copy, "-n", config=replaced(SMALL, "population: 60", "population: 62"))
     assert run.status == 0, run.output
     assert (run.jobs("identification"), run.jobs("case_tables")) == (4, 2)
     assert not {"target", "measurement", "model_fits", "intervals"} & set(run.all_jobs())

@@ -16,7 +16,7 @@ from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
-from tests.helpers.runs import SMALL, TINY, results_of, snakemake, tables
+from tests.helpers.runs import SMALL, TINY, replaced, results_of, snakemake, tables
 
 COLUMNS = (
     *("case", "method", "seed", "k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"),
@@ -107,7 +107,7 @@ def test_batches_change_no_byte(finished: Path, tmp_path: Path, batch_size: int)
     """Whatever is put together from batches, that is, not the verdicts on single traces."""
     together = ["errors", "methods"] + ["models", "coverage"] * (batch_size == 1)
     wanted = [f"results/tables/{name}.csv" for name in together]
-    config = SMALL.replace("batch_size: 2", f"batch_size: {batch_size}")
+    config = replaced(SMALL, "batch_size: 2", f"batch_size: {batch_size}")
     make_in_process(tmp_path, study_of(config), wanted)
     ours, theirs = tables(tmp_path), tables(finished)
     assert set(wanted) <= {f"results/{name}" for name in ours}

@@ -9,7 +9,7 @@ import pytest
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
-from tests.helpers.runs import snakemake, tables
+from tests.helpers.runs import replaced, snakemake, tables
 
 SWEEP = """
 seeds: 2
@@ -72,7 +72,7 @@ def test_all_asks_for_heat_maps_but_for_no_figure_of_a_point(study: Path) -> Non
 def test_a_value_more_runs_its_own_points_alone(study: Path, tmp_path: Path) -> None:
     study = shutil.copytree(study, tmp_path / "study")
     before = tables(study)
-    more = SWEEP.replace("values: [0.0, 0.1]", "values: [0.3, 0.1, 0.0]")
+    more = replaced(SWEEP, "values: [0.0, 0.1]", "values: [0.3, 0.1, 0.0]")
     run = snakemake(study, *WANTED, config=more)
     assert run.status == 0, run.output
     assert (run.jobs("target"), run.jobs("identification"), run.jobs("sweep_points")) == (2, 4, 1)
