@@ -116,7 +116,8 @@ def saved(figure: Figure, path: Path) -> Path:
 def difference(name: str, figure: Figure, folder: Path) -> str | None:
     """How a figure differs from its pinned picture; a picture of the difference is kept."""
     actual = saved(figure, folder / f"{name}.png")
-    return compare_images(str(PINNED / f"{name}.png"), str(actual), TOLERANCE)
+    found = compare_images(str(PINNED / f"{name}.png"), str(actual), TOLERANCE)
+    return None if found is None else str(found)
 
 
 @pytest.fixture
