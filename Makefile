@@ -12,10 +12,10 @@ LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --pytho
   --generate-hashes --no-header --no-annotate --quiet
 
 # What runs in minutes: all but the tests that start Snakemake again and again.
-QUICK := $(filter-out tests/workflow tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
+QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish lint format bench report docs lock clean
+.PHONY: study test test-lowest test-pythons check verify publish lint format bench report docs pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -76,6 +76,10 @@ report: $(READY)
 # Config keys described from their classes, and a JSON Schema for editors; the tests fail if this is forgotten.
 docs: $(READY)
 	$(BIN)/python -m tests.generated_docs
+
+# The pictures that figures are compared with; look at what has changed before committing them.
+pinned: $(READY)
+	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
 
 # Needs uv. The second lock holds only what running on Slurm adds to the first.
 lock:

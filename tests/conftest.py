@@ -2,11 +2,26 @@ import os
 
 # Workers share the cores; BLAS reads this once, while numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# Else every job that a test starts would compile all the source code for itself.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+from pathlib import Path
 
 import pytest
 
 from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
+from tests.helpers.runs import SMALL, TINY, built_once, made_without_snakemake, snakemake
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--pin", action="store_true", help="draw the pinned pictures of figures anew")
+
+
+@pytest.fixture(scope="session")
+def pinning(request: pytest.FixtureRequest) -> bool:
+    """Whether pinned pictures are drawn anew instead of compared."""
+    return bool(request.config.getoption("--pin"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -35,3 +50,25 @@ def phases() -> tuple[Phase, ...]:
 @pytest.fixture(scope="session")
 def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
     return torque_history(phases)
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """A finished small study, one for all workers; copy it before changing anything."""
+    return built_once(
+        "finished",
+        lambda folder: made_without_snakemake(folder, SMALL),
+        tmp_path_factory,
+        worker_id,
+    )
+
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """A study of two seeds that Snakemake has run, one for all workers; copy it likewise."""
+
+    def run(folder: Path) -> None:
+        done = snakemake(folder, config=TINY)
+        assert done.status == 0, done.output
+
+    return built_once("tiny", run, tmp_path_factory, worker_id)

@@ -145,8 +145,7 @@ class TestPeers:
         getattr(genetic_peers, name)(replace(task, misfit=counted), 1, documented=documented)
         budget = (20 if name == "by_pymoo" and documented else 40) + 8 * 20
         assert counted.evaluations <= budget
-        assert counted.evaluations == budget or name == "by_pygad"
-        assert counted.evaluations > 0.4 * budget
+        assert counted.evaluations > (0.4 * budget if name == "by_pygad" else budget - 1)
 
     @pytest.mark.parametrize("name", PEERS)
     def test_mutation_starts_when_it_should(self, task: "Task", name: str) -> None:

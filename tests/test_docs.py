@@ -17,6 +17,7 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
     "document",
     [
         "README.md",
+        "CONTRIBUTING.md",
         "config/README.md",
         *sorted(path.relative_to(ROOT) for path in (ROOT / "docs").glob("*.md")),
     ],
@@ -24,8 +25,24 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
 def test_links_lead_somewhere(document: str | Path) -> None:
     path = ROOT / document
     text = path.read_text(encoding="utf-8")
-    for link in re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text):
-        assert not link or (path.parent / link).exists(), link
+    links = re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text)
+    # What is above the first # of a link is empty where it leads to another part of the text.
+    assert [link for link in filter(None, links) if not (path.parent / link).exists()] == []
+
+
+def test_the_readme_leads_to_every_document() -> None:
+    """Directly or by another: else nobody would find it, nor the test above its links."""
+    found, left = set(), ["README.md"]
+    while left:
+        path = left.pop()
+        if path in found or not path.endswith(".md"):
+            continue
+        found.add(path)
+        for link in re.findall(r"\]\(([^)#]+)", (ROOT / path).read_text(encoding="utf-8")):
+            there = (ROOT / path).parent / link
+            if there.is_file():
+                left.append(str(there.resolve().relative_to(ROOT)))
+    assert {f"docs/{file.name}" for file in (ROOT / "docs").glob("*.md")} <= found
 
 
 def test_the_readme_shows_what_the_example_prints(

@@ -11,10 +11,9 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import main
-from tests.identify.test_methods import clean
-from tests.workflow.conftest import ROOT
+from tests.helpers.places import EXAMPLE, ROOT
+from tests.helpers.problems import clean
 
-EXAMPLE = ROOT / "data" / "example_trace.csv"
 TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
 
 

@@ -168,11 +168,7 @@ def in_words(found: dict[str, Any]) -> str:
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
     ]
-    lines += [
-        f"{' and '.join(trade['members'])} trade against each other: only {trade['quantity']} is "
-        f"{trade['in_words']}"
-        for trade in found["trades"]
-    ]
+    lines += [trade["words"] for trade in found["trades"]]
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
     if "drift_rad_per_s" in found:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.experiment.sample import MODELS, model_named
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
 from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
@@ -23,25 +23,11 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.identify.problem import Problem, problem_of
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.response.linear import rotation, step_response
-from tests.identify.test_methods import MODEL, SAMPLES, clean, problem, run, study_torque
-from tests.products.default import STUDY
+from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, posed_for, problem, run
 
 DAMPER = MODELS["damper"]
-
-
-def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
-    """The default study's problem for any model and trace."""
-    return problem_of(
-        STUDY.gripper,
-        model,
-        study_torque(),
-        times,
-        trace,
-        STUDY.ranges,
-    )
 
 
 def test_bound_is_the_inverse_information() -> None:
@@ -186,8 +172,7 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     """A stiff Maxwell liquid, seen slowly: its damper is determined, its spring bounded below."""
 
     times, _ = clean("liquid_drop_1")
-    gripper, torque = STUDY.gripper, study_torque()
-    response = rotation(step_response(gripper, DAMPER.network([[10.0]])), torque, times)[0]
+    response = rotation(step_response(GRIPPER, DAMPER.network([[10.0]])), TORQUE, times)[0]
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     maxwell = MODELS["maxwell"]
     posed = posed_for(maxwell, times, response + noise)

@@ -16,8 +16,8 @@ from biogrip.identifiability.many_limits import limits_of as limits_near
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.local_fit import FINE, Objective, local_fit, settled
-from tests.identifiability.definition import Held
-from tests.identifiability.limits_campaign import (
+from tests.helpers.definition import Held
+from tests.helpers.limits_campaign import (
     ALIKE,
     ALLOWED,
     NAMES,
@@ -27,8 +27,7 @@ from tests.identifiability.limits_campaign import (
     limits_of,
     misses,
 )
-from tests.identifiability.test_identifiability import posed_for
-from tests.identify.test_methods import MODEL, clean, problem, run
+from tests.helpers.problems import MODEL, clean, posed_for, problem, run
 
 QUICK = (6, 8)
 QUANTITIES = parameters_and_sum(MODEL)

@@ -14,9 +14,8 @@ from biogrip.identifiability.many_profiles import many_profiles
 from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identify.local_fit import FINE, local_fit
-from tests.identifiability.definition import Held
-from tests.identify.test_many_fits import identified, of_case
-from tests.identify.test_methods import MODEL
+from tests.helpers.definition import Held
+from tests.helpers.problems import MODEL, identified, of_case
 
 LOW = np.full(4, -3.0)
 HIGH = np.full(4, 4.0)

@@ -15,7 +15,7 @@ from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
-from tests.identify.plain_genetic import chromosomes_of
+from tests.helpers.plain_genetic import chromosomes_of
 
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 MODEL = MODELS["generalized_maxwell"]

@@ -9,54 +9,30 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.experiment.sample import MODELS, model_named
 from biogrip.identify import genetic_refined, least_squares
 from biogrip.identify.answer import Identification
 from biogrip.identify.levenberg_marquardt import Normal, bounded_step
 from biogrip.identify.local_fit import FINE, ROUGH, local_fit
 from biogrip.identify.many_fits import ManyFits, fit_together
 from biogrip.identify.multi_start import screened
-from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.identify.problem import Problem
 from biogrip.identify.settling import settled
 from biogrip.response.linear import rotation, step_response
-from tests.identify.test_methods import MODEL, SAMPLES, clean, study_torque
-from tests.products.default import STUDY
-from tests.response.test_sensitivity import MODEL_PARAMETERS
-
-SETTINGS: Any = STUDY.config.of_methods.of("least_squares")
-GRIPPER, TORQUE = STUDY.gripper, study_torque()
-RANGES = STUDY.ranges
-
-
-def posed(
-    times: Array,
-    response: Array,
-    count: int,
-    model: SampleModel = MODEL,
-    level: float = 0.1,
-    *,
-    nonlinear: bool = False,
-) -> list[Problem]:
-    """Problems that share everything but the noise."""
-    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
-    noise = Noise("gaussian", level, "peak")
-    traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return [
-        problem_of(
-            GRIPPER, model, TORQUE, times, trace, RANGES, condensed=condensed, nonlinear=nonlinear
-        )
-        for trace in traces
-    ]
-
-
-def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
-    return posed(*clean(case), count, level=level)
-
-
-def identified(problems: list[Problem], seeds: list[int]) -> list[Identification]:
-    rngs = [np.random.default_rng(seed) for seed in seeds]
-    return least_squares.identify_many(problems, SETTINGS, rngs)
+from tests.helpers.default import STUDY
+from tests.helpers.places import ROOT
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    SAMPLES,
+    SETTINGS,
+    TORQUE,
+    clean,
+    identified,
+    of_case,
+    posed,
+)
+from tests.helpers.responses import MODEL_PARAMETERS
 
 
 def starts_of(problem: Problem, count: int) -> Array:
@@ -234,7 +210,7 @@ def test_what_cannot_be_fitted_together_is_fitted_one_by_one() -> None:
 
 
 DIGITS = """
-from tests.identify.test_many_fits import identified, of_case
+from tests.helpers.problems import identified, of_case
 for case in ("endothelial_cell", "liquid_drop_1"):
     for answer in identified(of_case(case, 2), [0, 1]):
         print(" ".join(f"{value:.8e}" for value in (*answer.parameters, answer.misfit_rad)))
@@ -252,6 +228,7 @@ def test_digits_do_not_depend_on_the_processor() -> None:
         subprocess.run(
             [sys.executable, "-c", DIGITS],
             env={**os.environ, **other},
+            cwd=ROOT,
             capture_output=True,
             text=True,
             check=True,

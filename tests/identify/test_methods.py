@@ -1,6 +1,5 @@
 """All identifiers on the same problems."""
 
-import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -8,49 +7,16 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise, rms
-from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.noise import rms
 from biogrip.identify import many_starts, multi_start
-from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
 from biogrip.identify.methods import METHODS, identifier
 from biogrip.identify.problem import Problem, problem_of
-from biogrip.response.linear import rotation, step_response
 from biogrip.response.residuals import Residuals
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
+from tests.helpers.problems import MODEL, SAMPLES, clean, problem, run, study_torque
 
-MODEL = MODELS["generalized_maxwell"]
-SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
 CONTINUOUS = ("genetic_refined", "least_squares")
-
-
-def study_torque() -> TorqueHistory:
-    """The default study's protocol."""
-    return torque_history(STUDY.phases)
-
-
-@functools.cache
-def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
-    gripper, torque = STUDY.gripper, study_torque()
-    times = sample_times(400.0, rate_Hz)
-    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
-    return times, rotation(step_response(gripper, network), torque, times)[0]
-
-
-def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
-    times, response = clean(case, rate_Hz)
-    rng = np.random.default_rng([seed, 7])
-    trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
-    gripper, torque = STUDY.gripper, study_torque()
-    ranges = STUDY.ranges
-    return problem_of(gripper, MODEL, torque, times, trace, ranges)
-
-
-def run(method: str, posed: Problem, seed: int = 0) -> Identification:
-    identify = identifier(method, STUDY.config.of_methods.of(method))
-    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
-    return answer
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -187,7 +153,8 @@ def test_offset_and_drift_are_fitted_along() -> None:
     posed = problem_of(gripper, MODEL, torque, times, trace, ranges, offset=True, drift=True)
     for method in METHODS:
         answer = run(method, posed)
-        assert answer.misfit_rad < 1.1 * rms(noise) or method == "genetic"
+        # The genetic algorithm has two digits a parameter, and misses the noise floor by more.
+        assert answer.misfit_rad < (2.0 if method == "genetic" else 1.1) * rms(noise)
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.15 if method == "genetic" else 0.05)
         assert c + c_p == pytest.approx(10.0, rel=0.03)

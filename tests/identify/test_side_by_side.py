@@ -19,7 +19,7 @@ from biogrip.identify.selection import best
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import together
-from tests.identify.plain_genetic import chromosomes_of, identified
+from tests.helpers.plain_genetic import chromosomes_of, identified
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
 READINGS = {

@@ -20,7 +20,8 @@ from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
 from biogrip.running.sheet import Sheet, files_of, sheets_of
-from tests.products.default import ROOT, plan_of
+from tests.helpers.default import plan_of
+from tests.helpers.places import ROOT
 
 EVERYTHING = """
 cases:
@@ -175,7 +176,7 @@ def test_a_digest_has_twelve_digits(wrapped: Callable[[float], object]) -> None:
 DIGESTS = """
 from biogrip.products.catalogue import products
 from biogrip.running.sheet import sheets_of
-from tests.products.default import plan_of
+from tests.helpers.default import plan_of
 for sheet in sheets_of(products().values(), plan_of()):
     print(sheet.name, *map(sheet.digest, sheet.jobs))
 """

@@ -19,7 +19,8 @@ from biogrip.products.stages import sweep_points as stage
 from biogrip.products.tables.robustness import robustness
 from biogrip.response.linear import rotation, step_response
 from biogrip.study.study import Study
-from tests.products.default import study_of
+from tests.helpers.default import study_of
+from tests.helpers.runs import replaced
 
 CASE = "endothelial_cell"
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
@@ -149,7 +150,7 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 
 
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
-    text = SWEEPS.replace("values: [0, 0.2]", "values: [0.2]")
+    text = replaced(SWEEPS, "values: [0, 0.2]", "values: [0.2]")
     text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
     stage.judge(settings(study_of(text)), identifications, tmp_path / "x.csv")
     assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}

@@ -10,14 +10,8 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from tests.response.reference import random_samples
-from tests.response.test_sensitivity import PROTOCOLS
-
-TIMES = {
-    "uniform": np.linspace(0.0, 400.0, 4001),
-    "uneven": np.sort(np.random.default_rng(2).uniform(0.0, 400.0, 1500)),
-    "few": np.array([0.0, 1.0, 5.0, 20.0, 199.0, 201.0, 210.0, 390.0]),
-}
+from tests.helpers.responses import PROTOCOLS, random_samples
+from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 
 def products(rows: Array, slopes: Array) -> Array:

@@ -7,7 +7,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.response.dense_samples import DenseSamples
 from biogrip.response.sensitivity import responses_of_modes
-from tests.response.test_sensitivity import PROTOCOLS
+from tests.helpers.responses import PROTOCOLS
 
 _RNG = np.random.default_rng(4)
 TIMES = {

@@ -8,7 +8,7 @@ from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
 from biogrip.response.linear import rotation, rotation_rate, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
-from tests.response.reference import jaw_force_50_digits, random_samples
+from tests.helpers.responses import jaw_force_50_digits, random_samples
 from tests.response.test_linear import TIMES
 from tests.response.test_nonlinear import ARM, symmetric_states
 from tests.response.test_protocols import TORQUE

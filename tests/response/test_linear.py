@@ -9,7 +9,7 @@ from biogrip.experiment.protocol import TorqueHistory, held, torque_history
 from biogrip.experiment.sample import Network, generalized_maxwell
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import rotation, step_response
-from tests.response.reference import random_samples, rotation_50_digits
+from tests.helpers.responses import random_samples, rotation_50_digits
 
 # From 0.1 s after the start to the end, close to the step and far from it.
 TIMES = np.array([0.1, 0.2, 0.7, 3.3, 20.0, 90.0, 199.9, 200.1, 200.5, 210.0, 290.0, 400.0])

@@ -10,8 +10,8 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from tests.response.test_condensed import TIMES
-from tests.response.test_sensitivity import MODEL_PARAMETERS, PROTOCOLS
+from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS
+from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 MANY_BRANCHES = {branches: model_named("generalized_maxwell", branches) for branches in (2, 3, 4)}
 

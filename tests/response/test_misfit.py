@@ -8,7 +8,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
-from tests.response.reference import random_samples
+from tests.helpers.responses import random_samples
 
 MODEL = MODELS["generalized_maxwell"]
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])

@@ -20,7 +20,7 @@ from biogrip.response.nonlinear import (
     correction,
     nonlinear_rotation,
 )
-from tests.response.reference import random_samples
+from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, torque_history
 from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
@@ -13,32 +13,17 @@ from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.nuisance import nuisance_basis, within, without
 from biogrip.response.residuals import Residuals
 from biogrip.response.sensitivity import rotation_and_sensitivity
-from tests.response.reference import random_samples, rotation_50_digits
+from tests.helpers.responses import (
+    MODEL_PARAMETERS,
+    PROTOCOLS,
+    random_samples,
+    rotation_50_digits,
+)
 
 TIMES = np.array([0.1, 1.0, 7.5, 60.0, 199.0, 200.1, 201.0, 230.0, 399.0])
 # Without inertia the response itself differs by up to 3.1e-8 s^2 / t^2 (docs/model.md), t the
 # time since a step, and its derivatives by some times that.
 INERTIA = 5 * 3.1e-8 / np.where(TIMES < 200, TIMES, TIMES - 200) ** 2
-SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
-PROTOCOLS = {
-    "steps": (held(200.0, 1.6e-9), held(200.0, 0.32e-9)),
-    "ramp, parabola and sinusoid": (
-        Phase(50.0, Load(0.0, 2e-11), Load(0.0, 2e-11)),
-        Phase(150.0, Load(1e-9, 1e-12, 1e-14), Load(1e-9, 1e-12, 1e-14)),
-        Phase(200.0, SWING, SWING),
-    ),
-    "arms driven differently": (held(200.0, 1.6e-9, 1.0e-9), held(200.0, 0.3e-9, 0.5e-9)),
-}
-MODEL_PARAMETERS: dict[str, list[float]] = {
-    "generalized_maxwell": [9.5, 0.3, 10.0, 0.7],
-    "liquid_drop": [9.5, 0.3, 10.0],
-    "damper": [10.0],
-    "kelvin_voigt": [0.3, 10.0],
-    "maxwell": [2.0, 50.0],
-    "zener_maxwell": [2.0, 1.0, 50.0],
-    "zener_kelvin": [3.0, 2.0, 40.0],
-    "burgers": [3.0, 200.0, 2.0, 40.0],
-}
 
 
 def test_against_50_digits(gripper: Gripper, steps: TorqueHistory) -> None:

@@ -4,7 +4,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import step_response
 from biogrip.response.two_modes import two_modes
-from tests.response.reference import random_samples
+from tests.helpers.responses import random_samples
 
 
 def test_is_the_general_solution(gripper: Gripper) -> None:

@@ -29,7 +29,7 @@ from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.unilateral import UnilateralResponse, unilateral_response
-from tests.response.reference import random_samples
+from tests.helpers.responses import random_samples
 
 # Slow arms, which an integrator can follow through contact and flight.
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)

@@ -1,171 +1,18 @@
-import fcntl
-import os
 import shutil
-import subprocess
-import sys
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-
-# A whole study in a few seconds: real physics and algorithm, little of each.
-SMALL = """
-seeds: 4
-batch_size: 2
-measurement: {rate_Hz: 1.0}
-methods: [genetic, least_squares, differential_evolution]
-least_squares: {candidates: 100, starts: 4}
-differential_evolution: {popsize: 5, maxiter: 20}
-identifiability: {coverage_seeds: 6}
-model_selection: {models: [maxwell, generalized_maxwell]}
-genetic_algorithm: {population: 60, survivors: 30, min_generations: 10, max_generations: 25}
-cases:
-  liquid_drop_1: null
-"""
-
-# Every kind of file, and of each as little as there can be.
-TINY = """
-seeds: 2
-batch_size: 1
-measurement: {rate_Hz: 0.5}
-methods: [least_squares, genetic]
-least_squares: {candidates: 50, starts: 3}
-genetic_algorithm: {population: 20, survivors: 10, min_generations: 2, max_generations: 4}
-identifiability: {coverage_seeds: 2}
-model_selection: {models: [damper, maxwell]}
-cases:
-  endothelial_cell: null
-  liquid_drop_1: null
-"""
+from tests.helpers.places import ROOT as ROOT
 
 
-@dataclass(frozen=True)
-class Run:
-    """What a call of Snakemake came to."""
-
-    status: int
-    output: str
-
-    def jobs(self, rule: str) -> int:
-        """How many jobs of a rule were run or would be."""
-        return self.all_jobs().get(rule, 0)
-
-    def all_jobs(self) -> dict[str, int]:
-        """How many jobs of each rule were run or would be (from the job table)."""
-        rows = [line.split() for line in self.output.splitlines()]
-        table = {
-            row[0]: int(row[1])
-            for row in rows
-            if len(row) == 2 and row[0].isidentifier() and row[1].isdigit()
-        }
-        return {rule: jobs for rule, jobs in table.items() if rule not in ("all", "total")}
+@pytest.fixture
+def finished_copy(finished: Path, tmp_path: Path) -> Path:
+    """The finished study to be changed, file times kept."""
+    return shutil.copytree(finished, tmp_path / "study")
 
 
-Snakemake = Callable[..., Run]
-
-
-def snakemake(
-    folder: Path,
-    *arguments: str,
-    config: str = SMALL,
-    environment: dict[str, str] | None = None,
-    root: Path = ROOT,
-) -> Run:
-    """Run the repository's workflow in a folder of its own, over a config laid on the default."""
-    overlay = folder / "overlay.yaml"
-    overlay.write_text(config)
-    jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
-    command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
-    command += ["--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
-    command += ["--configfile", str(overlay)]
-    done = subprocess.run(
-        command,
-        cwd=root,
-        env={**os.environ, **(environment or {})},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=600,
-    )
-    return Run(done.returncode, done.stdout)
-
-
-@dataclass(frozen=True)
-class Tree:
-    """A copy of the repository that may be edited, and a study in it."""
-
-    root: Path
-    study: Path
-
-    @property
-    def environment(self) -> dict[str, str]:
-        """In which Python finds the copy."""
-        return {**os.environ, "PYTHONPATH": str(self.root / "src")}
-
-    def run(self, *arguments: str, config: str = SMALL) -> Run:
-        """Run the copy's workflow in its study."""
-        return snakemake(
-            self.study, *arguments, root=self.root, environment=self.environment, config=config
-        )
-
-
-def copied_tree(folder: Path) -> Tree:
-    """Copy what a study runs by, but no study."""
-    for name in ("src", "workflow", "config", "profiles"):
-        shutil.copytree(ROOT / name, folder / name)
-    shutil.copy(ROOT / "Snakefile", folder)
-    return Tree(folder, folder / "study")
-
-
-@pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """A finished small study, one for all workers; copy it before changing anything."""
-    return built_once("finished", SMALL, tmp_path_factory, worker_id)
-
-
-@pytest.fixture(scope="session")
-def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """A finished study of two seeds, one for all workers; copy it before changing anything."""
-    return built_once("tiny", TINY, tmp_path_factory, worker_id)
-
-
-def built_once(
-    name: str, config: str, tmp_path_factory: pytest.TempPathFactory, worker_id: str
-) -> Path:
-    """Run a study unless another worker has."""
-    own = tmp_path_factory.getbasetemp()
-    folder = (own if worker_id == "master" else own.parent) / name
-    with folder.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        if not folder.exists():
-            building = tmp_path_factory.mktemp("building")
-            run = snakemake(building, config=config)
-            assert run.status == 0, run.output
-            shutil.copytree(building, folder)
-    return folder
-
-
-def tables(folder: Path) -> dict[str, bytes]:
-    """Every file of results that is compared, by name."""
-    results = folder / "results"
-    return {
-        str(path.relative_to(results)): path.read_bytes()
-        for kind in ("tables", "targets", "identifications")
-        for path in sorted((results / kind).glob("*.*"))
-    }
-
-
-def results_of(folder: Path) -> dict[str, bytes]:
-    """Every result by name, but for what tells times, and for logs and records."""
-    results = folder / "results"
-    found = (path.relative_to(results) for path in sorted(results.rglob("*.*")))
-    return {
-        str(name): (results / name).read_bytes()
-        for name in found
-        if (results / name).is_file()
-        and name.parts[0] not in ("logs", "timings", ".manifest", "manifest.jsonl")
-        and not name.name.startswith("timings.")
-    }
+@pytest.fixture
+def tiny_copy(tiny: Path, tmp_path: Path) -> Path:
+    """The study of two seeds to be changed, file times kept."""
+    return shutil.copytree(tiny, tmp_path / "study")

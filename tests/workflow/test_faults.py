@@ -11,7 +11,11 @@ from pathlib import Path
 import psutil
 import pytest
 
-from tests.workflow.conftest import ROOT, SMALL, results_of, snakemake, tables
+from biogrip.errors import BiogripError
+from biogrip.study.load import load_study
+from biogrip.study.source import overlaid, read_config
+from tests.helpers.places import CONFIG, ROOT
+from tests.helpers.runs import TINY, biogrip, results_of, snakemake
 
 BAD = {
     "misspelt key": ("seedz: 3", "overlay.yaml, line 1: seedz: unknown key. Did you mean 'seeds'?"),
@@ -40,17 +44,23 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_bad_config_stops_with_one_message(finished: Path, tmp_path: Path, name: str) -> None:
-    study = tmp_path / "study"
-    shutil.copytree(finished, study)
-    before = tables(study)
+def test_a_bad_config_is_named(tmp_path: Path, name: str) -> None:
     config, message = BAD[name]
-    run = snakemake(study, config=config)
+    file = tmp_path / "overlay.yaml"
+    file.write_text(config)
+    with pytest.raises(BiogripError) as error:
+        load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
+    assert message in str(error.value)
+
+
+def test_a_bad_config_stops_with_one_message(tiny: Path, tiny_copy: Path) -> None:
+    config, message = BAD["misspelt key"]
+    run = snakemake(tiny_copy, config=config)
     assert run.status != 0
     assert message in run.output
     assert "Traceback" not in run.output
     assert run.output.count("\n") <= 25
-    assert tables(study) == before
+    assert results_of(tiny_copy) == results_of(tiny)
 
 
 def test_results_folder_that_cannot_be_written(tmp_path: Path) -> None:
@@ -62,66 +72,67 @@ def test_results_folder_that_cannot_be_written(tmp_path: Path) -> None:
     assert run.output.count("\n") <= 25
 
 
-def test_a_damaged_target_is_named_and_made_again(finished: Path, tmp_path: Path) -> None:
-    study = tmp_path / "study"
-    shutil.copytree(finished, study)
-    target = study / "results/targets/endothelial_cell.csv"
+def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -> None:
+    target = tiny_copy / "results/targets/liquid_drop_2.csv"
     whole = target.read_bytes()
     target.write_text("time,angle\n1,2\n")
-    for file in (study / "results/measurements/endothelial_cell").iterdir():
-        file.unlink()
+    batch = tiny_copy / "results/measurements/liquid_drop_2/seeds_0-0.parquet"
+    batch.unlink()
     # By a job's command alone nothing is made again.
-    command = [sys.executable, "-m", "biogrip", "make", "measurement"]
-    job = ["--case", "endothelial_cell", "--batch", "seeds_0-1"]
-    done = subprocess.run([*command, *job], cwd=study, capture_output=True, text=True)
+    done = biogrip(
+        tiny_copy, "make", "measurement", "--case", "liquid_drop_2", "--batch", "seeds_0-0"
+    )
     assert done.returncode == 1
-    assert "endothelial_cell.csv, line 1: found the columns time, angle" in done.stderr
+    assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.stderr
     assert "Traceback" not in done.stderr
-    run = snakemake(study, "results/measurements/endothelial_cell/seeds_0-1.parquet")
+    run = snakemake(tiny_copy, str(batch.relative_to(tiny_copy)), config=TINY)
     assert run.status == 0, run.output
-    kept = "results/targets/endothelial_cell.csv.edited"
+    kept = "results/targets/liquid_drop_2.csv.edited"
     assert f"kept as {kept}; making it again" in run.output
-    assert (study / kept).read_text() == "time,angle\n1,2\n"
+    assert (tiny_copy / kept).read_text() == "time,angle\n1,2\n"
     assert target.read_bytes() == whole
+    assert batch.read_bytes() == (tiny / batch.relative_to(tiny_copy)).read_bytes()
 
 
 def started(folder: Path, *targets: str) -> "subprocess.Popen[bytes]":
     """Start the workflow as `snakemake` does, and do not wait for it."""
-    (folder / "overlay.yaml").write_text(SMALL)
+    (folder / "overlay.yaml").write_text(TINY)
     command = [sys.executable, "-m", "snakemake", "-j2", *targets]
     command += ["--snakefile", str(ROOT / "Snakefile")]
     command += ["--directory", str(folder), "--configfile", str(folder / "overlay.yaml")]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
 
 
-def test_a_killed_run_continues_with_the_same_command(finished: Path, tmp_path: Path) -> None:
+ERRORS = "results/tables/errors_liquid_drop_2.csv"
+
+
+def test_a_killed_run_continues_with_the_same_command(tiny: Path, tmp_path: Path) -> None:
     """Kill -9 of Snakemake in mid-run: the second call needs no other flag."""
-    wanted = [f"results/tables/{name}.csv" for name in ("errors", "methods")]
-    process = started(tmp_path, *wanted)
+    process = started(tmp_path, ERRORS)
     give_up = time.monotonic() + 120
-    while len(list((tmp_path / "results").glob("identifications/*/*/*.csv"))) < 3:
+    while not list((tmp_path / "results").glob("identifications/*/*/*.csv")):
         assert time.monotonic() < give_up
         assert process.poll() is None
         time.sleep(0.02)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     assert list((tmp_path / ".snakemake" / "locks").iterdir())
-    run = snakemake(tmp_path, *wanted)
+    run = snakemake(tmp_path, ERRORS, config=TINY)
     assert run.status == 0, run.output
-    # Of 12, three were there; of these, one may not have been written down.
-    assert 0 < run.jobs("identification") < 12
-    ours, theirs = results_of(tmp_path), results_of(finished)
-    assert set(wanted) <= {f"results/{name}" for name in ours}
+    # Of four, one was there, but may not have been written down.
+    assert 0 < run.jobs("identification") <= 4
+    assert (run.jobs("target"), run.jobs("identifications")) == (0, 1)
+    ours, theirs = results_of(tmp_path), results_of(tiny)
+    assert ERRORS.removeprefix("results/") in ours
     assert [name for name in ours if ours[name] != theirs[name]] == []
 
 
-def test_a_killed_job_is_done_again_with_the_same_command(finished: Path, tmp_path: Path) -> None:
+def test_a_killed_job_is_done_again_with_the_same_command(tiny: Path, tiny_copy: Path) -> None:
     """Kill -9 of an identification in mid-run."""
-    study = tmp_path / "study"
-    shutil.copytree(finished, study)
     for stage in ("identifications", "histories", "timings"):
-        shutil.rmtree(study / "results" / stage / "endothelial_cell")
-    process = started(study)
+        shutil.rmtree(tiny_copy / "results" / stage / "liquid_drop_2")
+    (tiny_copy / "results" / "identifications" / "liquid_drop_2.csv").unlink()
+    process = started(tiny_copy, ERRORS)
     give_up = time.monotonic() + 60
     killed = None
     while killed is None:
@@ -130,9 +141,10 @@ def test_a_killed_job_is_done_again_with_the_same_command(finished: Path, tmp_pa
         killed = next(filter(is_identification, psutil.Process(process.pid).children(True)), None)
     killed.kill()
     assert process.wait(60) != 0
-    run = snakemake(study)
+    run = snakemake(tiny_copy, ERRORS, config=TINY)
     assert run.status == 0, run.output
-    assert results_of(study) == results_of(finished)
+    assert run.jobs("identification") > 0
+    assert results_of(tiny_copy) == results_of(tiny)
 
 
 def is_identification(process: psutil.Process) -> bool:
@@ -143,26 +155,26 @@ def is_identification(process: psutil.Process) -> bool:
     return command[2:4] == ["make", "identification"]
 
 
-def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Path) -> None:
+def test_a_full_disk_is_named_and_the_run_continues(tiny: Path, tmp_path: Path) -> None:
     """Results on a file system of their own, with room for a part of them, then for nothing."""
     study = tmp_path / "study"
-    shutil.copytree(finished, study, ignore=shutil.ignore_patterns("results"))
+    shutil.copytree(tiny, study, ignore=shutil.ignore_patterns("results"))
     disk = study / "results"
     disk.mkdir()
     tmpfs = ["mount", "-t", "tmpfs", "-o", "size=40m", "tmpfs", str(disk)]
     if subprocess.run(tmpfs, capture_output=True, check=False).returncode:
         pytest.skip("mounting a small file system takes root")
     try:
-        shutil.copytree(finished / "results", disk, dirs_exist_ok=True)
+        shutil.copytree(tiny / "results", disk, dirs_exist_ok=True)
         shutil.rmtree(disk / "figures")
         filler = disk / "filler"
         filler.write_bytes(bytes(shutil.disk_usage(disk).free - 400_000))
-        filling = snakemake(study)
+        filling = snakemake(study, config=TINY)
         with filler.open("ab") as stream:
             stream.write(bytes(shutil.disk_usage(disk).free))
-        full = snakemake(study)
+        full = snakemake(study, config=TINY)
         filler.unlink()
-        run = snakemake(study)
+        run = snakemake(study, config=TINY)
         results = results_of(study)
     finally:
         subprocess.run(["umount", str(disk)], check=True)
@@ -171,7 +183,7 @@ def test_a_full_disk_is_named_and_the_run_continues(finished: Path, tmp_path: Pa
     assert full.status != 0
     assert "results: results cannot be written here: No space left on device" in full.output
     assert run.status == 0, run.output
-    assert results == results_of(finished)
+    assert results == results_of(tiny)
 
 
 def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None:
@@ -184,16 +196,13 @@ def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None
     cells[7] = "99.9"
     errors.write_text("\n".join([*old[:2], ",".join(cells), *old[3:], ""]))
     (published / "gripper.md").unlink()
-    command = [sys.executable, "-m", "biogrip", "compare", str(published)]
-    now = str(finished / "results" / "tables")
-    done = subprocess.run([*command, now], capture_output=True, text=True)
+    now = finished / "results" / "tables"
+    done = biogrip(tmp_path, "compare", published, now)
     assert done.returncode != 0
     assert "gripper.md: regenerated, but not published" in done.stderr
     row = next(line for line in done.stderr.splitlines() if "99.9" in line)
     for word in ("errors", "endothelial_cell k_p", "best_identified", "99.9"):
         assert word in row
-    same = subprocess.run(
-        [sys.executable, "-m", "biogrip", "compare", now, now], capture_output=True, text=True
-    )
+    same = biogrip(tmp_path, "compare", now, now)
     assert same.returncode == 0
     assert "byte for byte" in same.stdout

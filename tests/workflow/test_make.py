@@ -1,7 +1,6 @@
 """A job's command typed by hand: its settings are among the results, and it says what is wrong."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -9,54 +8,72 @@ from pathlib import Path
 
 import pytest
 
+from biogrip.cli import main
 from biogrip.products.catalogue import products
 from biogrip.running.source_files import source_files
-from tests.workflow.conftest import results_of
+from tests.helpers.runs import biogrip, results_of
 
 CASE = ("--case", "liquid_drop_2")
 BATCH = (*CASE, "--batch", "seeds_1-1")
 METHOD = ("--method", "least_squares")
 
-# Every module of ours whose functions run while a product is made.
+# Every module of ours whose functions run while a product is made, in a process for each: what
+# is kept from one job to the next would not be called again.
 WATCHED = """
-import sys
+import json, os, sys
 from pathlib import Path
 import biogrip
-from biogrip.products.catalogue import chosen
+from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.resolved import read_study
 package = str(Path(biogrip.__file__).parent)
-name, job = sys.argv[1], dict(zip(sys.argv[2::2], sys.argv[3::2]))
-seen = set()
-def watch(frame, event, argument):
-    code = frame.f_code
-    # Modules are imported on the way; only what is called counts.
-    if event == "call" and code.co_filename.startswith(package) and code.co_name != "<module>":
-        seen.add(code.co_filename)
-(product,) = chosen([name])
-make = product.make
-def watched(*given, **files):
-    sys.setprofile(watch)
-    make(*given, **files)
-    sys.setprofile(None)
-object.__setattr__(product, "make", watched)
 plan = Plan(read_study(Path("results")), Path("results"))
-job = {key.removeprefix("--"): value for key, value in job.items()}
-product.run(plan, job)
-print(*sorted(seen), sep="\\n")
+def seen_by(name, job):
+    seen = set()
+    def watch(frame, event, argument):
+        code = frame.f_code
+        # Modules are imported on the way; only what is called counts.
+        if event == "call" and code.co_filename.startswith(package) and code.co_name != "<module>":
+            seen.add(code.co_filename)
+    product = products()[name]
+    make = product.make
+    def watched(*given, **files):
+        sys.setprofile(watch)
+        make(*given, **files)
+        sys.setprofile(None)
+    object.__setattr__(product, "make", watched)
+    product.run(plan, job)
+    return sorted(seen)
+for name, job in json.load(sys.stdin):
+    if child := os.fork():
+        assert os.waitpid(child, 0)[1] == 0, name
+    else:
+        print(json.dumps([name, seen_by(name, job)]), flush=True)
+        os._exit(0)
 """
+JOBS = {
+    "target": CASE,
+    "measurement": BATCH,
+    "identification": (*BATCH, *METHOD),
+    "identifications": CASE,
+    "intervals": (*CASE, "--batch", "seeds_1-1"),
+    "model_fits": BATCH,
+    "expectation": CASE,
+    "judgement": CASE,
+    "errors": CASE,
+    "methods": (),
+    "sampling_evidence": (),
+    "fit": CASE,
+    "scatter": CASE,
+    "torque": (),
+    "overview": (),
+    "summary": CASE,
+}
 
 
-@pytest.fixture
-def study(tiny: Path, tmp_path: Path) -> Path:
-    copied = tmp_path / "study"
-    shutil.copytree(tiny, copied)
-    return copied
-
-
-def biogrip(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]":
-    command = [sys.executable, "-m", "biogrip", *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=120)
+def wildcards_of(job: tuple[str, ...]) -> dict[str, str]:
+    pairs = zip(job[::2], job[1::2], strict=True)
+    return {key.removeprefix("--"): text for key, text in pairs}
 
 
 @pytest.mark.parametrize(
@@ -79,15 +96,31 @@ def biogrip(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str]"
     ids=lambda value: "-".join(value) if isinstance(value, tuple) else "",
 )
 def test_what_was_deleted_is_made_again_as_it_was(
-    tiny: Path, study: Path, names: tuple[str, ...], job: tuple[str, ...], files: list[str]
+    tiny: Path,
+    tiny_copy: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    names: tuple[str, ...],
+    job: tuple[str, ...],
+    files: list[str],
 ) -> None:
+    monkeypatch.chdir(tiny_copy)
     for file in files:
-        (study / "results" / file).unlink()
-    done = biogrip(study, "make", *names, *job)
-    assert done.returncode == 0, done.stderr
-    assert results_of(study) == results_of(tiny)
+        (tiny_copy / "results" / file).unlink()
+    assert main(["make", *names, *job]) == 0
+    assert results_of(tiny_copy) == results_of(tiny)
     # And the record knows it.
-    assert biogrip(study, "verify").returncode == 0
+    assert main(["verify"]) == 0
+
+
+def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
+    """As all tests here but in a process of its own."""
+    (tiny_copy / "results" / "tables" / "errors_liquid_drop_2.csv").unlink()
+    done = biogrip(tiny_copy, "make", "errors", *CASE)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert results_of(tiny_copy) == results_of(tiny)
+    done = biogrip(tiny_copy, "make", "erors", *CASE)
+    assert done.returncode == 1
+    assert done.stderr.startswith("biogrip: no product 'erors'. Did you mean 'errors'? Allowed: ")
 
 
 @pytest.mark.parametrize(
@@ -116,80 +149,86 @@ def test_what_was_deleted_is_made_again_as_it_was(
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
 )
 def test_what_cannot_be_made_is_said_and_changes_nothing(
-    tiny: Path, arguments: tuple[str, ...], message: str
+    tiny: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: tuple[str, ...],
+    message: str,
 ) -> None:
+    monkeypatch.chdir(tiny)
     before = results_of(tiny)
-    done = biogrip(tiny, "make", *arguments)
-    assert done.returncode == 1
-    assert done.stderr.startswith(f"biogrip: {message}")
-    assert done.stderr.count("\n") == 1
+    assert main(["make", *arguments]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith(f"biogrip: {message}")
+    assert said.count("\n") == 1
     assert results_of(tiny) == before
 
 
-def test_a_folder_without_a_study_is_said(tmp_path: Path) -> None:
-    done = biogrip(tmp_path, "make", "errors", *CASE)
-    assert done.returncode == 1
-    assert done.stderr.startswith("biogrip: results/study.json: there is none, for no study was ru")
+def test_a_folder_without_a_study_is_said(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["make", "errors", *CASE]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("biogrip: results/study.json: there is none, for no study was run here")
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("text", ["", "[", "{}", "[]", '"study"', '{"cases": 3}'])
-def test_a_damaged_study_is_said(tmp_path: Path, text: str) -> None:
+def test_a_damaged_study_is_said(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    text: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "study.json").write_text(text)
-    done = biogrip(tmp_path, "make", "errors", *CASE)
-    assert done.returncode == 1
-    assert done.stderr.startswith("biogrip: results/study.json: cannot be read as a study")
-    assert "Traceback" not in done.stderr
+    assert main(["make", "errors", *CASE]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("biogrip: results/study.json: cannot be read as a study")
+    assert said.count("\n") == 1
 
 
-def test_a_file_of_the_users_is_not_replaced(study: Path) -> None:
-    mine = study / "results" / "traces" / "liquid_drop_2" / "seed_0.csv"
+def test_a_file_of_the_users_is_not_replaced(
+    tiny_copy: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tiny_copy)
+    mine = tiny_copy / "results" / "traces" / "liquid_drop_2" / "seed_0.csv"
     mine.parent.mkdir(parents=True)
     mine.write_text("mine")
-    done = biogrip(study, "make", "single_trace", *CASE, "--seed", "0")
-    assert done.returncode == 1
-    assert "seed_0.csv: in the way, and not written by this study" in done.stderr
+    assert main(["make", "single_trace", *CASE, "--seed", "0"]) == 1
+    assert "seed_0.csv: in the way, and not written by this study" in capsys.readouterr().err
     assert mine.read_text() == "mine"
 
 
-@pytest.mark.parametrize(
-    ("name", "job"),
-    [
-        ("target", CASE),
-        ("measurement", BATCH),
-        ("identification", (*BATCH, *METHOD)),
-        ("identifications", CASE),
-        ("intervals", (*CASE, "--batch", "seeds_1-1")),
-        ("model_fits", BATCH),
-        ("expectation", CASE),
-        ("judgement", CASE),
-        ("errors", CASE),
-        ("methods", ()),
-        ("sampling_evidence", ()),
-        ("fit", CASE),
-        ("scatter", CASE),
-        ("torque", ()),
-        ("overview", ()),
-        ("summary", CASE),
-    ],
-)
+@pytest.fixture(scope="module")
+def called(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+    """By product, the files of all functions that are called when it is made."""
+    study = shutil.copytree(tiny, tmp_path_factory.mktemp("watched") / "study")
+    jobs = [(name, wildcards_of(job)) for name, job in JOBS.items()]
+    done = subprocess.run(
+        [sys.executable, "-c", WATCHED],
+        cwd=study,
+        input=json.dumps(jobs),
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    return {name: set(files) for name, files in map(json.loads, done.stdout.splitlines())}
+
+
+@pytest.mark.parametrize("name", JOBS)
 def test_no_code_that_makes_a_product_is_missing_from_its_digest(
-    study: Path, name: str, job: tuple[str, ...]
+    called: dict[str, set[str]], name: str
 ) -> None:
     """What is called is the independent count; what only says what to do is in the settings."""
-    command = [sys.executable, "-c", WATCHED, name, *job]
-    done = subprocess.run(
-        command, cwd=study, env=os.environ, capture_output=True, text=True, check=True
-    )
-    wildcards = {
-        key.removeprefix("--"): text for key, text in zip(job[::2], job[1::2], strict=True)
-    }
     product = products()[name]
-    known = set(source_files(product.module, *product.modules(wildcards)))
+    known = source_files(product.module, *product.modules(wildcards_of(JOBS[name])))
     # How a product is written down when it is made, not what: see `_SAYING`.
-    wrappers = {str(Path(file)) for file in done.stdout.split() if file.endswith("/declared.py")}
-    assert set(done.stdout.split()) - wrappers <= known
+    wrappers = {file for file in called[name] if file.endswith("/declared.py")}
+    assert sys.modules[product.module].__file__ in called[name]
+    assert called[name] - wrappers <= set(known)
 
 
 def test_a_study_is_written_down_as_it_was_run(tiny: Path) -> None:

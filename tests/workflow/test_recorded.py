@@ -4,10 +4,17 @@ import json
 from pathlib import Path
 
 import pandas as pd
+import pytest
 
-from tests.workflow.conftest import ROOT, snakemake
+from biogrip.errors import BiogripError
+from biogrip.study.load import load_study
+from biogrip.study.source import overlaid, read_config
+from tests.helpers.default import study_of
+from tests.helpers.in_process import make_in_process
+from tests.helpers.pictures import assert_drawn
+from tests.helpers.places import CONFIG, EXAMPLE, ROOT
+from tests.helpers.runs import replaced, snakemake
 
-EXAMPLE = ROOT / "data" / "example_trace.csv"
 RECORDED = f"""
 methods: [least_squares]
 model_selection: {{models: [damper, liquid_drop]}}
@@ -22,8 +29,7 @@ cases:
 
 
 def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None:
-    run = snakemake(tmp_path, config=RECORDED)
-    assert run.status == 0, run.output
+    make_in_process(tmp_path, study_of(RECORDED))
     results = tmp_path / "results"
     errors = pd.read_csv(results / "tables" / "errors_my_trace.csv")
     assert errors["parameter"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
@@ -32,9 +38,10 @@ def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None
     verdicts = pd.read_csv(results / "tables" / "verdicts_my_trace.csv")
     assert verdicts["verdict"].tolist()[:2] == ["determined", "determined"]
     for figure in ("fit", "profiles", "valley", "convergence", "evolution"):
-        assert (results / "figures" / f"{figure}_my_trace.png").stat().st_size > 5000
+        assert_drawn(results / "figures" / f"{figure}_my_trace.png")
     found = json.loads((results / "identifiability" / "my_trace.json").read_text())
     page = (results / "summaries" / "my_trace.html").read_text()
+    assert len(found["quantities"]) == 5
     for item in found["quantities"]:
         assert item["in_words"] in page
     assert page.count("data:image/png;base64,") == 3
@@ -46,27 +53,45 @@ def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None
 
 
 def test_the_example_is_what_its_truth_makes(tmp_path: Path) -> None:
-    config = (ROOT / "data" / "example_truth.yaml").read_text()
+    study = study_of((ROOT / "data" / "example_truth.yaml").read_text())
     trace = "results/traces/example/seed_0.csv"
-    run = snakemake(tmp_path, trace, config=config)
-    assert run.status == 0, run.output
+    make_in_process(tmp_path, study, [trace])
     assert (tmp_path / trace).read_bytes() == EXAMPLE.read_bytes()
 
 
 def test_a_bad_recording_stops_with_its_place(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("time_s,rotation_rad\n" + "".join(f"{t},{1e-3 * t}\n" for t in range(401)))
-    config = RECORDED.replace(str(EXAMPLE), str(bad))
+    config = replaced(RECORDED, str(EXAMPLE), str(bad))
     run = snakemake(tmp_path, "results/measurements/my_trace/seeds_0-0.parquet", config=config)
     assert run.status != 0
     assert "bad.csv, line 402, column 'rotation_rad': found" in run.output
     assert "Traceback" not in run.output
-    missing = snakemake(tmp_path, config=config.replace("bad.csv", "bda.csv"))
-    assert missing.status != 0
-    assert "overlay.yaml, line 10: cases.my_trace.measurement.file: found" in missing.output
-    assert "Did you mean" in missing.output
-    known = snakemake(tmp_path, config=config.replace("maxwell}", "maxwell, k: 1.0}"))
-    assert "is what a recorded trace is to tell; leave it out" in known.output
-    simulated = config.replace("{file: " + str(bad) + ", ", "{")
-    unknown = snakemake(tmp_path, config=simulated)
-    assert "time: is only for a recorded trace" in unknown.output
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "messages"),
+    [
+        (
+            "example_trace.csv",
+            "exmaple_trace.csv",
+            ["line 10: cases.my_trace.measurement.file: found", "Did you mean"],
+        ),
+        (
+            "maxwell}",
+            "maxwell, k: 1.0}",
+            ["is what a recorded trace is to tell; leave it out"],
+        ),
+        ("{file: " + str(EXAMPLE) + ", ", "{", ["time: is only for a recorded trace"]),
+    ],
+    ids=["missing", "known", "simulated"],
+)
+def test_what_a_recording_cannot_be_is_named(
+    tmp_path: Path, old: str, new: str, messages: list[str]
+) -> None:
+    assert old in RECORDED
+    file = tmp_path / "overlay.yaml"
+    file.write_text(replaced(RECORDED, old, new))
+    with pytest.raises(BiogripError) as error:
+        load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
+    assert [message for message in messages if message not in str(error.value)] == []

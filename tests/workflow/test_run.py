@@ -3,15 +3,15 @@
 import os
 import re
 import signal
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import psutil
 import pytest
 
-from tests.workflow.conftest import TINY
+from biogrip.cli import main
+from tests.helpers.places import EXAMPLE
+from tests.helpers.runs import TINY, started
 
 BAD = {
     "missing": (None, r"my.yaml: cannot be read: No such file"),
@@ -30,57 +30,53 @@ BAD = {
 }
 
 
-def biogrip(folder: Path, *arguments: str) -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "biogrip", *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-
-
 @pytest.mark.parametrize("kind", BAD)
 def test_a_config_that_cannot_be_used_is_named_before_anything_starts(
-    tmp_path: Path, kind: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    kind: str,
 ) -> None:
+    monkeypatch.chdir(tmp_path)
     content, message = BAD[kind]
     if isinstance(content, str):
         (tmp_path / "my.yaml").write_text(content.replace("{folder}", str(tmp_path)))
     elif content is not None:
         (tmp_path / "my.yaml").write_bytes(content)
-    with biogrip(tmp_path, "run", "my.yaml", "-n") as run:
-        output, _ = run.communicate(timeout=60)
-    assert run.returncode == 1
-    assert re.search(message, output)
-    assert "Traceback" not in output
-    assert len(output.splitlines()) <= 2
+    assert main(["run", "my.yaml", "-n"]) == 1
+    said = "".join(capfd.readouterr())
+    assert re.search(message, said)
+    assert len(said.splitlines()) <= 2
     assert {path.name for path in tmp_path.iterdir()} <= {"my.yaml"}
 
 
-def test_config_files_come_first(tmp_path: Path) -> None:
+def test_config_files_come_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "my.yaml").write_text(TINY)
-    with biogrip(tmp_path, "run", "-n", "--configfile", "my.yaml") as run:
-        output, _ = run.communicate(timeout=60)
-    assert run.returncode == 1
-    assert output.startswith("biogrip: --configfile: config files come first")
+    assert main(["run", "-n", "--configfile", "my.yaml"]) == 1
+    said = "".join(capfd.readouterr())
+    assert said.startswith("biogrip: --configfile: config files come first")
 
 
-def test_a_run_ends_by_naming_what_to_open(tmp_path: Path) -> None:
-    (tmp_path / "my.yaml").write_text(TINY)
+def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:
     errors = "results/tables/errors.csv"
-    with biogrip(tmp_path, "run", "my.yaml", "-j2", errors) as run:
+    (tiny_copy / errors).unlink()
+    with started(tiny_copy, "run", "overlay.yaml", "-j2", errors) as run:
         output, _ = run.communicate(timeout=300)
     assert run.returncode == 0, output
-    assert output.splitlines()[-1] == "biogrip: done. Open results/tables/errors.md."
-    for name in ("errors.md", "errors.csv"):
-        assert (tmp_path / "results" / "tables" / name).is_file()
+    assert output.splitlines()[-1] == (
+        "biogrip: done. Open results/tables/errors.md, results/figures/overview.png, "
+        "results/summaries/liquid_drop_2.html."
+    )
+    assert (tiny_copy / errors).read_bytes() == (tiny / errors).read_bytes()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
 def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Signals) -> None:
     (tmp_path / "my.yaml").write_text(TINY)
-    with biogrip(tmp_path, "run", "my.yaml", "-j2") as run:
+    with started(tmp_path, "run", "my.yaml", "-j2") as run:
         give_up = time.monotonic() + 120
         while not list((tmp_path / "results").glob("measurements/*/*.parquet")):
             assert time.monotonic() < give_up
@@ -96,7 +92,7 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
     assert not [p for p in psutil.process_iter(["cwd"]) if p.info["cwd"] == str(tmp_path)]
     (target,) = (tmp_path / "results").glob("targets/*.csv")
     done = target.stat().st_mtime_ns
-    with biogrip(tmp_path, "run", "my.yaml", "-j2", str(target.relative_to(tmp_path))) as run:
+    with started(tmp_path, "run", "my.yaml", "-j2", str(target.relative_to(tmp_path))) as run:
         output, _ = run.communicate(timeout=120)
     assert run.returncode == 0, output
     assert target.stat().st_mtime_ns == done
@@ -104,8 +100,7 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
 def test_a_stopped_command_says_so_in_a_line(tmp_path: Path, number: signal.Signals) -> None:
-    trace = Path(__file__).parents[2] / "data" / "example_trace.csv"
-    with biogrip(tmp_path, "identify", str(trace), "--output", "found.json") as run:
+    with started(tmp_path, "identify", EXAMPLE, "--output", "found.json") as run:
         # Its own handlers are in place before the libraries are loaded.
         give_up = time.monotonic() + 60
         while not any("numpy" in m.path for m in psutil.Process(run.pid).memory_maps()):

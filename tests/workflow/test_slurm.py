@@ -13,8 +13,11 @@ from typing import NoReturn
 
 import pytest
 
-from tests.workflow.conftest import ROOT, snakemake, tables
-from tests.workflow.slurm.cluster import SlurmError, missing_packages, one_node_slurm
+from tests.helpers.default import study_of
+from tests.helpers.in_process import make_in_process
+from tests.helpers.places import ROOT
+from tests.helpers.runs import snakemake, tables
+from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
 
 PLUGIN = "snakemake_executor_plugin_slurm"
 # Of the site, not of the study: no accounting to ask, and nobody else who would mind the asking.
@@ -65,6 +68,7 @@ least_squares: {candidates: 100, starts: 2}
 identifiability: {coverage_seeds: 0}
 model_selection: {models: []}
 cases:
+  endothelial_cell: null
   liquid_drop_1: null
 """
 
@@ -74,8 +78,7 @@ def test_slurm_gives_the_same_bytes(tmp_path: Path, slurm: dict[str, str]) -> No
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
-    local = snakemake(here, config=FEW_JOBS)
-    assert local.status == 0, local.output
+    make_in_process(here, study_of(FEW_JOBS))
     arguments = ("--profile", "profiles/slurm", *SITE, "--config", "batch_size=2")
     with ThreadPoolExecutor() as pool:
         running = pool.submit(snakemake, there, *arguments, config=FEW_JOBS, environment=slurm)
@@ -84,6 +87,7 @@ def test_slurm_gives_the_same_bytes(tmp_path: Path, slurm: dict[str, str]) -> No
         run = running.result()
     assert run.status == 0, run.output
     assert run.output.count("Trying to restart job") == 1
+    assert len(tables(here)) > 20
     assert tables(there) == tables(here)
     # Slurm's executor says so where a rule has no resources.
     for missing in ("No wall time information", "No job memory information"):

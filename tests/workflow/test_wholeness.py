@@ -1,19 +1,14 @@
 """Whatever becomes of results between two runs: the next ends with the same ones, or says so."""
 
-import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
-from tests.workflow.conftest import TINY, results_of, snakemake
-
-
-@pytest.fixture
-def study(tiny: Path, tmp_path: Path) -> Path:
-    copied = tmp_path / "study"
-    shutil.copytree(tiny, copied)
-    return copied
+from biogrip.running.wholeness import check_results
+from tests.helpers.default import study_of
+from tests.helpers.in_process import inputs_and_outputs
+from tests.helpers.runs import TINY, results_of, snakemake
 
 
 def one_of_each_kind(folder: Path) -> list[Path]:
@@ -52,30 +47,60 @@ def a_byte_changed(path: Path) -> None:
     path.write_bytes(content)
 
 
-@pytest.mark.parametrize(
-    "damage", [cut_in_the_middle, cut_between_rows, emptied, deleted, a_byte_changed]
-)
-def test_every_kind_of_file_is_made_again(
-    tiny: Path, study: Path, damage: Callable[[Path], None]
+DAMAGES = (cut_in_the_middle, cut_between_rows, emptied, deleted, a_byte_changed)
+
+
+def damaged_by(damage: Callable[[Path], None], files: list[Path]) -> dict[Path, bytes]:
+    """Damage files; gives what is left of those of which anything is."""
+    for file in files:
+        damage(file)
+    return {file: file.read_bytes() for file in files if file.exists() and file.stat().st_size}
+
+
+@pytest.mark.parametrize("damage", DAMAGES, ids=lambda damage: damage.__name__)
+def test_damage_of_every_kind_of_file_is_found(
+    tiny: Path,
+    tiny_copy: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    damage: Callable[[Path], None],
 ) -> None:
-    damaged = one_of_each_kind(study)
-    assert len(damaged) >= 25
-    contents = {}
-    for path in damaged:
-        damage(path)
-        if path.exists() and path.stat().st_size:
-            contents[path] = path.read_bytes()
-    run = snakemake(study, config=TINY)
-    assert run.status == 0, run.output
-    found = results_of(study)
-    for path, content in contents.items():
-        kept = path.with_name(f"{path.name}.edited")
-        assert f"kept as {kept.relative_to(study)}; making it again" in run.output
+    """Before a run plans anything, its place is empty, whatever the damage was."""
+    monkeypatch.chdir(tiny_copy)
+    _, outputs = inputs_and_outputs(study_of(TINY))
+    files = one_of_each_kind(tiny_copy)
+    assert len(files) >= 25
+    contents = damaged_by(damage, files)
+    check_results(Path("results"), outputs, outputs.__contains__, changing=True)
+    said = capsys.readouterr().err
+    found, before = results_of(tiny_copy), results_of(tiny)
+    for file, content in contents.items():
+        kept = file.with_name(f"{file.name}.edited")
+        assert f"kept as {kept.relative_to(tiny_copy)}; making it again" in said
         assert kept.read_bytes() == content
-        found.pop(str(kept.relative_to(study / "results")), None)
+        found.pop(str(kept.relative_to(tiny_copy / "results")), None)
+    hit = {str(file.relative_to(tiny_copy / "results")) for file in files}
+    assert not [file for file in files if file.exists()]
+    assert found == {name: content for name, content in before.items() if name not in hit}
+
+
+def test_every_kind_of_file_is_made_again(tiny: Path, tiny_copy: Path) -> None:
+    """In one run, the damages by turns."""
+    files = one_of_each_kind(tiny_copy)
+    contents: dict[Path, bytes] = {}
+    for turn, damage in enumerate(DAMAGES):
+        contents |= damaged_by(damage, files[turn :: len(DAMAGES)])
+    assert len(contents) > len(files) / 2
+    run = snakemake(tiny_copy, config=TINY)
+    assert run.status == 0, run.output
+    found = results_of(tiny_copy)
+    for file, content in contents.items():
+        kept = file.with_name(f"{file.name}.edited")
+        assert f"kept as {kept.relative_to(tiny_copy)}; making it again" in run.output
+        assert kept.read_bytes() == content
+        found.pop(str(kept.relative_to(tiny_copy / "results")), None)
     assert found == results_of(tiny)
-    for path in damaged:
-        assert path.exists()
+    assert [file for file in files if not file.exists()] == []
 
 
 def test_what_is_asked_for_is_everything_that_is_made(tiny: Path) -> None:
@@ -94,11 +119,11 @@ def test_what_is_asked_for_is_everything_that_is_made(tiny: Path) -> None:
 
 
 @pytest.fixture
-def mine(study: Path, tmp_path: Path) -> Iterator[dict[Path, str]]:
+def mine(tiny_copy: Path, tmp_path: Path) -> Iterator[dict[Path, str]]:
     """Files of a user's, among the results and beyond links; they are to be what they were."""
     elsewhere = tmp_path / "thesis"
     elsewhere.mkdir()
-    results = study / "results"
+    results = tiny_copy / "results"
     (results / "calibrations").symlink_to(elsewhere)
     (results / "tables" / "link.tex").symlink_to(elsewhere / "chapter.tex")
     files = {
@@ -118,12 +143,12 @@ def mine(study: Path, tmp_path: Path) -> Iterator[dict[Path, str]]:
 
 
 def test_a_run_leaves_files_of_the_users_alone(
-    tiny: Path, study: Path, mine: dict[Path, str]
+    tiny: Path, tiny_copy: Path, mine: dict[Path, str]
 ) -> None:
-    (study / "results" / "tables" / "errors.csv").unlink()
-    run = snakemake(study, config=TINY)
+    (tiny_copy / "results" / "tables" / "errors.csv").unlink()
+    run = snakemake(tiny_copy, config=TINY)
     assert run.status == 0, run.output
-    assert results_of(tiny).items() <= results_of(study).items()
+    assert results_of(tiny).items() <= results_of(tiny_copy).items()
 
 
 def test_a_file_in_the_way_stops_the_run_before_it_starts(tmp_path: Path) -> None:
@@ -138,12 +163,14 @@ def test_a_file_in_the_way_stops_the_run_before_it_starts(tmp_path: Path) -> Non
     assert [path for path in (tmp_path / "results").rglob("*") if path.is_file()] == [mine]
 
 
-def test_looking_changes_nothing(study: Path) -> None:
-    errors = study / "results" / "tables" / "errors.csv"
+def test_looking_changes_nothing(tiny_copy: Path) -> None:
+    errors = tiny_copy / "results" / "tables" / "errors.csv"
     errors.write_text("edited")
-    before = results_of(study)
+    before = results_of(tiny_copy)
+    outputs = {}
     for look in ("-n", "--summary", "--list-rules", "--dag"):
-        run = snakemake(study, look, config=TINY)
+        run = snakemake(tiny_copy, look, config=TINY)
         assert run.status == 0, run.output
-        assert results_of(study) == before
-    assert "a run makes it again" in snakemake(study, "-n", config=TINY).output
+        assert results_of(tiny_copy) == before
+        outputs[look] = run.output
+    assert "a run makes it again" in outputs["-n"]

@@ -2,6 +2,11 @@
 
 By the Illinois rule (Dowell & Jarratt 1971) on the square root of the rise of
 chi^2, which is nearly linear in the quantity's logarithm: a few fits suffice.
+
+References
+----------
+.. [1] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971), 168-174.
 """
 
 from dataclasses import dataclass

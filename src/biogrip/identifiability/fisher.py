@@ -1,4 +1,13 @@
-"""How precisely a trace can determine parameters: Fisher information and Cramer-Rao bounds."""
+"""How precisely a trace can determine parameters: Fisher information and Cramer-Rao bounds.
+
+References
+----------
+.. [1] H. Cramér, Mathematical Methods of Statistics, Princeton University Press, 1946.
+.. [2] C. R. Rao, Information and the accuracy attainable in the estimation of statistical
+   parameters, Bulletin of the Calcutta Mathematical Society 37 (1945).
+.. [3] H. White, A heteroskedasticity-consistent covariance matrix estimator and a direct test
+   for heteroskedasticity, Econometrica 48 (1980), 817-838: noise that changes along the trace.
+"""
 
 import numpy as np
 

@@ -5,6 +5,12 @@ One member of a quantity is eliminated: it follows from the others and the value
 dominates the quantity, chosen anew at every step among those that are not at a
 bound: eliminating another, a small step would throw it far. A stiff residual in
 its place would yield to the trace, the more the better the trace knows.
+
+References
+----------
+.. [1] J. Abadie and J. Carpentier, Generalization of the Wolfe reduced gradient method to the
+   case of nonlinear constraints, in R. Fletcher (ed.), Optimization, Academic Press, 1969,
+   37-47.
 """
 
 from collections.abc import Sequence

@@ -3,6 +3,17 @@
 The rise of the sum of squares over its minimum, in units of the noise's
 variance, is the rise of chi^2. A quantity has a confidence limit where the rise
 is the threshold, and what is returned is the value at which it was found to be.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based
+   confidence intervals, Applied Statistics 37 (1988), 87-94.
+.. [2] D. M. Bates and D. G. Watts, Nonlinear Regression Analysis and Its Applications, Wiley,
+   1988: profiles and the F threshold where the noise is estimated.
+.. [3] A. Raue et al., Structural and practical identifiability analysis of partially observed
+   dynamical models by exploiting the profile likelihood, Bioinformatics 25 (2009), 1923-1929.
+.. [4] M. Dowell and P. Jarratt, A modified regula falsi method for computing the root of an
+   equation, BIT 11 (1971), 168-174: the Illinois rule.
 """
 
 from dataclasses import dataclass

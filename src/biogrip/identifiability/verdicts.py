@@ -85,7 +85,7 @@ class Trade:
     Parameters
     ----------
     members
-        Names of parameters that can be exchanged against each other.
+        Names of parameters that trade against each other.
     finding
         The combination that is determined.
     """

@@ -1,4 +1,11 @@
-"""SciPy's differential evolution on log-parameters, a whole generation evaluated at once."""
+"""SciPy's differential evolution on log-parameters, a whole generation evaluated at once.
+
+References
+----------
+.. [1] R. Storn and K. Price, Differential evolution: a simple and efficient heuristic for
+   global optimization over continuous spaces, Journal of Global Optimization 11 (1997),
+   341-359.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -6,6 +6,17 @@ about the point it starts from: what would leave is fixed at the edge, and the r
 solved for again. No sum runs over problems, nor in an order that depends on how
 many there are: to the last bit, what a problem comes out with does not depend on
 which others are solved with it.
+
+References
+----------
+.. [1] K. Levenberg, A method for the solution of certain non-linear problems in least squares,
+   Quarterly of Applied Mathematics 2 (1944), 164-168.
+.. [2] D. W. Marquardt, An algorithm for least-squares estimation of nonlinear parameters,
+   Journal of the Society for Industrial and Applied Mathematics 11 (1963), 431-441.
+.. [3] J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, in G. A. Watson
+   (ed.), Numerical Analysis, Lecture Notes in Mathematics 630, Springer, 1978, 105-116.
+.. [4] H. B. Nielsen, Damping parameter in Marquardt's method, report IMM-REP-1999-05, Technical
+   University of Denmark, 1999.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,13 @@
-"""From a starting point down to the optimum it leads to, on log-parameters within bounds."""
+"""From a starting point down to the optimum it leads to, on log-parameters within bounds.
+
+References
+----------
+.. [1] M. A. Branch, T. F. Coleman and Y. Li, A subspace, interior, and conjugate gradient
+   method for large-scale bound-constrained minimization problems, SIAM Journal on Scientific
+   Computing 21 (1999), 1-23: `scipy.optimize.least_squares`.
+.. [2] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
+   3.4: Newton's method with the moduli of the curvatures.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

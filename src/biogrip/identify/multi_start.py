@@ -1,4 +1,10 @@
-"""Local fits from several starting points, and the best of them."""
+"""Local fits from several starting points, and the best of them.
+
+References
+----------
+.. [1] A. Raue et al., Lessons learned from quantitative dynamical modeling in systems biology,
+   PLoS ONE 8 (2013), e74335: local fits from many starts.
+"""
 
 from collections.abc import Callable, Iterable
 

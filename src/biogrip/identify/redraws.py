@@ -2,6 +2,11 @@
 
 It is what numpy's `Generator.integers` draws one after the other with bounds for each, by
 Lemire's method from 32-bit words, at a fraction of the time for many generators.
+
+References
+----------
+.. [1] D. Lemire, Fast random integer generation in an interval, ACM Transactions on Modeling
+   and Computer Simulation 29 (2019), article 3.
 """
 
 from collections.abc import Iterator, Sequence

@@ -5,6 +5,11 @@ the gradient vanishes can be found to all of them. Gauss-Newton steps need not l
 there: of an element too weak to be seen, only second derivatives of the residuals
 tell how the gradient changes. So the steps are Newton's, with second derivatives
 from differences of exact gradients; the last ones, with gradients from all samples.
+
+References
+----------
+.. [1] J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed., Springer, 2006, section
+   3.4: Newton's method with the moduli of the curvatures.
 """
 
 import numpy as np

@@ -1,4 +1,11 @@
-"""No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2)."""
+"""No-load calibration: an arm's inertia, damping and stiffness from its free motion (section 2).
+
+References
+----------
+.. [1] J. J. Moré, The Levenberg-Marquardt algorithm: implementation and theory, in G. A. Watson
+   (ed.), Numerical Analysis, Lecture Notes in Mathematics 630, Springer, 1978, 105-116:
+   `scipy.optimize.least_squares`.
+"""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -7,6 +7,14 @@ at as many well-chosen times. So a response is simulated at those, and a square
 matrix turns what it is there into rows whose sum of squares, gradients and all,
 is that of the residuals at every sample. Where samples are dense, that space is
 found on nodes that stand for them (`biogrip.response.dense_samples`).
+
+References
+----------
+.. [1] P. Businger and G. H. Golub, Linear least squares solutions by Householder
+   transformations, Numerische Mathematik 7 (1965), 269-276: QR with column pivoting.
+.. [2] Z. Drmač and S. Gugercin, A new selection operator for the discrete empirical
+   interpolation method, SIAM Journal on Scientific Computing 38 (2016), A631-A648: points of
+   interpolation chosen by it.
 """
 
 from functools import cached_property

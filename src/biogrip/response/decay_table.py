@@ -14,6 +14,11 @@ degree d leaves an error of at most 4 e rho^-d / (rho - 1) sum |a_i|. That is
 1.7e-16 sum |a_i|, no more than rounding, for the wide pieces of high degree that
 need the fewest rates. Looking up is faster in short pieces of low degree, into
 which they are divided; these add 4e-17 sum |a_i|.
+
+References
+----------
+.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
+   convergence of Chebyshev interpolants within a Bernstein ellipse.
 """
 
 from collections.abc import Callable

@@ -8,6 +8,11 @@ before are further away, and a sinusoid of the torque is a polynomial as well on
 piece of a period. So a piece with thousands of samples needs twenty nodes, and sums
 of products over its samples are known from one small matrix, which is summed up block
 by block. Where samples are few, they are the nodes.
+
+References
+----------
+.. [1] L. N. Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013, chapter 8:
+   how fast Chebyshev's coefficients of analytic functions fall.
 """
 
 from collections.abc import Iterator

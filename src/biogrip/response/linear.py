@@ -193,7 +193,13 @@ def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
 
 
 def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
-    """phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n, without cancellation near zero."""
+    """phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n, without cancellation near zero.
+
+    References
+    ----------
+    .. [1] M. Hochbruck and A. Ostermann, Exponential integrators, Acta Numerica 19 (2010),
+       209-286.
+    """
     small = np.abs(z) < 1.0
     near = np.where(small, z, 0)
     series = np.zeros_like(near)

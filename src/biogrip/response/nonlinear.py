@@ -15,6 +15,11 @@ which is small, of second order in the rotation. It is found by repeated
 substitution; each sweep is an implicit collocation (Radau IIA, five stages) of
 uncoupled linear modes on a mesh graded towards the torque's jumps, for all
 samples at once. Inertia acts on the linear part alone.
+
+References
+----------
+.. [1] E. Hairer and G. Wanner, Solving Ordinary Differential Equations II: Stiff and
+   Differential-Algebraic Problems, 2nd ed., Springer, 1996, section IV.5: Radau IIA methods.
 """
 
 from dataclasses import dataclass

@@ -3,6 +3,12 @@
 Both enter linearly, so they are not searched for. Whatever a trace shares with
 their span is taken out of trace and responses alike, and comes back as the
 best offset and drift once the sample is known (variable projection).
+
+References
+----------
+.. [1] G. H. Golub and V. Pereyra, The differentiation of pseudo-inverses and nonlinear least
+   squares problems whose variables separate, SIAM Journal on Numerical Analysis 10 (1973),
+   413-432.
 """
 
 import numpy as np

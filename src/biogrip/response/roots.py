@@ -4,6 +4,15 @@ The coefficients of a gripper-sample polynomial span dozens of decades. An
 eigenvalue solver loses the small roots there; iterating on the polynomial
 itself, from starting radii read off its Newton polygon, keeps every root to
 full relative accuracy.
+
+References
+----------
+.. [1] L. W. Ehrlich, A modified Newton method for polynomials, Communications of the ACM 10
+   (1967), 107-108.
+.. [2] O. Aberth, Iteration methods for finding all zeros of a polynomial simultaneously,
+   Mathematics of Computation 27 (1973), 339-344.
+.. [3] D. A. Bini, Numerical computation of polynomial zeros by means of Aberth's method,
+   Numerical Algorithms 13 (1996), 179-200: starting radii from the Newton polygon.
 """
 
 from itertools import combinations
@@ -39,6 +48,11 @@ def real_quadratic_roots(coefficients: Array) -> Array:
     -------
     (n, 2)
         The fast root first; never closer together than `SMALLEST_GAP`.
+
+    References
+    ----------
+    .. [1] N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., SIAM, 2002,
+       section 1.8: the quadratic formula without cancellation.
     """
     a, b, c = coefficients.T
     discriminant = np.maximum(b * b - 4 * a * c, (SMALLEST_GAP * b) ** 2)

@@ -5,6 +5,13 @@ the arithmetic of the transfer function without touching the real part (complex
 step). Poles, weights and exponentials in time are differentiated by hand, with no
 cancellation at either end. What is found for a sample does not depend, to the last
 bit, on which others are looked at with it.
+
+References
+----------
+.. [1] W. Squire and G. Trapp, Using complex variables to estimate derivatives of real
+   functions, SIAM Review 40 (1998), 110-112.
+.. [2] J. R. R. A. Martins, P. Sturdza and J. J. Alonso, The complex-step derivative
+   approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
 """
 
 from dataclasses import dataclass

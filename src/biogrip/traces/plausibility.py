@@ -9,6 +9,11 @@ a tenth of the protocol, and ten protocols. Three lags are too few to identify
 a sample but enough to find its response under noise; a peak of the samples
 themselves would be one of the noise, and means over blocks would lose a
 sinusoid.
+
+References
+----------
+.. [1] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
+   chapter 23: weights that are not negative.
 """
 
 import math

@@ -13,7 +13,7 @@ from biogrip.products.figures import comb, convergence, linkage, torque
 from biogrip.products.figures.results import scale_of
 from biogrip.products.figures.style import ALL_SEEDS, FITTED, save, styled
 from biogrip.products.product import Product
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
 
 
 def drawn(module: Any) -> Figure:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from biogrip.products.figures import force
 from biogrip.products.figures.style import styled
 from biogrip.products.stages import target
-from tests.products.default import study_of
+from tests.helpers.default import study_of
 
 STUDY = study_of(
     """

@@ -10,7 +10,7 @@ from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.products.files.traces import read_jaw_force, read_target
 from biogrip.products.stages import joined, target
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
 
 
 def settings(torque_Nm: float, *more: Phase, unilateral: bool = False) -> target.Settings:

@@ -4,7 +4,7 @@ import pytest
 
 from biogrip.products.tables import contact_loss
 from biogrip.products.tables.layout import Cell
-from tests.products.default import study_of
+from tests.helpers.default import study_of
 
 
 def rows_of(overlay: str) -> dict[tuple[Cell, Cell], dict[str, Cell]]:

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from biogrip.products.tables import mechanics
-from tests.products.default import STUDY, study_of
+from tests.helpers.default import STUDY, study_of
 
 
 def rows_of(study: object = STUDY) -> list[dict[str, object]]:

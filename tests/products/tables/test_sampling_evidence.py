@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.products.tables.sampling_evidence import sampling_evidence, settings
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
 
 SETTINGS = settings(STUDY)
 

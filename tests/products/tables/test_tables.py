@@ -12,7 +12,7 @@ from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables.errors import ERRORS, Settings, errors
 from biogrip.products.tables.layout import Column, Table, inert, write
-from tests.workflow.conftest import ROOT
+from tests.helpers.places import ROOT
 
 SETTINGS = Settings(
     "drop",

@@ -1,4 +1,4 @@
-"""The valley of c against c_p, and the line along which they trade."""
+"""The valley of c against c_p, along which they trade against each other."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -120,8 +120,8 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
 VALLEY = drawing(
     draw,
     name="valley",
-    caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade, and "
-    "where the fits of all seeds lie in it.",
+    caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade "
+    "against each other, and where the fits of all seeds lie in it.",
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],

@@ -1,4 +1,11 @@
-"""Which sample model is the simplest that a trace asks for."""
+"""Which sample model is the simplest that a trace asks for.
+
+References
+----------
+.. [1] H. Akaike, A new look at the statistical model identification, IEEE Transactions on
+   Automatic Control 19 (1974), 716-723.
+.. [2] G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978), 461-464.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -18,7 +18,7 @@ from biogrip.study.study import Study
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 _DETERMINED_PERCENT = 100.0
-# Where c and c_p trade, each alone is far less certain than their sum.
+# Where c and c_p trade against each other, each alone is far less certain than their sum.
 _TRADING = 2.0
 
 _COLUMNS = (

@@ -9,9 +9,7 @@ from biogrip.products.plan import Plan
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Study
-
-ROOT = Path(__file__).parents[2]
-CONFIG = ROOT / "config" / "config.yaml"
+from tests.helpers.places import CONFIG
 
 
 def study_of(overlay: str = "") -> Study:

@@ -1,16 +1,42 @@
-"""An independent solution of the corrected linear model, with 50 digits.
+"""Protocols and samples to try, and an independent solution with 50 digits.
 
-Nothing here is shared with the library: forces of springs and dampers are
-written down arm by arm, as in the corrected eqs. (4)-(6), and the five
-first-order equations solved through the eigenvectors of their matrix.
+Of the corrected linear model's solution nothing is shared with the library: forces of
+springs and dampers are written down arm by arm, as in the corrected eqs. (4)-(6), and the
+five first-order equations solved through the eigenvectors of their matrix.
 """
 
 import numpy as np
 from mpmath import mp, mpf
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held
 from biogrip.instrument.gripper import Gripper
+
+SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
+PROTOCOLS = {
+    "steps": (held(200.0, 1.6e-9), held(200.0, 0.32e-9)),
+    "ramp, parabola and sinusoid": (
+        Phase(50.0, Load(0.0, 2e-11), Load(0.0, 2e-11)),
+        Phase(150.0, Load(1e-9, 1e-12, 1e-14), Load(1e-9, 1e-12, 1e-14)),
+        Phase(200.0, SWING, SWING),
+    ),
+    "arms driven differently": (held(200.0, 1.6e-9, 1.0e-9), held(200.0, 0.3e-9, 0.5e-9)),
+}
+MODEL_PARAMETERS: dict[str, list[float]] = {
+    "generalized_maxwell": [9.5, 0.3, 10.0, 0.7],
+    "liquid_drop": [9.5, 0.3, 10.0],
+    "damper": [10.0],
+    "kelvin_voigt": [0.3, 10.0],
+    "maxwell": [2.0, 50.0],
+    "zener_maxwell": [2.0, 1.0, 50.0],
+    "zener_kelvin": [3.0, 2.0, 40.0],
+    "burgers": [3.0, 200.0, 2.0, 40.0],
+}
+SAMPLING_TIMES = {
+    "uniform": np.linspace(0.0, 400.0, 4001),
+    "uneven": np.sort(np.random.default_rng(2).uniform(0.0, 400.0, 1500)),
+    "few": np.array([0.0, 1.0, 5.0, 20.0, 199.0, 201.0, 210.0, 390.0]),
+}
 
 
 def rotation_50_digits(

@@ -1,13 +1,12 @@
 """Confidence limits against their definition, on very many traces.
 
-``python -m tests.identifiability.limits_campaign [traces [case ...]]`` takes some 10 minutes for
+``python -m tests.helpers.limits_campaign [traces [case ...]]`` takes some 10 minutes for
 100 traces of a case, one for the ``example`` under twenty names. The test suite has a few.
 """
 
 import functools
 import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -20,15 +19,15 @@ from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import identifier
 from biogrip.identify.problem import Problem, problem_of
-from tests.identifiability.definition import rise_at, rises_along
-from tests.identify.test_methods import MODEL, SAMPLES, problem, run, study_torque
-from tests.products.default import STUDY
+from tests.helpers.default import STUDY
+from tests.helpers.definition import rise_at, rises_along
+from tests.helpers.places import EXAMPLE
+from tests.helpers.problems import MODEL, SAMPLES, problem, run, study_torque
 
 ALLOWED = 0.01
 # Random starts at a limit; steps on the way to one.
 THOROUGH = (24, 24)
 ALIKE = 1e-3
-EXAMPLE = Path(__file__).parents[2] / "data" / "example_trace.csv"
 NAMES = ("example_trace", *(f"trace_{year}" for year in range(2006, 2021)), "a", "b", "zz", "cell")
 
 

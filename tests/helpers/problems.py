@@ -1,0 +1,95 @@
+"""Problems of the default study: its samples, protocol and settings, and traces to be fitted."""
+
+import functools
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
+from biogrip.experiment.sample import MODELS, SampleModel
+from biogrip.identify import least_squares
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.methods import identifier
+from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.default import STUDY
+
+MODEL = MODELS["generalized_maxwell"]
+SAMPLES = {name: case.parameters for name, case in STUDY.cases.items()}
+
+
+def study_torque() -> TorqueHistory:
+    """The default study's protocol."""
+    return torque_history(STUDY.phases)
+
+
+@functools.cache
+def clean(case: str, rate_Hz: float = 1.0) -> tuple[Array, Array]:
+    gripper, torque = STUDY.gripper, study_torque()
+    times = sample_times(400.0, rate_Hz)
+    network = MODEL.network([[SAMPLES[case][name] for name in MODEL.names]])
+    return times, rotation(step_response(gripper, network), torque, times)[0]
+
+
+def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> Problem:
+    times, response = clean(case, rate_Hz)
+    rng = np.random.default_rng([seed, 7])
+    trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
+    gripper, torque = STUDY.gripper, study_torque()
+    ranges = STUDY.ranges
+    return problem_of(gripper, MODEL, torque, times, trace, ranges)
+
+
+def run(method: str, posed: Problem, seed: int = 0) -> Identification:
+    identify = identifier(method, STUDY.config.of_methods.of(method))
+    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
+    return answer
+
+
+SETTINGS: Any = STUDY.config.of_methods.of("least_squares")
+GRIPPER, TORQUE = STUDY.gripper, study_torque()
+RANGES = STUDY.ranges
+
+
+def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
+    """The default study's problem for any model and trace."""
+    return problem_of(
+        STUDY.gripper,
+        model,
+        study_torque(),
+        times,
+        trace,
+        STUDY.ranges,
+    )
+
+
+def posed(
+    times: Array,
+    response: Array,
+    count: int,
+    model: SampleModel = MODEL,
+    level: float = 0.1,
+    *,
+    nonlinear: bool = False,
+) -> list[Problem]:
+    """Problems that share everything but the noise."""
+    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
+    noise = Noise("gaussian", level, "peak")
+    traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
+    return [
+        problem_of(
+            GRIPPER, model, TORQUE, times, trace, RANGES, condensed=condensed, nonlinear=nonlinear
+        )
+        for trace in traces
+    ]
+
+
+def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
+    return posed(*clean(case), count, level=level)
+
+
+def identified(problems: list[Problem], seeds: list[int]) -> list[Identification]:
+    rngs = [np.random.default_rng(seed) for seed in seeds]
+    return least_squares.identify_many(problems, SETTINGS, rngs)

@@ -1,0 +1,188 @@
+"""Every figure, drawn from a small study, is what it was: compared with pictures kept here.
+
+``make pinned`` draws the pictures anew. Look at what has changed before you commit them.
+"""
+
+from collections.abc import Callable
+from itertools import product as all_pairs
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.testing.compare import compare_images
+
+from biogrip.products.catalogue import products
+from biogrip.products.figures import declared
+from biogrip.products.figures import robustness as heat_map
+from biogrip.products.figures.style import styled
+from biogrip.products.heat_maps import heat_maps
+from biogrip.products.plan import Plan
+from biogrip.products.stages.sweep_points import POINTS
+from tests.helpers.default import plan_of, study_of
+from tests.helpers.runs import SMALL
+
+PINNED = Path(__file__).with_name("pinned")
+# Small pictures, in which a line is still a line.
+DPI = 60
+# Root mean square of the difference of all pixels, of 255. Results are the same bytes on every
+# processor; what is left to it are last bits of coordinates, of which antialiasing makes
+# differences of a level or two in a few pixels: some 0.01. A thin line in another colour makes
+# 0.5 or more in the largest figure, which the tests below show.
+TOLERANCE = 0.2
+# Text is set differently by another minor version of Matplotlib, which brings another FreeType.
+VERSION = ".".join(mpl.__version__.split(".")[:2])
+VERSION_FILE = PINNED / "matplotlib-version"
+SWEEP = """
+methods: [genetic, least_squares]
+sweeps:
+  level:
+    title: Level and rate
+    cases: [endothelial_cell, liquid_drop_1, liquid_drop_2]
+    rows: {label: level, unit: "%", unit_in_si: 0.01, key: measurement.noise.level,
+           values: [0, 0.05, 0.2]}
+    columns: {label: rate, unit: Hz, key: measurement.rate_Hz, values: [0.1, 10]}
+"""
+
+Draw = Callable[[str], Figure]
+
+
+def jobs() -> dict[str, tuple[str, dict[str, str]]]:
+    """Figure and wildcards of every picture of the small study, by the picture's name."""
+    plan = plan_of(SMALL)
+    return {
+        Path(figure.writes["png"].format(**job)).stem: (figure.name, dict(job))
+        for figure in products().values()
+        if figure.category == "Figures"
+        for job in figure.jobs(plan)
+    }
+
+
+JOBS = jobs()
+HEAT_MAPS = "robustness_level"
+NAMES = [*JOBS, HEAT_MAPS]
+EACH = pytest.mark.parametrize(
+    ("name", "figure"), [(name, name) for name in NAMES], indirect=["figure"], ids=NAMES
+)
+
+
+@pytest.fixture(scope="module")
+def draw(finished: Path) -> Draw:
+    """Draw a figure by the name of its picture; a figure that was drawn may be changed."""
+
+    def drawn(name: str) -> Figure:
+        figures: list[Figure] = []
+        with pytest.MonkeyPatch.context() as patch:
+            patch.chdir(finished)
+            patch.setattr(declared, "save", lambda figure, _: figures.append(figure))
+            figure, job = JOBS[name]
+            products()[figure].run(Plan(study_of(SMALL), Path("results")), job)
+        return figures[0]
+
+    return drawn
+
+
+@pytest.fixture(scope="module")
+def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """Points of a sweep, of all sizes of numbers and without a bound here and there."""
+    folder = tmp_path_factory.mktemp("points")
+    sweep = study_of(SWEEP).sweeps["level"]
+    files = []
+    for n, case in enumerate(sweep.cases):
+        rows = []
+        grid = list(all_pairs(sweep.rows.values, sweep.columns.values))
+        for i, (row, column) in enumerate(grid):
+            for j, method in enumerate(("genetic", "least_squares")):
+                for q, quantity in enumerate(("k", "k_p", "c", "c_p", "c + c_p")):
+                    share = ((3 * i + 2 * j + n) % 11) / 10
+                    error = 0.004 * 7.0 ** (i + q)
+                    bound = np.nan if row.text == "0" else error * 2.0 ** (i - 3)
+                    values = (row.text, column.text, method, quantity, 20, share, error, bound)
+                    rows.append((f"{case}-{i}", *values))
+        files.append(folder / f"{case}.csv")
+        POINTS.write(files[-1], rows)
+    return files
+
+
+def saved(figure: Figure, path: Path) -> Path:
+    with styled():
+        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+    # A second time, constrained layout would come to another one.
+    figure.set_layout_engine("none")
+    return path
+
+
+def difference(name: str, figure: Figure, folder: Path) -> str | None:
+    """How a figure differs from its pinned picture; a picture of the difference is kept."""
+    actual = saved(figure, folder / f"{name}.png")
+    found = compare_images(str(PINNED / f"{name}.png"), str(actual), TOLERANCE)
+    return None if found is None else str(found)
+
+
+@pytest.fixture
+def figure(request: pytest.FixtureRequest, draw: Draw, judged: list[Path]) -> Figure:
+    """The figure that a test is about, drawn."""
+    if request.param != HEAT_MAPS:
+        return draw(request.param)
+    study = study_of(SWEEP)
+    with styled():
+        return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
+
+
+@pytest.fixture
+def comparable(pinning: bool) -> None:
+    if not pinning and VERSION_FILE.read_text().strip() != VERSION:
+        pytest.skip(f"pictures are pinned with Matplotlib {VERSION_FILE.read_text().strip()}")
+
+
+@pytest.mark.usefixtures("comparable")
+@pytest.mark.parametrize(
+    ("name", "figure"), [(n, n) for n in NAMES], indirect=["figure"], ids=NAMES
+)
+def test_a_figure_is_what_it_was(name: str, figure: Figure, tmp_path: Path, pinning: bool) -> None:
+    """If the change is meant: make pinned."""
+    if pinning:
+        PINNED.mkdir(exist_ok=True)
+        saved(figure, PINNED / f"{name}.png")
+    assert difference(name, figure, tmp_path) is None
+
+
+@pytest.mark.usefixtures("comparable")
+@pytest.mark.parametrize(
+    ("name", "figure"), [(n, n) for n in NAMES], indirect=["figure"], ids=NAMES
+)
+def test_a_change_of_drawing_is_seen(name: str, figure: Figure, tmp_path: Path) -> None:
+    """The colour of one line, or where it is by a fiftieth of the axis; or else one number."""
+    lines = [
+        (axes, line)
+        for axes in figure.axes
+        for line in axes.lines
+        if len(np.atleast_1d(line.get_xdata())) and line.get_visible()
+    ]
+    if not lines:
+        figure.axes[0].texts[0].set_text("8")
+        assert difference(name, figure, tmp_path) is not None
+        return
+    axes, line = lines[-1]
+    colour = line.get_color()
+    line.set_color("#CC79A7")
+    assert difference(name, figure, tmp_path) is not None
+    line.set_color(colour)
+    assert difference(name, figure, tmp_path) is None
+    to_points = axes.transScale + axes.transLimits
+    places = to_points.transform(line.get_xydata()) + 0.02
+    line.set_data(*to_points.inverted().transform(places).T)
+    assert difference(name, figure, tmp_path) is not None
+
+
+def test_every_figure_is_pinned_and_nothing_else(pinning: bool) -> None:
+    if pinning:
+        VERSION_FILE.write_text(f"{VERSION}\n")
+        for path in PINNED.glob("*.png"):
+            if path.stem not in NAMES:
+                path.unlink()
+    assert {path.stem for path in PINNED.glob("*.png")} == set(NAMES)
+    pinned = {JOBS[name][0] for name in JOBS} | {"robustness_map"}
+    assert pinned == {name for name, one in products().items() if one.category == "Figures"}
+    assert sum(path.stat().st_size for path in PINNED.iterdir()) < 1_000_000
