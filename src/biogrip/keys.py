@@ -53,3 +53,13 @@ class Key:
     unique: bool = False
     needed: bool = False
     spread: bool = False
+
+
+def printed(text: str) -> Key:
+    """Define a name in print, of which tables, figures and file formats make no more than text."""
+    return Key(
+        text,
+        pattern=r"(?![ +-])[\w .,:;()+/%'-]{1,60}",
+        form="text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning "
+        "with a space, + or -",
+    )

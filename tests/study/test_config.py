@@ -80,6 +80,23 @@ def test_a_case_may_change_a_block_for_itself(tmp_path: Path) -> None:
     assert other.left.stiffness_Nm_per_rad == 4.4e-7
 
 
+@pytest.mark.parametrize("name", ["unit", "title", "label", "error_percent"])
+def test_a_case_may_have_the_name_of_a_key(tmp_path: Path, name: str) -> None:
+    sample = "{model: generalized_maxwell, k: 2e1, k_p: 5.0, c: 80.0, c_p: 1e-3}"
+    study = load(tmp_path, f"cases: {{{name}: {{sample: {sample}, title: 1e-3 of it}}}}")
+    assert study.cases[name].parameters["c_p"] == 1e-3
+    assert study.cases[name].title == "1e-3 of it"
+
+
+def test_text_that_is_like_a_number_stays_text(tmp_path: Path) -> None:
+    assert load(tmp_path, f"cases: {{x: {{{DROP}, title: 1e-3}}}}").cases["x"].title == "1e-3"
+
+
+def test_more_jobs_than_can_be_planned_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(BiogripError, match=r"line 2: batch_size: found 1, which makes 20000 seeds"):
+        load(tmp_path, "seeds: 20000\nbatch_size: 1")
+
+
 def test_a_case_set_to_nothing_is_dropped(tmp_path: Path) -> None:
     study = load(tmp_path, f"cases: {{liquid_drop_1: null, drop: {{{DROP}}}}}")
     assert list(study.cases) == ["endothelial_cell", "liquid_drop_2", "drop"]

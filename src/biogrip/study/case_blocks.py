@@ -6,159 +6,22 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.noise import Noise
-from biogrip.experiment.sample import MODELS, MOST_BRANCHES, Parameter, Sample, SampleModel
 from biogrip.experiment.truth import Published
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
-from biogrip.instrument.calibrated_gripper import ARM_KEYS
 from biogrip.instrument.calibration import CalibrationTest
-from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, Contact, contact
-from biogrip.instrument.gripper import Gripper
-from biogrip.keys import Key, Problem
+from biogrip.keys import Key, Problem, printed
+from biogrip.study.gripper_block import GripperBlock
+from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.method_blocks import MethodBlocks
 from biogrip.study.protocol_block import ProtocolBlock
-from biogrip.study.trace_file import trace_file_problem
-from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
-
-PRINTED = Key(
-    pattern=r"(?![ +-])[\w .,:;()+/%'-]{1,60}",
-    form="text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning with "
-    "a space, + or -",
-)
-"""What a name in print may be."""
+from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, parameter_problems
 
 EQUATIONS = ("linear", "nonlinear")
 CALIBRATED = "calibrated"
 
-_LEAST_PARAMETER = 1e-18
-_LARGEST_PARAMETER = 1e12
 _MOST_SAMPLES = 10_000_000
-
-_Uncertainties = Annotated[
-    Mapping[Annotated[str, Key(choices=ARM_KEYS)], Annotated[float, Key(low=0, high=1e3)]], Key()
-]
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """Standard uncertainties of a calibrated gripper, arm by arm; information only."""
-
-    left: Annotated[_Uncertainties | None, Key("Uncertainties of the left arm's keys.")] = None
-    right: Annotated[_Uncertainties | None, Key("Uncertainties of the right arm's keys.")] = None
-
-
-@dataclass(frozen=True)
-class GripperBlock(Gripper):
-    """The two arms (Table 1)."""
-
-    jaw_gap_m: Annotated[
-        float,
-        Key("Distance between the jaws in the neutral configuration.", "m", low=1e-9, high=1.0),
-    ]
-    uncertainty: Annotated[Uncertainty | None, Key()] = None
-
-    @property
-    def neutral(self) -> Gripper:
-        """The gripper in its neutral configuration."""
-        return Gripper(self.arm_length_m, self.reference_angle_deg, self.left, self.right)
-
-    def contact(self, comb: CombDrive, size_m: float) -> Contact:
-        """Close it onto a sample."""
-        return contact(self.neutral, self.jaw_gap_m, comb, size_m)
-
-
-@dataclass(frozen=True, kw_only=True)
-class MeasurementBlock:
-    """How the left arm's rotation is recorded."""
-
-    rate_Hz: Annotated[
-        float, Key("Sampling rate; the first sample is at t = 0.", "Hz", low=1e-9, high=1e9)
-    ]
-    times_s: Annotated[
-        tuple[Annotated[float, Key(low=0, high=1e9)], ...],
-        Key(
-            "Sampling times, ascending, instead of a uniform rate; for more of them there is "
-            "rate_Hz.",
-            "s",
-            fewest=2,
-            most=5000,
-        ),
-    ] = ()
-    file: Annotated[
-        str | None,
-        Key(
-            "A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. "
-            'See "Your own measurement".',
-            fewest=1,
-            most=4000,
-        ),
-    ] = None
-    time: Annotated[
-        str | None,
-        Key(
-            "Name of the file's column of times, counted from the start of the protocol.",
-            fewest=1,
-            most=4000,
-        ),
-    ] = None
-    rotation: Annotated[
-        str | None,
-        Key("Name of the file's column of the left arm's closing rotation.", fewest=1, most=4000),
-    ] = None
-    time_unit: Annotated[
-        str | None,
-        Key(
-            "Unit of the times, where the column's name does not end in it.",
-            choices=tuple(TIME_UNITS),
-        ),
-    ] = None
-    rotation_unit: Annotated[
-        str | None,
-        Key(
-            "Unit of the rotations, where the column's name does not end in it.",
-            choices=tuple(ROTATION_UNITS),
-        ),
-    ] = None
-    noise_rad: Annotated[
-        float | None,
-        Key(
-            "Standard deviation of the recorded noise, if it is known; by default that of the "
-            "residual.",
-            "rad",
-            low=1e-15,
-            high=10,
-        ),
-    ] = None
-    offset: Annotated[
-        bool,
-        Key(
-            "Whether the instrument may have added a constant; it is then fitted along. By "
-            "default no."
-        ),
-    ] = False
-    drift: Annotated[
-        bool,
-        Key(
-            "Whether the instrument may have added a drift linear in time; it is then fitted "
-            "along. By default no."
-        ),
-    ] = False
-    noise: Annotated[Noise, Key()]
-
-    def problems(self) -> Iterator[Problem]:
-        """A recorded trace needs a file that is there, and the names of its columns."""
-        if self.file is None:
-            for key in ("time", "rotation", "time_unit", "rotation_unit", "noise_rad"):
-                if getattr(self, key) is not None:
-                    yield (key,), "is only for a recorded trace, whose measurement has a file."
-            return
-        for key in ("time", "rotation"):
-            if getattr(self, key) is None:
-                yield (key,), f"is missing: a recorded trace needs the name of its {key} column."
-        if problem := trace_file_problem(self.file):
-            yield ("file",), problem
 
 
 @dataclass(frozen=True)
@@ -201,76 +64,6 @@ class Identifiability:
     ]
 
 
-@dataclass(frozen=True)
-class SampleBlock:
-    """The sample's constitutive model and its true parameters."""
-
-    model: Annotated[
-        str,
-        Key(
-            'Constitutive model; which parameters it has is listed under "Sample models".',
-            choices=tuple(MODELS),
-        ),
-    ]
-    parameters: Annotated[
-        Mapping[str, Annotated[float, Key(high=_LARGEST_PARAMETER)]],
-        Key("True values of the model's parameters, by name, SI units.", spread=True),
-    ]
-    branches: Annotated[
-        int,
-        Key(
-            "Number of Maxwell branches of `generalized_maxwell`; with more than one, its "
-            "parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
-            low=1,
-            high=MOST_BRANCHES,
-        ),
-    ] = 1
-    size_m: Annotated[
-        float | None,
-        Key(
-            "Diameter of the sample. Decides where the jaws touch it.",
-            "m",
-            low=SMALLEST_M,
-            high=LARGEST_M,
-        ),
-    ] = None
-
-    @property
-    def sample(self) -> Sample:
-        """Which model it has."""
-        return Sample(self.model, self.branches)
-
-    def problems(self) -> Iterator[Problem]:
-        """Find parameters that its model does not have, or not with such values."""
-        if self.branches != 1 and self.model != "generalized_maxwell":
-            yield ("branches",), "only generalized_maxwell has a number of branches."
-            return
-        model = self.sample.model
-        for name in self.parameters:
-            if name not in model.names:
-                text = f"is no parameter of {model.name}, which has {', '.join(model.names)}."
-                yield (name,), text + nearest(name, model.names)
-        yield from _value_problems(model, self.parameters)
-
-    def missing(self) -> Iterator[Problem]:
-        """Find parameters whose true values are not there."""
-        model = self.sample.model
-        for name in model.names:
-            if name not in self.parameters:
-                yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
-
-
-def _value_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
-    """Find parameters that are too small, but for those that may vanish."""
-    there: list[Parameter] = [p for p in model.parameters if p.name in values]
-    for parameter in there:
-        value = values[parameter.name]
-        if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
-            zero = "0 or " if parameter.may_vanish else ""
-            text = f"found {value}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
-            yield (parameter.name,), f"{text} {parameter.unit}."
-
-
 @dataclass(frozen=True, kw_only=True)
 class Shared:
     """Blocks that hold for all cases, and that a case may change for itself."""
@@ -297,11 +90,9 @@ class CaseBlock(Shared):
 
     title: Annotated[
         str | None,
-        Key(
+        printed(
             "Name in print, of letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning "
-            "with a space, + or -; by default the case's name.",
-            pattern=PRINTED.pattern,
-            form=PRINTED.form,
+            "with a space, + or -; by default the case's name."
         ),
     ] = None
     sample: Annotated[SampleBlock, Key()]
@@ -309,7 +100,7 @@ class CaseBlock(Shared):
         Published | None, Key("What the paper reports of this sample; data to compare with.")
     ] = None
     fixed: Annotated[
-        Mapping[str, Annotated[float, Key(low=0, high=_LARGEST_PARAMETER)]] | None,
+        Mapping[str, Annotated[float, Key(low=0, high=LARGEST_PARAMETER)]] | None,
         Key("Parameters that are known and not identified, by name, with their values."),
     ] = None
     contact: Annotated[
@@ -392,7 +183,7 @@ class CaseBlock(Shared):
             if name not in model.names:
                 text = f"is no parameter of the sample, which has {', '.join(model.names)}."
                 yield ("fixed", name), text + nearest(name, model.names)
-        for path, text in _value_problems(model, self.known):
+        for path, text in parameter_problems(model, self.known):
             yield ("fixed", *path), text
         if set(model.names) <= set(self.known):
             yield ("fixed",), "leaves nothing to identify; allowed are fewer parameters."

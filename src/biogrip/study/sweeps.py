@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from biogrip.keys import Key
-from biogrip.study.case_blocks import PRINTED, CaseBlock
+from biogrip.keys import Key, printed
+from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.typed import plain
 
 _LARGEST = 1e12
@@ -20,9 +20,7 @@ _Text = Annotated[str, Key(most=_LONGEST_TEXT)]
 class ValueBlock:
     """Keys that are laid over the block of the axis' key."""
 
-    label: Annotated[
-        str, Key("Name of the value in print.", pattern=PRINTED.pattern, form=PRINTED.form)
-    ]
+    label: Annotated[str, printed("Name of the value in print.")]
     changes: Annotated[Mapping[str, _Number | _Text], Key(spread=True)]
 
 
@@ -30,7 +28,7 @@ class ValueBlock:
 class AxisBlock:
     """What changes along one direction of a sweep's grid."""
 
-    label: Annotated[str, Key("Name in print.", pattern=PRINTED.pattern, form=PRINTED.form)]
+    label: Annotated[str, printed("Name in print.")]
     key: Annotated[
         str | Annotated[tuple[str, ...], Key(fewest=1, most=100, unique=True)],
         Key(
@@ -48,9 +46,7 @@ class AxisBlock:
             unique=True,
         ),
     ]
-    unit: Annotated[
-        str | None, Key("Unit in print.", pattern=PRINTED.pattern, form=PRINTED.form)
-    ] = None
+    unit: Annotated[str | None, printed("Unit in print.")] = None
     unit_in_si: Annotated[
         float, Key("One such unit in that of the key, by default 1.", low=1e-24, high=1e24)
     ] = 1.0
@@ -73,11 +69,7 @@ class SweepBlock:
     columns: Annotated[AxisBlock, Key()]
     title: Annotated[
         str | None,
-        Key(
-            "Name in print; by default the sweep's name.",
-            pattern=PRINTED.pattern,
-            form=PRINTED.form,
-        ),
+        printed("Name in print; by default the sweep's name."),
     ] = None
 
 

@@ -1,0 +1,43 @@
+"""The gripper, as the config says it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.instrument.actuator import CombDrive
+from biogrip.instrument.calibrated_gripper import ARM_KEYS
+from biogrip.instrument.contact import Contact, contact
+from biogrip.instrument.gripper import Gripper
+from biogrip.keys import Key
+
+_Uncertainties = Annotated[
+    Mapping[Annotated[str, Key(choices=ARM_KEYS)], Annotated[float, Key(low=0, high=1e3)]], Key()
+]
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """Standard uncertainties of a calibrated gripper, arm by arm; information only."""
+
+    left: Annotated[_Uncertainties | None, Key("Uncertainties of the left arm's keys.")] = None
+    right: Annotated[_Uncertainties | None, Key("Uncertainties of the right arm's keys.")] = None
+
+
+@dataclass(frozen=True)
+class GripperBlock(Gripper):
+    """The two arms (Table 1)."""
+
+    jaw_gap_m: Annotated[
+        float,
+        Key("Distance between the jaws in the neutral configuration.", "m", low=1e-9, high=1.0),
+    ]
+    uncertainty: Annotated[Uncertainty | None, Key()] = None
+
+    @property
+    def neutral(self) -> Gripper:
+        """The gripper in its neutral configuration."""
+        return Gripper(self.arm_length_m, self.reference_angle_deg, self.left, self.right)
+
+    def contact(self, comb: CombDrive, size_m: float) -> Contact:
+        """Close it onto a sample."""
+        return contact(self.neutral, self.jaw_gap_m, comb, size_m)

@@ -1,0 +1,102 @@
+"""How a trace is recorded, as the config says it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.experiment.noise import Noise
+from biogrip.keys import Key, Problem
+from biogrip.study.trace_file import trace_file_problem
+from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasurementBlock:
+    """How the left arm's rotation is recorded."""
+
+    rate_Hz: Annotated[
+        float, Key("Sampling rate; the first sample is at t = 0.", "Hz", low=1e-9, high=1e9)
+    ]
+    times_s: Annotated[
+        tuple[Annotated[float, Key(low=0, high=1e9)], ...],
+        Key(
+            "Sampling times, ascending, instead of a uniform rate; for more of them there is "
+            "rate_Hz.",
+            "s",
+            fewest=2,
+            most=5000,
+        ),
+    ] = ()
+    file: Annotated[
+        str | None,
+        Key(
+            "A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. "
+            'See "Your own measurement".',
+            fewest=1,
+            most=4000,
+        ),
+    ] = None
+    time: Annotated[
+        str | None,
+        Key(
+            "Name of the file's column of times, counted from the start of the protocol.",
+            fewest=1,
+            most=4000,
+        ),
+    ] = None
+    rotation: Annotated[
+        str | None,
+        Key("Name of the file's column of the left arm's closing rotation.", fewest=1, most=4000),
+    ] = None
+    time_unit: Annotated[
+        str | None,
+        Key(
+            "Unit of the times, where the column's name does not end in it.",
+            choices=tuple(TIME_UNITS),
+        ),
+    ] = None
+    rotation_unit: Annotated[
+        str | None,
+        Key(
+            "Unit of the rotations, where the column's name does not end in it.",
+            choices=tuple(ROTATION_UNITS),
+        ),
+    ] = None
+    noise_rad: Annotated[
+        float | None,
+        Key(
+            "Standard deviation of the recorded noise, if it is known; by default that of the "
+            "residual.",
+            "rad",
+            low=1e-15,
+            high=10,
+        ),
+    ] = None
+    offset: Annotated[
+        bool,
+        Key(
+            "Whether the instrument may have added a constant; it is then fitted along. By "
+            "default no."
+        ),
+    ] = False
+    drift: Annotated[
+        bool,
+        Key(
+            "Whether the instrument may have added a drift linear in time; it is then fitted "
+            "along. By default no."
+        ),
+    ] = False
+    noise: Annotated[Noise, Key()]
+
+    def problems(self) -> Iterator[Problem]:
+        """A recorded trace needs a file that is there, and the names of its columns."""
+        if self.file is None:
+            for key in ("time", "rotation", "time_unit", "rotation_unit", "noise_rad"):
+                if getattr(self, key) is not None:
+                    yield (key,), "is only for a recorded trace, whose measurement has a file."
+            return
+        for key in ("time", "rotation"):
+            if getattr(self, key) is None:
+                yield (key,), f"is missing: a recorded trace needs the name of its {key} column."
+        if problem := trace_file_problem(self.file):
+            yield ("file",), problem

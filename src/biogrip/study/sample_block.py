@@ -1,0 +1,83 @@
+"""The sample, as the config says it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.errors import nearest
+from biogrip.experiment.sample import MODELS, MOST_BRANCHES, Parameter, Sample, SampleModel
+from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
+from biogrip.keys import Key, Problem
+
+LARGEST_PARAMETER = 1e12
+_LEAST_PARAMETER = 1e-18
+
+
+@dataclass(frozen=True)
+class SampleBlock:
+    """The sample's constitutive model and its true parameters."""
+
+    model: Annotated[
+        str,
+        Key(
+            'Constitutive model; which parameters it has is listed under "Sample models".',
+            choices=tuple(MODELS),
+        ),
+    ]
+    parameters: Annotated[
+        Mapping[str, Annotated[float, Key(high=LARGEST_PARAMETER)]],
+        Key("True values of the model's parameters, by name, SI units.", spread=True),
+    ]
+    branches: Annotated[
+        int,
+        Key(
+            "Number of Maxwell branches of `generalized_maxwell`; with more than one, its "
+            "parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
+            low=1,
+            high=MOST_BRANCHES,
+        ),
+    ] = 1
+    size_m: Annotated[
+        float | None,
+        Key(
+            "Diameter of the sample. Decides where the jaws touch it.",
+            "m",
+            low=SMALLEST_M,
+            high=LARGEST_M,
+        ),
+    ] = None
+
+    @property
+    def sample(self) -> Sample:
+        """Which model it has."""
+        return Sample(self.model, self.branches)
+
+    def problems(self) -> Iterator[Problem]:
+        """Find parameters that its model does not have, or not with such values."""
+        if self.branches != 1 and self.model != "generalized_maxwell":
+            yield ("branches",), "only generalized_maxwell has a number of branches."
+            return
+        model = self.sample.model
+        for name in self.parameters:
+            if name not in model.names:
+                text = f"is no parameter of {model.name}, which has {', '.join(model.names)}."
+                yield (name,), text + nearest(name, model.names)
+        yield from parameter_problems(model, self.parameters)
+
+    def missing(self) -> Iterator[Problem]:
+        """Find parameters whose true values are not there."""
+        model = self.sample.model
+        for name in model.names:
+            if name not in self.parameters:
+                yield (name,), f"is missing: {model.name} needs {', '.join(model.names)}."
+
+
+def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
+    """Find parameters that are too small, but for those that may vanish."""
+    there: list[Parameter] = [p for p in model.parameters if p.name in values]
+    for parameter in there:
+        value = values[parameter.name]
+        if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
+            zero = "0 or " if parameter.may_vanish else ""
+            text = f"found {value}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
+            yield (parameter.name,), f"{text} {parameter.unit}."
