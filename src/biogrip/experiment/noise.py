@@ -23,15 +23,16 @@ class Noise:
             low=0,
             high=10,
         ),
-    ]
+    ] = None
     reference: Annotated[
         str,
         Key(
             "What `level` is a share of. `peak`: the largest rotation of the noise-free trace, the "
             "same noise everywhere; `signal`: the noise-free rotation at each instant.",
             choices=("peak", "signal"),
+            needed=True,
         ),
-    ]
+    ] = "peak"
     level_rad: Annotated[
         float | None,
         Key(

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 from biogrip.errors import BiogripError, nearest
+from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Published
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS
