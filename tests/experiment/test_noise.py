@@ -39,13 +39,13 @@ def test_the_peak_is_the_largest_rotation_either_way() -> None:
 
 
 def test_an_instruments_noise_does_not_depend_on_the_sample() -> None:
-    noise = Noise("uniform", None, "peak", 3e-6)
+    noise = Noise("uniform", 0.1, "peak", 3e-6)
     for size in (1e-5, 3e-3):
         rng = np.random.default_rng(0)
         assert rms(add_noise(size * CLEAN, noise, rng) - size * CLEAN) == pytest.approx(
             3e-6, rel=6e-3
         )
     assert not noise.absent
-    for nothing in (Noise("gaussian", 0.0, "peak"), Noise("gaussian", None, "peak", 0.0)):
+    for nothing in (Noise("gaussian", 0.0, "peak"), Noise("gaussian", 0.1, "peak", 0.0)):
         assert nothing.absent
         np.testing.assert_array_equal(add_noise(CLEAN, nothing, rng), CLEAN)

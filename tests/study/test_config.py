@@ -127,9 +127,8 @@ BAD = {
     "protocol: {phases: []}": r"protocol.phases: found a list of 0, allowed are at least 1",
     "protocol: {phases: [{duration_s: 5, torque_Nm: 0}]}": r"phases: no phase has a torque",
     "measurement: {rate_Hz: 1e-6}": r"measurement.rate_Hz: found 1e-06, which gives 1.0004 samples",
-    "measurement: {noise: {level_rad: 1e-6}}": r"my.yaml, line 1: measurement.noise: found level "
-    r"and level_rad, allowed is one of level and level_rad; null takes one away",
-    "measurement: {noise: {level: null}}": r"measurement.noise: found neither, allowed is one",
+    "measurement: {noise: {level_rad: -1e-6}}": r"my.yaml, line 1: measurement.noise.level_rad: "
+    r"found -1e-06, allowed is a number ",
     f"cases: {{x: {{contact: loose, {DROP}}}}}": r"x.contact: found 'loose'. Allowed: bilat",
     f"cases: {{x: {{contact: unilateral, models: {{target: nonlinear}}, {DROP}}}}}": (
         r"my.yaml, line 1: cases.x.contact: found unilateral and a nonlinear target, allowed is "
@@ -173,10 +172,10 @@ def test_bad_config_is_explained(tmp_path: Path, text: str) -> None:
 
 
 def test_contact_and_noise_of_an_instrument(tmp_path: Path) -> None:
-    noise = "measurement: {noise: {level: null, level_rad: 2e-6}}"
+    noise = "measurement: {noise: {level_rad: 2e-6}}"
     case = load(tmp_path, f"cases: {{x: {{contact: unilateral, {noise}, {DROP}}}}}").cases["x"]
     assert case.unilateral
-    assert case.noise == Noise("gaussian", None, "peak", 2e-6)
+    assert case.noise == Noise("gaussian", 0.1, "peak", 2e-6)
     other = load(tmp_path, f"cases: {{x: {{contact: bilateral, {DROP}}}}}").cases["x"]
     assert not other.unilateral
     assert other.noise == Noise("gaussian", 0.1, "peak")

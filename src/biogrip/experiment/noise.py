@@ -1,13 +1,12 @@
 """What the instrument records: the rotation with noise on it."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.keys import Key, Problem
+from biogrip.keys import Key
 
 
 @dataclass(frozen=True)
@@ -16,40 +15,27 @@ class Noise:
 
     kind: Annotated[str, Key("Distribution of the noise.", choices=("gaussian", "uniform"))]
     level: Annotated[
-        float | None,
-        Key(
-            "Standard deviation of the noise, as a share of the reference; `null` where "
-            "`level_rad` is given.",
-            low=0,
-            high=10,
-        ),
-    ] = None
+        float,
+        Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
+    ]
     reference: Annotated[
         str,
         Key(
             "What `level` is a share of. `peak`: the largest rotation of the noise-free trace, the "
             "same noise everywhere; `signal`: the noise-free rotation at each instant.",
             choices=("peak", "signal"),
-            needed=True,
         ),
-    ] = "peak"
+    ]
     level_rad: Annotated[
         float | None,
         Key(
             "Standard deviation of the noise as an instrument has it, the same whatever the "
-            "sample: `{level: null, level_rad: 3.0e-6}`.",
+            "sample, e.g. 3.0e-6. Where it is given, `level` does not count.",
             "rad",
             low=0,
             high=10,
         ),
     ] = None
-
-    def problems(self) -> Iterator[Problem]:
-        """Its size is given once."""
-        given = [key for key in ("level", "level_rad") if getattr(self, key) is not None]
-        if len(given) != 1:
-            found = " and ".join(given) or "neither"
-            yield (), f"found {found}, allowed is one of level and level_rad; null takes one away."
 
     @property
     def absent(self) -> bool:
@@ -97,8 +83,8 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
     (n_samples,)
     """
     magnitude = np.abs(rotation_rad)
-    if noise.level_rad is not None or noise.level is None:
-        return np.full_like(magnitude, noise.level_rad or 0.0)
+    if noise.level_rad is not None:
+        return np.full_like(magnitude, noise.level_rad)
     scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())
     deviation: Array = noise.level * scale
     return deviation
