@@ -29,7 +29,7 @@ DPI = 60
 # Root mean square of the difference of all pixels, of 255. Results are the same bytes on every
 # processor; what is left to it are last bits of coordinates, of which antialiasing makes
 # differences of a level or two in a few pixels: some 0.01. A thin line in another colour makes
-# 0.5 or more in the largest figure, which the tests below show.
+# 0.7 or more in every figure, which the tests below show.
 TOLERANCE = 0.2
 # Text is set differently by another minor version of Matplotlib, which brings another FreeType.
 VERSION = ".".join(mpl.__version__.split(".")[:2])
