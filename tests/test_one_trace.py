@@ -1,6 +1,8 @@
 """`biogrip identify`: one recorded trace from file to verdicts, and what is wrong with bad ones."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -227,3 +229,67 @@ def test_a_trace_of_any_name_is_read(
     file = written(tmp_path / name, times, -values)
     assert main(["identify", str(file)]) == 1
     assert "found a rotation that goes against the torque" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("trace.csv", "trace.csv: is read; allowed is another file to write."),
+        ("link.csv", "link.csv: is read; allowed is another file to write."),
+        ("mine.json", "mine.json: is there, and biogrip did not write it; allowed is another name"),
+        ("link.json", "link.json: is there, and biogrip did not write it; allowed is another name"),
+        (".", "cannot be written; allowed is a file in a folder that you may write to."),
+        ("nowhere/x.json", "cannot be written; allowed is a file in a folder that you may write"),
+        ("x" * 300, "cannot be written: File name too long."),
+        ("x" * 250, "cannot be written: File name too long."),
+        ("x" * 300 + "/a.json", "cannot be written; allowed is a file in a folder that you may"),
+    ],
+)
+def test_an_output_that_cannot_be_written_is_refused_at_once(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, name: str, said: str
+) -> None:
+    trace, mine = tmp_path / "trace.csv", tmp_path / "mine.json"
+    trace.write_bytes(EXAMPLE.read_bytes())
+    mine.write_text('{"mine": 1}')
+    (tmp_path / "link.csv").symlink_to(trace)
+    (tmp_path / "link.json").symlink_to(mine)
+    before = sorted(tmp_path.iterdir())
+    assert main(["identify", str(trace), "--output", f"{tmp_path}/{name}"]) == 1
+    assert said in capsys.readouterr().err
+    assert sorted(tmp_path.iterdir()) == before
+    assert trace.read_bytes() == EXAMPLE.read_bytes()
+    assert mine.read_text() == '{"mine": 1}'
+
+
+def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path) -> None:
+    output = tmp_path / "found.json"
+    output.write_text("mine")
+    assert main(["identify", str(EXAMPLE), "--output", str(output), "--force"]) == 0
+    written = output.read_bytes()
+    assert main(["identify", str(EXAMPLE), "--output", str(output)]) == 0
+    assert output.read_bytes() == written
+
+
+@pytest.mark.parametrize("command", ["verify", "clean", "identify --config", "compare", "publish"])
+def test_a_path_that_no_system_allows_is_one_message(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    given = {
+        "identify --config": ["identify", str(EXAMPLE), "--output", "x.json", "--config"],
+        "compare": ["compare", "."],
+        "publish": ["publish", "."],
+    }
+    assert main([*given.get(command, [command]), "x" * 300]) == 1
+    said = capsys.readouterr().err
+    assert said.startswith("biogrip: ")
+    assert said.count("\n") == 1
+
+
+def test_nobody_reading_on_is_no_error(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "biogrip", "clean", str(tmp_path)]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    os.close(writer)
+    assert done.returncode == 128 + signal.SIGPIPE
+    assert done.stderr == ""

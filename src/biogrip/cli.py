@@ -16,6 +16,7 @@ from biogrip.files import refuse_inputs, watched
 from biogrip.running.journal import recorded_in
 
 RESULTS = Path("results")
+_SHOWN = 200
 
 # Imports stay inside their command: a job pays only for what it uses.
 
@@ -38,8 +39,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 stack.enter_context(watched(_refuse_others))
                 stack.enter_context(recorded_in(RESULTS))
             options.command(options)
+            sys.stdout.flush()
     except BiogripError as error:
         print(f"biogrip: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # Whoever was reading has gone. Python would say so once more on its way out.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 128 + signal.SIGPIPE
+    except OSError as error:
+        # What only the system knows of a path: no permission, too long a name, ...
+        place = "" if error.filename is None else f"{str(error.filename)[:_SHOWN]}: "
+        print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("biogrip: stopped; nothing was written by halves.", file=sys.stderr)

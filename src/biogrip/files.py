@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
@@ -32,7 +32,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     BiogripError
         If the file cannot be written.
     """
-    scratch = path.with_name(f".{path.name}.{os.getpid()}.part")
+    scratch = scratch_of(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
@@ -42,7 +42,14 @@ def written_whole(path: Path) -> Iterator[Path]:
     except OSError as error:
         raise BiogripError(f"{path}: cannot be written: {error.strerror or error}.") from error
     finally:
-        scratch.unlink(missing_ok=True)
+        # Why it could not be written is said already.
+        with suppress(OSError):
+            scratch.unlink(missing_ok=True)
+
+
+def scratch_of(path: Path) -> Path:
+    """Where this process writes a file before it is whole."""
+    return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
 def write_text(path: Path, text: str) -> None:
@@ -59,7 +66,8 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     BiogripError
         Names the first.
     """
-    read = [path for path in inputs if path.exists()]
+    # Of a path that no system allows, Path.exists raises what it thinks of it.
+    read = [path for path in inputs if os.path.exists(path)]
     for output in outputs:
-        if output.exists() and any(output.samefile(path) for path in read):
+        if os.path.exists(output) and any(output.samefile(path) for path in read):
             raise BiogripError(f"{output}: is read; allowed is another file to write.")

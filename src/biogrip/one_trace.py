@@ -15,7 +15,7 @@ from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import MODELS
-from biogrip.files import write_text
+from biogrip.files import scratch_of, write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import identifier
@@ -84,10 +84,17 @@ def check_output(output: Path, *, force: bool) -> None:
         If it cannot be written or must not be replaced.
     """
     folder = output.parent
-    if output.is_dir() or not folder.is_dir() or not os.access(folder, os.W_OK):
+    if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         raise BiogripError(
             f"{output}: cannot be written; allowed is a file in a folder that you may write to."
         )
+    for place in (output, scratch_of(output)):
+        try:
+            os.lstat(place)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise BiogripError(f"{output}: cannot be written: {error.strerror}.") from error
     if os.path.lexists(output) and not force and not _is_ours(output):
         raise BiogripError(
             f"{output}: is there, and biogrip did not write it; allowed is another name, "

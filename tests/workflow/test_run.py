@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -96,6 +97,65 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
         output, _ = run.communicate(timeout=120)
     assert run.returncode == 0, output
     assert target.stat().st_mtime_ns == done
+
+
+@pytest.mark.parametrize("loaded", ["_yaml", "snakemake_process", "matplotlib"])
+def test_a_run_is_stopped_in_a_line_while_it_starts(tmp_path: Path, loaded: str) -> None:
+    """While configs are checked, while Snakemake is loaded, and while it plans."""
+    (tmp_path / "my.yaml").write_text(TINY)
+    with biogrip(tmp_path, "run", "my.yaml", "-j2") as run:
+        give_up = time.monotonic() + 60
+        while not any(loaded in line for line in loads(run.pid)):
+            assert time.monotonic() < give_up
+            assert run.poll() is None
+            time.sleep(0.01)
+        os.kill(run.pid, signal.SIGINT)
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 128 + signal.SIGINT
+    assert "Traceback" not in output
+    assert output.splitlines()[-1].endswith("to go on: biogrip run my.yaml -j2")
+
+
+def loads(pid: int) -> list[str]:
+    """What a run, and Snakemake in it, are and have mapped."""
+    found = []
+    for process in (psutil.Process(pid), *psutil.Process(pid).children()):
+        with suppress(psutil.Error, OSError):
+            found += [*process.cmdline(), *(m.path for m in process.memory_maps())]
+    return found
+
+
+def test_a_run_in_the_background_of_a_script_is_stopped_too(tmp_path: Path) -> None:
+    """There SIGINT is ignored, which programs that are started go on doing."""
+    (tmp_path / "my.yaml").write_text(TINY)
+    command = [sys.executable, "-m", "biogrip", "run", "my.yaml", "-j2"]
+    ignoring = "import os, signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); "
+    starting = f"{ignoring}os.execv(sys.executable, {command!r})"
+    with subprocess.Popen(
+        [sys.executable, "-c", starting], cwd=tmp_path, stderr=subprocess.PIPE, text=True
+    ) as run:
+        give_up = time.monotonic() + 120
+        while not list((tmp_path / "results").glob("measurements/*/*.parquet")):
+            assert time.monotonic() < give_up
+            time.sleep(0.05)
+        os.kill(run.pid, signal.SIGINT)
+        time.sleep(0.5)
+        assert run.poll() is None
+        os.kill(run.pid, signal.SIGTERM)
+        _, said = run.communicate(timeout=60)
+    assert run.returncode == 128 + signal.SIGTERM
+    assert said.splitlines()[-1].startswith("biogrip: stopped by SIGTERM")
+
+
+def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    for name, found in (("file", "found a file"), ("file/x", "Not a directory"), ("x" * 300, "")):
+        with biogrip(tmp_path, "run", "--directory", name, "-n") as run:
+            output, _ = run.communicate(timeout=60)
+        assert run.returncode == 1
+        assert output.startswith("biogrip: --directory: ")
+        assert f"{found}, allowed is a folder.\n" in output if found else "too long" in output
+        assert output.count("\n") == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)

@@ -4,19 +4,20 @@ import argparse
 import os
 import shlex
 import signal
+import stat
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import chdir, contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import chdir, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
 from biogrip.errors import BiogripError
-from biogrip.study.defaults import default_config, snakefile
-from biogrip.study.load import load_study, read_configs
 
+# What is large is imported by who uses it: until then no signal would be answered.
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SHOWN = 6
+_LONGEST = 200
 
 
 def run(arguments: Sequence[str]) -> int:
@@ -38,12 +39,34 @@ def run(arguments: Sequence[str]) -> int:
     BiogripError
         If a config cannot be used. Nothing has been started then.
     """
+    signals = _Signals()
+    try:
+        with signals.handled():
+            status = _run(arguments, signals)
+    except _Stopped:
+        status = 1
+    if signals.first is None:
+        return status
+    again = shlex.join(["biogrip", "run", *arguments])
+    print(
+        f"biogrip: stopped by {signals.first.name}. Nothing that is done is lost; "
+        f"to go on: {again}",
+        file=sys.stderr,
+    )
+    return 128 + signals.first
+
+
+def _run(arguments: Sequence[str], signals: "_Signals") -> int:
+    from biogrip.study.defaults import default_config, snakefile
+
     overlays, rest = _split(arguments)
     known = _known(rest)
     folder = Path(known.directory or ".")
+    _check_folder(folder)
     configs = [Path(name).absolute() for name in overlays]
     _check([default_config(), *configs], folder)
-    command = [sys.executable, "-m", "snakemake", "--snakefile", str(snakefile()), *rest]
+    command = [sys.executable, "-m", "biogrip.running.snakemake_process"]
+    command += ["--snakefile", str(snakefile()), *rest]
     if not known.cores and not known.profile:
         command += ["--cores", "all"]
     if not known.dry_run and known.quiet is None:
@@ -51,21 +74,29 @@ def run(arguments: Sequence[str]) -> int:
         command += ["--quiet", "host", "reason"]
     if configs:
         command += ["--configfile", *map(str, configs)]
-    status, stopped = _supervised(command)
-    again = shlex.join(["biogrip", "run", *arguments])
-    if stopped is not None:
-        print(
-            f"biogrip: stopped by {stopped.name}. Nothing that is done is lost; to go on: {again}",
-            file=sys.stderr,
-        )
-        return 128 + stopped
-    if status == 0 and not known.dry_run:
+    status = signals.supervise(command)
+    if status == 0 and signals.first is None and not known.dry_run:
         print(_to_open(folder / "results"))
     return status
 
 
+def _check_folder(folder: Path) -> None:
+    """Refuse a place that Snakemake could not run in; it would make one that is not there."""
+    try:
+        found = None if stat.S_ISDIR(folder.stat().st_mode) else "found a file"
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        found = error.strerror
+    if found:
+        shown = str(folder)[:_LONGEST]
+        raise BiogripError(f"--directory: {shown}: {found}, allowed is a folder.")
+
+
 def _check(configs: list[Path], folder: Path) -> None:
     """Check the study as Snakemake will see it, from the folder that it will run in."""
+    from biogrip.study.load import load_study, read_configs
+
     merged = read_configs(configs)
     # Traces are named from there; before the first run it need not exist.
     with chdir(folder if folder.is_dir() else "."):
@@ -98,32 +129,57 @@ def _known(rest: list[str]) -> argparse.Namespace:
     return known
 
 
-def _supervised(command: list[str]) -> tuple[int, signal.Signals | None]:
-    """Run a command in a process group of its own, and hand it the signals that we get.
-
-    So that it gets each of them once, whether from the terminal or from a scheduler.
-    """
-    got: list[signal.Signals] = []
-    child = subprocess.Popen(command, start_new_session=True)
-
-    def pass_on(number: int, _: FrameType | None) -> None:
-        got.append(signal.Signals(number))
-        # Snakemake ends at once on SIGINT; on SIGTERM it would first wait for its jobs.
-        os.killpg(child.pid, signal.SIGINT)
-
-    with _handled(pass_on):
-        status = child.wait()
-    return status, got[0] if got else None
+class _Stopped(BaseException):
+    """A signal came before there was anything to stop."""
 
 
-@contextmanager
-def _handled(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
-    before = {number: signal.signal(number, handler) for number in _STOPS}
-    try:
-        yield
-    finally:
-        for number, old in before.items():
-            signal.signal(number, old)
+class _Signals:
+    """The signals that stop a run, handed to Snakemake once it is there."""
+
+    def __init__(self) -> None:
+        self.first: signal.Signals | None = None
+        self._starting = False
+        self._child: subprocess.Popen[bytes] | None = None
+
+    @contextmanager
+    def handled(self) -> Iterator[None]:
+        """Take the signals meanwhile, but for those that are ignored, as with ``nohup``."""
+        taken = [number for number in _STOPS if signal.getsignal(number) != signal.SIG_IGN]
+        before = {number: signal.signal(number, self._got) for number in taken}
+        try:
+            yield
+        finally:
+            for number, old in before.items():
+                signal.signal(number, old)
+
+    def supervise(self, command: list[str]) -> int:
+        """Run a command in a process group of its own, and return its exit status.
+
+        So that it gets each signal once, whether from the terminal or from a scheduler.
+        """
+        self._starting = True
+        # It lets SIGINT through when it is ready to end by it.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._child = subprocess.Popen(command, start_new_session=True)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if self.first is not None:
+            self._pass_on(self._child)
+        return self._child.wait()
+
+    def _got(self, number: int, _: FrameType | None) -> None:
+        self.first = self.first or signal.Signals(number)
+        if self._child is not None:
+            self._pass_on(self._child)
+        elif not self._starting:
+            raise _Stopped
+
+    def _pass_on(self, child: "subprocess.Popen[bytes]") -> None:
+        # It may have ended just now.
+        with suppress(ProcessLookupError):
+            # Snakemake ends at once on SIGINT; on SIGTERM it would first wait for its jobs.
+            os.killpg(child.pid, signal.SIGINT)
 
 
 def _to_open(results: Path) -> str:
