@@ -81,11 +81,13 @@ docs: $(READY)
 pinned: $(READY)
 	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
 
-# Needs uv. The second lock holds only what running on Slurm adds to the first.
+# Needs uv. The other locks hold only what running on Slurm, and benchmarks, add to the first.
 lock:
 	$(LOCK) --extra dev --output-file requirements.lock
-	$(LOCK) --extra slurm --constraints requirements.lock --output-file requirements-slurm.lock \
-	  $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock)
+	for extra in slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
+	  $(LOCK) --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
+	    $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock) || exit 1; \
+	done
 
 # Of the results only what the study wrote.
 clean:

@@ -1,21 +1,26 @@
 """How far an identification is from what the machine can do at all."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from benchmarks.batch import BATCH
 from benchmarks.section import Row, Section, number
 from benchmarks.setup import Problem, problem
+from benchmarks.starts import Started, fitted, started
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array
 from biogrip.identify.genetic import evolve
+from biogrip.identify.problem import condensed_of
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.response.mode_rows import ModeRows
+from biogrip.response.sensitivity import Modes
 
 _ROUNDS = 15
-_SEEDS, _NONLINEAR_SEEDS = 15, 3
+_SEEDS, _NONLINEAR_SEEDS, _FITTED = 15, 3, 5
 _LARGE = 1500
 _FEW, _MANY = 1000, 4000
 
@@ -27,7 +32,11 @@ machine's own rate, that of numpy's product of two {_LARGE} x {_LARGE} matrices;
 table takes its exponentials and a weighted sum. From then on the misfit runs over no samples. What
 is left is a hundred calls of numpy on short arrays: the misfit of one individual is what the calls
 themselves cost, and what one individual more costs, from {_FEW} to {_MANY}, is their arithmetic.
-The limit of a generation's misfit is that arithmetic alone."""
+The limit of a generation's misfit is that arithmetic alone. Local fits are those of {BATCH} traces
+side by side, as above. At every point that a fit tries, two matrix products cannot be avoided:
+amplitudes and places of the modes times the table of their rows, for the response and its
+derivatives; and these rows times themselves, for the normal equations. The limit of the fits is
+these products at the machine's rate."""
 
 
 class Watched(SeriesMisfit):
@@ -59,6 +68,45 @@ def watched(p: Problem) -> Watched:
     return misfit
 
 
+class WatchedRows(ModeRows):
+    """Counts operations of products of rows of responses, and keeps the time spent in all of them.
+
+    Parameters
+    ----------
+    rows
+        What is watched.
+    """
+
+    def __init__(self, rows: ModeRows) -> None:
+        vars(self).update(vars(rows))
+        self.start()
+
+    def start(self) -> None:
+        """Count from here."""
+        self.evaluations, self.operations, self.spent_s = 0, 0, 0.0
+
+    def __call__(self, modes: Modes) -> Array:
+        """Rows of responses and of their derivatives."""
+        spent_s, found = clocked(partial(super().__call__, modes))
+        self.spent_s += spent_s
+        count, functions, rows = found.shape
+        _, drives, powers, _ = self._table.shape
+        inner = modes.rates.shape[1] * drives * powers
+        self.evaluations += count
+        self.operations += 2 * count * functions * rows * (inner + functions)
+        return found
+
+
+def watched_fits(problems: Sequence[Problem]) -> tuple[WatchedRows, list[Started]]:
+    """Return traces to fit, and what watches the rows of all of their responses."""
+    first = problems[0]
+    condensed = condensed_of(first.steps, first.time_s, offset=False, drift=False)
+    rows = WatchedRows(condensed.of_modes)
+    # Made once and kept there.
+    vars(condensed)["of_modes"] = rows
+    return rows, started(problems, condensed)
+
+
 def limit_section() -> Section:
     """Measure shares, rates and what the rates would allow."""
     p = problem()
@@ -88,10 +136,11 @@ def limit_section() -> Section:
         _row(f"misfit of {children} individuals", children_ms, "ms"),
         _row("limit: arithmetic alone", children * another_ms, "ms"),
         _row("misfit over its limit", children_ms / (children * another_ms), "times"),
+        *_fits([problem(seed) for seed in range(BATCH)], large_rate),
     ]
     columns: dict[str, Callable[[Row], str]] = {
         "quantity": lambda row: row["quantity"],
-        "value": lambda row: f"{number(row['value'])} {row['unit']}",
+        "value": lambda row: f"{number(row['value'])} {row['unit']}".strip(),
     }
     return Section("limit", "Distance to the limit", _TEXT, columns, rows)
 
@@ -126,6 +175,25 @@ def _shares(p: Problem) -> list[Row]:
         _row("of which in the misfit", 100 * misfit_s / whole_s, "%"),
         _row("identification on the nonlinear model", 1e3 * nonlinear_s / _NONLINEAR_SEEDS, "ms"),
         _row("of which in the nonlinear misfit", 100 * spent_s / nonlinear_s, "%"),
+    ]
+
+
+def _fits(problems: Sequence[Problem], large_rate: float) -> list[Row]:
+    """How long local fits take, and what of it the products would at a rate in GFLOP/s."""
+    rows, traces = watched_fits(problems)
+    timed = alternate({"fits": partial(fitted, traces)}, _FITTED)
+    rows.start()
+    whole_s, _ = clocked(partial(fitted, traces))
+    fits_ms = timed.median_ms("fits") / len(traces)
+    operations = rows.operations / len(traces)
+    limit_ms = 1e-6 * operations / large_rate
+    return [
+        _row("local fits of one trace of the batch", fits_ms, "ms"),
+        _row("of which in rows of responses", 100 * rows.spent_s / whole_s, "%"),
+        _row("their evaluations", rows.evaluations / len(traces), ""),
+        _row("their products: operations", 1e-6 * operations, "million"),
+        _row("limit: these products alone", limit_ms, "ms"),
+        _row("local fits over their limit", fits_ms / limit_ms, "times"),
     ]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-PEERS = ("deap", "pygad", "pymoo")
+PEERS = ("deap", "lmfit", "pygad", "pymoo", "pypesto")
 
 
 def machine() -> dict[str, str]:

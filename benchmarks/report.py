@@ -8,11 +8,14 @@ from benchmarks import identification, misfit
 from benchmarks.growth import growth_section
 from benchmarks.identification import identification_section
 from benchmarks.limit import limit_section
+from benchmarks.local_fits import local_fits_section
 from benchmarks.machine import machine
 from benchmarks.misfit import misfit_section
 from benchmarks.nonlinear import nonlinear_section
 from benchmarks.optimum import optimum_section
+from benchmarks.profiles import profiles_section
 from benchmarks.section import Section, markdown, number
+from benchmarks.study import study_section
 from benchmarks.timing import clocked
 from biogrip.files import write_text, written_whole
 from biogrip.products.figures.style import styled
@@ -23,9 +26,12 @@ SECTIONS = (
     misfit_section,
     identification_section,
     nonlinear_section,
+    local_fits_section,
+    profiles_section,
     optimum_section,
     growth_section,
     limit_section,
+    study_section,
 )
 
 # Section, peer and how many times faster than it this project means to be.

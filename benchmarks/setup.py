@@ -1,6 +1,6 @@
 """The problem that all benchmarks share: one noisy trace of the default study."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +14,9 @@ from biogrip.experiment.sample import SampleModel, model_named
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
-from biogrip.identify.problem import problem_of
+from biogrip.identify.problem import condensed_of, problem_of
 from biogrip.instrument.gripper import Gripper
+from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import misfit_of
 from biogrip.study.load import load_study
@@ -71,10 +72,16 @@ class Problem:
             self.gripper, self.model, self.steps, self.time_s, self.trace_rad, nonlinear=nonlinear
         )
 
-    def posed(self) -> Posed:
+    def posed(self, condensed: Condensed | None = None) -> Posed:
         """Pose the identification as the study does."""
         return problem_of(
-            self.gripper, self.model, self.steps, self.time_s, self.trace_rad, self.ranges
+            self.gripper,
+            self.model,
+            self.steps,
+            self.time_s,
+            self.trace_rad,
+            self.ranges,
+            condensed=condensed,
         )
 
     def population(self, count: int = POPULATION) -> Array:
@@ -124,3 +131,10 @@ def problem(
         genetic,
         chosen.block.of_methods,
     )
+
+
+def posed_together(problems: Sequence[Problem], condensed: Condensed | None = None) -> list[Posed]:
+    """Pose the identification of traces of one case, condensed once for all as in the study."""
+    first = problems[0]
+    condensed = condensed or condensed_of(first.steps, first.time_s, offset=False, drift=False)
+    return [p.posed(condensed) for p in problems]

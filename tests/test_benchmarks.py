@@ -1,24 +1,32 @@
 """What of the benchmarks can be checked without a clock."""
 
 import math
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import yaml
 
 from benchmarks.batch import in_batch
-from benchmarks.limit import watched
+from benchmarks.limit import watched, watched_fits
 from benchmarks.misfit import by_lsim, by_radau, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.section import number
-from benchmarks.setup import Problem, problem
+from benchmarks.setup import CONFIG, Problem, problem
+from benchmarks.starts import fitted, started
+from benchmarks.study import by_rule, in_order, processor_s
 from benchmarks.timing import Timed, alternate, time_to_success
 from biogrip.identify.genetic import evolve
 from biogrip.identify.genome import Genome
 from biogrip.response.nonlinear import nonlinear_rotation
+from biogrip.study.load import load_study
+from biogrip.study.study import Study
 
 if TYPE_CHECKING:
     from benchmarks.genetic_peers import Task
@@ -57,6 +65,48 @@ def test_the_watched_misfit_is_the_misfit(noisy: Problem) -> None:
     assert misfit.misfit_s > 0
     # The trace is summed over for the table alone.
     assert (misfit.rates, misfit.sums_s) == (rates, sums_s)
+
+
+def test_the_watched_fits_are_the_fits(noisy: Problem) -> None:
+    rows, traces = watched_fits([noisy])
+    rows.start()
+    np.testing.assert_array_equal(fitted(traces), fitted(started([noisy])))
+    assert rows.evaluations > len(traces[0].starts)
+    # Two modes and four parameters: products of 5 x 12 with 12 x rows, and of 5 x rows with rows.
+    some_rows = traces[0].posed.residuals.condensed_trace.size
+    assert rows.operations == 2 * rows.evaluations * 5 * (12 + 5) * some_rows
+    assert rows.spent_s > 0
+
+
+@pytest.fixture(scope="module")
+def study() -> Study:
+    return load_study(yaml.safe_load(CONFIG.read_text()), [CONFIG])
+
+
+def test_jobs_come_after_what_they_read(study: Study) -> None:
+    made: set[str] = set()
+    jobs = in_order(study)
+    for job in jobs:
+        needed = {
+            file for files in job.sheet.inputs(job.wildcards).values() for file in map(str, files)
+        }
+        assert needed <= made
+        made |= set(job.outputs)
+    assert len(jobs) > 50
+
+
+def test_processor_time_of_jobs_is_added_up_by_rule(study: Study, tmp_path: Path) -> None:
+    targets = [job for job in in_order(study) if job.sheet.name == "target"][:2]
+    target, total = by_rule(targets, study, tmp_path)
+    assert (target["rule"], target["jobs"]) == ("target", 2)
+    assert target["starting_s"] > 0
+    assert total["processor_s"] == target["processor_s"] > 0
+    assert all((tmp_path / file).exists() for job in targets for file in job.outputs)
+
+
+def test_a_job_that_fails_is_no_measurement(tmp_path: Path) -> None:
+    with pytest.raises(subprocess.CalledProcessError):
+        processor_s([sys.executable, "-c", "raise SystemExit(1)"], tmp_path)
 
 
 def test_ratios_are_taken_turn_by_turn() -> None:
@@ -176,3 +226,26 @@ class TestPeers:
         for method in METHODS.values():
             found = method(p, np.random.default_rng(0))
             assert misfit(found[None])[0] < 1.001 * misfit(p.truth[None])[0]
+
+    def test_local_fits_reach_the_same_optima(self) -> None:
+        pytest.importorskip("lmfit")
+        pytest.importorskip("pypesto")
+        from benchmarks.local_fits import OURS, PEERS, SIDE_BY_SIDE, compared
+
+        traces = [
+            replace(trace, starts=trace.starts[:4]) for trace in started([problem(0), problem(1)])
+        ]
+        rows = compared(traces, few=1, rounds=1)
+        assert [row["library"] for row in rows] == [OURS, SIDE_BY_SIDE, *PEERS]
+        assert all(row["largest_chi2_above_best"] < 0.1 for row in rows)
+        assert rows[0]["times_ours"] == rows[1]["times_side_by_side"] == 1.0
+
+    def test_limits_agree(self) -> None:
+        pytest.importorskip("lmfit")
+        pytest.importorskip("pypesto")
+        from benchmarks.profiles import PYPESTO, compared
+
+        rows = {row["library"]: row for row in compared([problem(0), problem(1)], rounds=1)}
+        # Interpolated over steps as wide as the interval, or wider.
+        assert rows.pop(PYPESTO)["largest_error_deviations"] > 1
+        assert all(row["largest_error_deviations"] < 0.1 for row in rows.values())

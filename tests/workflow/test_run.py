@@ -3,6 +3,8 @@
 import os
 import re
 import signal
+import subprocess
+import sys
 import time
 from contextlib import suppress
 from pathlib import Path
@@ -103,7 +105,7 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
 def test_a_run_is_stopped_in_a_line_while_it_starts(tmp_path: Path, loaded: str) -> None:
     """While configs are checked, while Snakemake is loaded, and while it plans."""
     (tmp_path / "my.yaml").write_text(TINY)
-    with biogrip(tmp_path, "run", "my.yaml", "-j2") as run:
+    with started(tmp_path, "run", "my.yaml", "-j2") as run:
         give_up = time.monotonic() + 60
         while not any(loaded in line for line in loads(run.pid)):
             assert time.monotonic() < give_up
@@ -150,7 +152,7 @@ def test_a_run_in_the_background_of_a_script_is_stopped_too(tmp_path: Path) -> N
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for name, found in (("file", "found a file"), ("file/x", "Not a directory"), ("x" * 300, "")):
-        with biogrip(tmp_path, "run", "--directory", name, "-n") as run:
+        with started(tmp_path, "run", "--directory", name, "-n") as run:
             output, _ = run.communicate(timeout=60)
         assert run.returncode == 1
         assert output.startswith("biogrip: --directory: ")
