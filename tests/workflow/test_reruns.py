@@ -74,7 +74,7 @@ def test_an_odd_number_of_seeds_is_kept_too(study: Path) -> None:
         ("rate_Hz: 1.0", "rate_Hz: 2.0", {"target", "measurement", "identification"}),
         ("rate_Hz: 1.0", "rate_Hz: 1.0, noise: {level: 0.2}", {"measurement", "identification"}),
         ("population: 60", "population: 62", {"identification"}),
-        ("seeds: 4", "seeds: 4\nevaluation: {noise_floor_tolerance: 0.03}", set()),
+        ("seeds: 4", "seeds: 4\nevaluation: {near_noise_tolerance: 0.03}", set()),
     ],
 )
 def test_a_setting_reruns_what_depends_on_it(

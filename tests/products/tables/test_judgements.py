@@ -29,7 +29,7 @@ def rows(table: Table) -> list[dict[str, Any]]:
 def settings(parameters: dict[str, float], samples: int) -> Settings:
     """Of one case, a drop."""
     truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
-    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, noise_floor_tolerance=0.02)
+    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
     # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
     assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
     assert second["optimum_share"] == 1.0
-    assert first["noise_floor_share"] == pytest.approx(1 / 3)
+    assert first["near_noise_share"] == pytest.approx(1 / 3)
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
     assert first["error_percent c + c_p"] == pytest.approx(0.0)

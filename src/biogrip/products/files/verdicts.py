@@ -55,6 +55,11 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     return found
 
 
+def told_from_zero(verdicts: dict[str, Any]) -> set[str]:
+    """Return the quantities that are not just bounded above, so that ratios to them mean much."""
+    return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
+
+
 def _finding(finding: "Finding") -> dict[str, Any]:
     profile = finding.profile
     return {

@@ -14,7 +14,7 @@ from biogrip.experiment.sampling import Sampling
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import nearest_encodable
-from biogrip.identify.success import at_noise_floor
+from biogrip.identify.success import near_noise
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.rows import RowFile
 from biogrip.products.plan import Plan, Wildcards
@@ -62,7 +62,7 @@ class Settings:
     ----------
     methods
         Identifiers.
-    noise_floor_tolerance
+    near_noise_tolerance
         By which share a misfit may exceed the noise, to be taken for as good.
     parameters
         True values by name, SI units.
@@ -71,7 +71,7 @@ class Settings:
     """
 
     methods: tuple[str, ...]
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
     parameters: Mapping[str, float]
     points: Mapping[str, PointSettings]
 
@@ -85,7 +85,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
             point.row.text, point.column.text, case.problem, case.noise, case.sampling
         )
     parameters = study.cases[job["case"]].parameters
-    return Settings(tuple(study.methods), study.noise_floor_tolerance, parameters, points)
+    return Settings(tuple(study.methods), study.near_noise_tolerance, parameters, points)
 
 
 def judge(settings: Settings, identifications: list[Path], points: Path) -> None:
@@ -147,7 +147,7 @@ def _succeeded(
     if point.noise.level == 0:
         floor = _resolution_rad(point.problem, settings.parameters, time_s)
         found = found.assign(noise_rms_rad=floor)
-    return at_noise_floor(found, settings.noise_floor_tolerance)
+    return near_noise(found, settings.near_noise_tolerance)
 
 
 def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
