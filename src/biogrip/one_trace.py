@@ -168,6 +168,9 @@ def in_words(found: dict[str, Any]) -> str:
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
     ]
+    if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
+        alone = f"{50 * (1 + found['confidence']):g} %"
+        lines.append(f"A limit that stands alone is an end of an interval with two: {alone}")
     lines += [
         f"{' and '.join(trade['members'])} trade against each other: only {trade['quantity']} is "
         f"{trade['in_words']}"

@@ -86,8 +86,9 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
 
 
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
-    item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0}
+    item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
     measured: dict[str, Any] = {
+        "confidence": 0.9,
         "quantities": [
             {**item, "quantity": "k", "verdict": "determined"},
             {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None},
@@ -102,6 +103,10 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     known = verdicts_table.Settings("x", "X", {"k": 2.5, "c": 1.0, "c_p": 0.5})
     table = verdicts(known, files[0], files[1:])
     k, total = rows(table)
+    assert k["excluded"] == "1.5 to 1.8"
+    headings = {column.name: column.heading for column in table.columns}
+    assert (headings["low"], headings["high"]) == ("90 % from", "90 % to")
+    assert "one that stands alone holds with 95 %" in table.caption
     assert (k["target"], k["value"], k["low"], k["expected_high"]) == (2.5, 2.0, 1.0, 4.0)
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
