@@ -34,10 +34,10 @@ def paper_against_study() -> str:
                 "parameter": f"{row['parameter']} ({row['unit']})",
                 "target": f"{float(row['target']):.4g}",
                 "paper": f"{float(row['paper_identified']):.4g} ({_percent(error)})",
-                "this study: best seed": f"{float(row['best_identified']):.3g} "
-                f"({_percent(row['best_error_percent'])})",
+                "this study: typical seed": f"{float(row['typical_identified']):.3g} "
+                f"({_percent(row['typical_error_percent'])})",
                 "5-95 % of seeds": f"{low} to {high}",
-                "seeds at the noise floor": f"{100 * float(row['noise_floor_share']):.0f} %",
+                "seeds near the noise": f"{100 * float(row['near_noise_share']):.0f} %",
             }
         )
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))

@@ -175,6 +175,9 @@ def in_words(found: dict[str, Any]) -> str:
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
     ]
+    if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
+        alone = f"{50 * (1 + found['confidence']):g} %"
+        lines.append(f"A limit that stands alone is an end of an interval with two: {alone}")
     lines += [trade["words"] for trade in found["trades"]]
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")

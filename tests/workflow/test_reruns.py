@@ -70,7 +70,7 @@ def test_other_numbers_of_seeds_rerun_no_finished_job_and_change_no_number(
     [
         ("rate_Hz: 1.0", "rate_Hz: 2.0", {"target", "measurement", "identification"}),
         ("rate_Hz: 1.0", "rate_Hz: 1.0, noise: {level: 0.2}", {"measurement", "identification"}),
-        ("seeds: 4", "seeds: 4\nevaluation: {noise_floor_tolerance: 0.03}", set()),
+        ("seeds: 4", "seeds: 4\nevaluation: {near_noise_tolerance: 0.03}", set()),
     ],
 )
 def test_a_setting_reruns_what_depends_on_it(

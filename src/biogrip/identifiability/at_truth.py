@@ -1,7 +1,7 @@
 """How precisely a simulated case can be identified at all: bounds at its true parameters."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.response.sensitivity import rotation_and_sensitivity
+
+_DETERMINED_PERCENT = 100.0
 
 
 def bounds_percent(
@@ -49,3 +51,28 @@ def bounds_percent(
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
     return [(q, 100 * bound(sensitivity, sigma, logarithms, q)) for q in quantities]
+
+
+def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
+    """Return the best and the worst determined quantity of several points.
+
+    Only those count whose bound is below 100 % at half of the points or more. A sum
+    stands for its parts: that they trade against each other, far from where they
+    are, no bound of first order shows.
+
+    Parameters
+    ----------
+    bounds
+        Labels of quantities, and their bounds in percent at the points; NaN, without
+        noise, does not count.
+    """
+    percents: dict[str, list[float]] = {}
+    for label, percent in bounds:
+        if not math.isnan(percent):
+            percents.setdefault(label, []).append(percent)
+    medians = sorted((float(np.median(found)), label) for label, found in percents.items())
+    parts = {part for label in percents if " + " in label for part in label.split(" + ")}
+    determined = [
+        label for percent, label in medians if percent < _DETERMINED_PERCENT and label not in parts
+    ]
+    return determined[:1] + determined[1:][-1:]

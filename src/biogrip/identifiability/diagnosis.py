@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
-from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
@@ -18,8 +18,6 @@ _TOO_MUCH = 1.2
 _CORRELATED = 5.0
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
-# Chi^2 that the prior, by which optima are chosen where the trace says nothing, may cost.
-_MISSED = 0.05
 
 
 @dataclass(frozen=True)
@@ -77,17 +75,29 @@ def diagnose(
             problem, best, misfit_rad, confidence=confidence, noise_rad=noise_rad
         )
         findings = findings_of(likelihood, model)
-        lowest = min((finding.profile for finding in findings), key=lambda p: float(p.rises.min()))
-        if lowest.rises.min() > -_MISSED:
+        trades = trades_of(likelihood, model, findings)
+        profiled = [*findings, *(trade.finding for trade in trades)]
+        lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.rises.min()))
+        if lowest.rises.min() > -MISSED:
             break
         fit = settled(problem, local_fit(problem, lowest.lowest))
-        if likelihood.rise(fit.misfit_rad) > -_MISSED:
+        if likelihood.rise(fit.misfit_rad) > -MISSED:
             break
         best, misfit_rad = fit.log_parameters, fit.misfit_rad
-    trades = trades_of(likelihood, model, findings)
     grip = problem.residuals.grip(likelihood.best)
-    notes = [*_notes(likelihood), *_pulling(grip, problem.residuals.duration_s)]
+    pulling = _pulling(grip, problem.residuals.duration_s)
+    notes = [*_in_parts(findings), *_notes(likelihood), *pulling]
     return Diagnosis(likelihood, findings, trades, grip, notes)
+
+
+def _in_parts(findings: list[Finding]) -> list[str]:
+    """Say of which quantities the values within confidence are no interval."""
+    return [
+        f"The values of {finding.quantity.label} within confidence are in {1 + len(finding.gaps)} "
+        "parts; the limits are those of the outermost."
+        for finding in findings
+        if finding.gaps
+    ]
 
 
 def _pulling(grip: Grip, last_s: float) -> list[str]:

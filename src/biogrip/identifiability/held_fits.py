@@ -6,7 +6,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.held import HeldQuantities
-from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.profile import MISSED, Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.many_fits import ManyFits
@@ -27,6 +27,12 @@ class HeldFits:
         One a trace; with their problems `fit_together` has to agree.
     quantities
         What may be held.
+
+    Attributes
+    ----------
+    deeper
+        By trace, the lowest rise so far and its log-parameters, if that is so far below
+        zero that the trace's optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
@@ -34,6 +40,7 @@ class HeldFits:
         self.quantities = quantities
         self.best = np.stack([likelihood.best for likelihood in likelihoods])
         self.threshold = np.array([likelihood.threshold for likelihood in likelihoods])
+        self.deeper: dict[int, tuple[float, Array]] = {}
         self._fits = ManyFits(problems)
         self._residuals = problems[0].residuals
         self._misfit_rad = np.array([likelihood.misfit_rad for likelihood in likelihoods])
@@ -94,7 +101,12 @@ class HeldFits:
 
     def _rises(self, found: Minima, trace: IntArray) -> tuple[Array, Array]:
         excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
-        return self._residuals.samples * excess / self._noise_rad[trace] ** 2, found.x
+        rises = self._residuals.samples * excess / self._noise_rad[trace] ** 2
+        for index in np.flatnonzero(rises < -MISSED):
+            of_trace = int(trace[index])
+            if of_trace not in self.deeper or rises[index] < self.deeper[of_trace][0]:
+                self.deeper[of_trace] = float(rises[index]), found.x[index].copy()
+        return rises, found.x
 
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest logarithm of each quantity, (n_quantities,) each."""

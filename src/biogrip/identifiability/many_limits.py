@@ -26,6 +26,7 @@ def many_limits(
     quantities: Sequence[Quantity],
     tolerance: float = CLOSE,
     accuracy: float = _ACCURACY,
+    fits: HeldFits | None = None,
 ) -> Array:
     """Find where the rise of chi^2 equals the threshold.
 
@@ -39,13 +40,15 @@ def many_limits(
         Of the fits, see `local_fit`.
     accuracy
         Of the square root of the rise.
+    fits
+        Those that are to be used; they know afterwards which optima were missed.
 
     Returns
     -------
     (n_traces, n_quantities, 2)
         Logarithms of the lower and upper limits; NaN where the trace does not close the profile.
     """
-    fits = HeldFits(likelihoods, quantities)
+    fits = fits or HeldFits(likelihoods, quantities)
     shape = (len(likelihoods), len(quantities), 2)
     trace, which, upper = (index.ravel() for index in np.indices(shape))
     low, high = (end[which] for end in fits.ranges())
@@ -81,7 +84,26 @@ def many_limits(
 
 def limits_of(likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> Array:
     """Limits as of `many_limits`, one by one where `fit_together` does not agree."""
+    return limits_and_deeper(likelihoods, quantities)[0]
+
+
+def limits_and_deeper(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+) -> tuple[Array, dict[int, Array]]:
+    """Limits as of `limits_of`, and what is deeper than the optima that they are about.
+
+    Returns
+    -------
+    limits : (n_traces, n_quantities, 2)
+        As of `many_limits`.
+    deeper
+        By trace, log-parameters whose chi^2 is clearly below that of its optimum, so that
+        this was missed; one by one, nothing is known of that.
+    """
     if quantities and fit_together([likelihood.problem for likelihood in likelihoods]):
-        return many_limits(likelihoods, quantities)
+        fits = HeldFits(likelihoods, quantities)
+        limits = many_limits(likelihoods, quantities, fits=fits)
+        return limits, {trace: x for trace, (_, x) in fits.deeper.items()}
     found = [[limits_near(each, quantity) for quantity in quantities] for each in likelihoods]
-    return np.array(found, dtype=float).reshape(len(likelihoods), len(quantities), 2)
+    shape = (len(likelihoods), len(quantities), 2)
+    return np.array(found, dtype=float).reshape(shape), {}

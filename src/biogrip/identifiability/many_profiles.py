@@ -12,8 +12,9 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood, Profile, grid_of, profile
+from biogrip.identifiability.profile import Likelihood, Profile, grid_of, profile, profile_of
 from biogrip.identifiability.quantities import Quantity
+from biogrip.identifiability.smooth import Points, smoothed
 from biogrip.identify.local_fit import FAIR, FINE
 from biogrip.identify.many_fits import fit_together
 
@@ -23,7 +24,7 @@ _NEWS = 1e-3
 
 
 def many_profiles(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Follow quantities over their whole ranges, and find their confidence limits.
 
@@ -33,6 +34,8 @@ def many_profiles(
         One a trace.
     quantities
         Whose profiles are wanted.
+    smooth
+        Whether with as many points as it takes to draw them.
 
     Returns
     -------
@@ -54,15 +57,25 @@ def many_profiles(
     _from_optimum(done, middle)
     _from_neighbours(done, middle)
     closed, crossed = _crossed(likelihoods, done)
+    ends = np.where(closed, crossed, np.nan).T.tolist()
+    limits = [(_or_none(low), _or_none(high)) for low, high in ends]
+    points = [
+        Points(grid, done.rises[index, : len(grid)], done.x[index, : len(grid)])
+        for index, grid in enumerate(grids)
+    ]
+    if smooth:
+
+        def fit(profile: IntArray, targets: Array, starts: Array) -> tuple[Array, Array]:
+            return fits.at(trace[profile], which[profile], targets, starts, CLOSE)
+
+        smoothed(points, [[at for at in ends if at is not None] for ends in limits], fit)
     return [
         [
-            Profile(
-                grids[index],
-                done.rises[index, : len(grids[index])],
+            profile_of(
+                points[index],
                 float(starts[index]),
-                float(crossed[0, index]) if closed[0, index] else None,
-                float(crossed[1, index]) if closed[1, index] else None,
-                done.x[index, int(np.nanargmin(done.rises[index]))],
+                limits[index],
+                float(fits.threshold[trace[index]]),
             )
             for index in range(t * shape[1], (t + 1) * shape[1])
         ]
@@ -70,11 +83,22 @@ def many_profiles(
     ]
 
 
+def _or_none(limit: float) -> float | None:
+    return None if np.isnan(limit) else limit
+
+
 def profiles_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Profile]:
-    """Profiles of one trace, all at once where `fit_together` agrees, else one by one."""
-    if fit_together([likelihood.problem]):
-        return many_profiles([likelihood], quantities)[0]
-    return [profile(likelihood, quantity) for quantity in quantities]
+    """Profiles of one trace, see `profiles_of_many`."""
+    return profiles_of_many([likelihood], quantities)[0]
+
+
+def profiles_of_many(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
+) -> list[list[Profile]]:
+    """Profiles as of `many_profiles`, one by one where `fit_together` does not agree."""
+    if likelihoods and fit_together([likelihood.problem for likelihood in likelihoods]):
+        return many_profiles(likelihoods, quantities, smooth=smooth)
+    return [[profile(each, quantity) for quantity in quantities] for each in likelihoods]
 
 
 class _Points:

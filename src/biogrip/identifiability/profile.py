@@ -21,9 +21,11 @@ from statistics import NormalDist
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
+from biogrip.identifiability.confidence_set import gaps_of
 from biogrip.identifiability.held_fit import held_fit
 from biogrip.identifiability.quantities import Quantity
+from biogrip.identifiability.smooth import Points, smoothed
 from biogrip.identify.local_fit import FAIR, FINE, Objective
 from biogrip.identify.problem import Problem
 
@@ -31,6 +33,11 @@ from biogrip.identify.problem import Problem
 _NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
 _POINTS = 35
 _CERTAIN = 0.999
+MISSED = 0.05
+"""Chi^2 that the prior, by which optima are chosen where the trace says nothing, may cost.
+
+What is deeper than an optimum by more says that it was not the global one.
+"""
 # A branch may relax within twice the experiment at the price of chi^2 rising by some 50.
 _HINGE = 10.0
 _MOST_DOUBLINGS = 12
@@ -68,7 +75,9 @@ class Likelihood:
         Standard deviation of the noise, known or estimated from the residual.
     threshold
         Rise of chi^2 at the confidence limits: chi-squared with one degree of
-        freedom where the noise is known, F where it is estimated.
+        freedom where the noise is known, F where it is estimated. It is that of an
+        interval with two ends: a limit that stands alone is one of these ends, and
+        holds with more than the confidence.
     certainty
         Rise that a profile must have reached at the end of the range to be closed
         there; the same at 99.9 %. A profile that levels off between the two has
@@ -115,6 +124,8 @@ class Profile:
         Confidence limits; None where the trace does not close the profile.
     lowest : (n_parameters,)
         Log-parameters at the lowest rise, which is below zero if the optimum was missed.
+    gaps
+        Where, between points within confidence, the profile is above the threshold.
     """
 
     log_values: Array
@@ -123,6 +134,7 @@ class Profile:
     low: float | None
     high: float | None
     lowest: Array
+    gaps: tuple[tuple[float, float], ...] = ()
 
 
 def likelihood_of(
@@ -161,7 +173,8 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
 
     Each point is fitted from its neighbour's fit, outwards from the optimum and
     back again, so that a basin which is lower further out is followed inwards. The
-    limits are the outermost: what is between them need not all be within confidence.
+    limits are the outermost: what is between them need not all be within confidence,
+    and where it is not is told as gaps.
     """
     fits = _Held(likelihood, quantity, _EXACT)
     start, grid = quantity.log(likelihood.best), grid_of(likelihood, quantity)
@@ -178,13 +191,26 @@ def profile(likelihood: Likelihood, quantity: Quantity) -> Profile:
     limits = [fits.outermost(done, -1), fits.outermost(done, 1)]
     rises = np.array([point.rise for point in done])
     certainty = max(likelihood.certainty, likelihood.threshold)
+    low = limits[0] if rises[0] > certainty else None
+    high = limits[1] if rises[-1] > certainty else None
+    points = Points(grid, rises, np.array([point.log_parameters for point in done]))
+    smoothed([points], [[limit for limit in (low, high) if limit is not None]], fits.from_points)
+    return profile_of(points, start, (low, high), likelihood.threshold)
+
+
+Limits = tuple[float | None, float | None]
+
+
+def profile_of(points: Points, best: float, limits: Limits, threshold: float) -> Profile:
+    """Put a profile together from its points."""
     return Profile(
-        grid,
-        rises,
-        start,
-        limits[0] if rises[0] > certainty else None,
-        limits[1] if rises[-1] > certainty else None,
-        done[int(np.argmin(rises))].log_parameters,
+        points.values,
+        points.rises,
+        best,
+        limits[0],
+        limits[1],
+        points.x[int(np.argmin(points.rises))],
+        gaps_of(points.values, points.rises, threshold),
     )
 
 
@@ -265,6 +291,16 @@ class _Held:
         residuals = self._likelihood.problem.residuals
         misfit = residuals.noise_scale_rad * float(np.sqrt(found.chi2 / residuals.samples))
         return _Point(target, self._likelihood.rise(misfit), found.log_parameters, found.bend)
+
+    def from_points(self, _: IntArray, targets: Array, starts: Array) -> tuple[Array, Array]:
+        """Fit at targets (n,) from log-parameters (n, n_parameters); see `smoothed`."""
+        flat = np.zeros((starts.shape[1],) * 2)
+        found = [
+            self.at(float(target), _Point(target, np.inf, x, flat))
+            for target, x in zip(targets, starts, strict=True)
+        ]
+        rises = np.array([point.rise for point in found])
+        return rises, np.array([point.log_parameters for point in found])
 
     def outermost(self, points: list[_Point], sign: int) -> float | None:
         """Logarithm of the last crossing towards one end of a grid; points are lowered in place."""

@@ -22,6 +22,13 @@ _SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
 
 
 def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | None:
+    """Valley as of `valley_and_deeper`."""
+    return valley_and_deeper(likelihood, model)[0]
+
+
+def valley_and_deeper(
+    likelihood: Likelihood, model: SampleModel
+) -> tuple[dict[str, Any] | None, Array | None]:
     """Rise of chi^2 over two exchangeable parameters, the others fitted at every point.
 
     Parameters
@@ -37,16 +44,19 @@ def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | 
         ``x`` and ``y``, names and units; and on a grid that follows the valley
         ``x_values``, ``y_values`` and ``rises``, nested lists (n_sums, n_shares).
         None unless exactly two exchangeable parameters were searched, among others.
+    (n_parameters,) or None
+        Log-parameters whose chi^2 is clearly below that of the optimum, so that this
+        was missed; fitted one by one, nothing is known of that.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
-        return None
+        return None, None
     best = np.exp(likelihood.best[pair])
     sums = best.sum() * _SUMS[:, None]
     x_values, y_values = sums * _SHARES, sums * (1 - _SHARES)
-    rises = _rises(likelihood, model, pair, x_values, y_values)
+    rises, deeper = _rises(likelihood, model, pair, x_values, y_values)
     x, y = (model.parameters[index] for index in pair)
-    return {
+    data = {
         "x": {"name": x.name, "symbol": x.symbol, "unit": x.unit},
         "y": {"name": y.name, "symbol": y.symbol, "unit": y.unit},
         "x_values": _listed(x_values),
@@ -54,6 +64,7 @@ def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | 
         "rises": _listed(rises),
         "best": [rounded(float(value)) for value in best],
     }
+    return data, deeper
 
 
 def _listed(values: Array) -> list[list[float | None]]:
@@ -62,8 +73,8 @@ def _listed(values: Array) -> list[list[float | None]]:
 
 def _rises(
     likelihood: Likelihood, model: SampleModel, pair: list[int], x_values: Array, y_values: Array
-) -> Array:
-    """Rise of chi^2 at every point of the grid, (n_sums, n_shares)."""
+) -> tuple[Array, Array | None]:
+    """Rise of chi^2 at every point of the grid, (n_sums, n_shares), and what is deeper."""
     if fit_together([likelihood.problem]):
         return _rises_at_once(likelihood, pair, x_values, y_values)
     rises = np.empty_like(x_values)
@@ -73,12 +84,12 @@ def _rises(
         for j in range(rises.shape[1])[:: 1 if i % 2 else -1]:
             here = (float(x_values[i, j]), float(y_values[i, j]))
             rises[i, j], start = _rest_fitted(likelihood, model, pair, here, start)
-    return rises
+    return rises, None
 
 
 def _rises_at_once(
     likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
-) -> Array:
+) -> tuple[Array, Array | None]:
     """Fit all points from the optimum, then from neighbours as long as these are news."""
     fits = HeldFits([likelihood], [])
     rows, columns = x_values.shape
@@ -108,7 +119,8 @@ def _rises_at_once(
         start = x[origin].copy()
         start[:, pair] = x[points][:, pair]
         tolerance = CLOSE
-    return rises.reshape(rows, columns)
+    deeper = fits.deeper.get(0)
+    return rises.reshape(rows, columns), None if deeper is None else deeper[1]
 
 
 def _rest_fitted(

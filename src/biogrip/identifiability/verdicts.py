@@ -66,8 +66,17 @@ class Finding:
         """Upper confidence limit in SI units."""
         return None if self.profile.high is None else math.exp(self.profile.high)
 
+    @property
+    def gaps(self) -> list[tuple[float, float]]:
+        """Values in SI units that are excluded although others on both sides are not."""
+        return [(math.exp(start), math.exp(end)) for start, end in self.profile.gaps]
+
     def words(self) -> str:
         """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
+        return self._limits_in_words() + (f", except {but} {self.quantity.unit}" if but else "")
+
+    def _limits_in_words(self) -> str:
         unit = self.quantity.unit
         if self.verdict == DETERMINED:
             return f"determined: {self.value:.3g} {unit} ({self.low:.3g} to {self.high:.3g})"

@@ -49,11 +49,12 @@ class Evaluation:
             high=100,
         ),
     ]
-    noise_floor_tolerance: Annotated[
+    near_noise_tolerance: Annotated[
         float,
         Key(
-            "A seed reaches the noise floor if its misfit exceeds the RMS of the noise in its "
-            "trace by at most this share.",
+            "A seed counts as near the noise if its misfit exceeds the RMS of the noise in its "
+            "trace by at most this share. Of thousands of samples that is much in χ², so it need "
+            "be no optimum.",
             low=0,
             high=1,
         ),

@@ -277,9 +277,9 @@ class Study:
         return self.config.batch_size
 
     @property
-    def noise_floor_tolerance(self) -> float:
+    def near_noise_tolerance(self) -> float:
         """By which share a misfit may exceed the noise, to be taken for as good."""
-        return self.config.evaluation.noise_floor_tolerance
+        return self.config.evaluation.near_noise_tolerance
 
     @property
     def optimum_tolerance(self) -> float:

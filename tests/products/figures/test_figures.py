@@ -68,7 +68,7 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("seeds", "best", "others", "label"),
+    ("seeds", "shown", "others", "label"),
     [
         (50, 7, 49, "all 50 seeds"),
         (1500, 7, 99, "first 100 of 1500 seeds"),
@@ -76,10 +76,12 @@ def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
     ],
 )
 def test_no_more_seeds_are_drawn_than_can_be_seen(
-    tmp_path: Path, seeds: int, best: int, others: int, label: str
+    tmp_path: Path, seeds: int, shown: int, others: int, label: str
 ) -> None:
     numbers = np.arange(seeds)
-    misfit = np.where(numbers == best, 1.0, 1.5)
+    others_before = np.flatnonzero(numbers != shown)[: (seeds - 1) // 2]
+    misfit = np.where(np.isin(numbers, others_before), 1.0, 1.5)
+    misfit[shown] = 1.2
     found = pd.DataFrame({"seed": numbers, "misfit_rad": misfit, "noise_rms_rad": 1.0})
     for column in ("case", "generations", "evaluations", "stop_reason"):
         found[column] = 1
@@ -88,7 +90,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit_rad"] = np.repeat(misfit, 2)
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
-    settings = convergence.Settings("A cell", "genetic", 20, noise_floor_tolerance=0.02)
+    settings = convergence.Settings("A cell", "genetic", 20, near_noise_tolerance=0.02)
     files = (tmp_path / "found.csv", tmp_path / "history.parquet")
     axes = convergence.draw(settings, *files).axes
     filled = [line for line in axes[0].lines if len(np.asarray(line.get_xdata()))]

@@ -29,7 +29,7 @@ def rows(table: Table) -> list[dict[str, Any]]:
 def settings(parameters: dict[str, float], samples: int) -> Settings:
     """Of one case, a drop."""
     truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
-    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, noise_floor_tolerance=0.02)
+    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
     # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
     assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
     assert second["optimum_share"] == 1.0
-    assert first["noise_floor_share"] == pytest.approx(1 / 3)
+    assert first["near_noise_share"] == pytest.approx(1 / 3)
     assert second["median_evaluations"] == 11
     assert first["error_percent k"] == pytest.approx(20.0)
     assert first["error_percent c + c_p"] == pytest.approx(0.0)
@@ -86,8 +86,9 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
 
 
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
-    item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0}
+    item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
     measured: dict[str, Any] = {
+        "confidence": 0.9,
         "quantities": [
             {**item, "quantity": "k", "verdict": "determined"},
             {**item, "quantity": "c + c_p", "verdict": "bounded above", "low": None},
@@ -102,6 +103,10 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     known = verdicts_table.Settings("x", "X", {"k": 2.5, "c": 1.0, "c_p": 0.5})
     table = verdicts(known, files[0], files[1:])
     k, total = rows(table)
+    assert k["excluded"] == "1.5 to 1.8"
+    headings = {column.name: column.heading for column in table.columns}
+    assert (headings["low"], headings["high"]) == ("90 % from", "90 % to")
+    assert "one that stands alone holds with 95 %" in table.caption
     assert (k["target"], k["value"], k["low"], k["expected_high"]) == (2.5, 2.0, 1.0, 4.0)
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None

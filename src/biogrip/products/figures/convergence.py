@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from biogrip.identify.methods import METHODS
-from biogrip.identify.success import at_noise_floor, lowest_misfit
+from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words
 from biogrip.products.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
@@ -29,25 +29,25 @@ class Settings:
         The case in print, and whose histories.
     mutation_start
         First generation whose children mutate; None for a method without.
-    noise_floor_tolerance
+    near_noise_tolerance
         By which share a misfit may exceed the noise, to be taken for as good.
     """
 
     title: str
     method: str
     mutation_start: int | None
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Choose what the convergence of a case depends on."""
     mutates = "genetic_algorithm" in METHODS[study.shown].blocks
     start = case.mutation_start if mutates else None
-    return Settings(case.title, study.shown, start, study.noise_floor_tolerance)
+    return Settings(case.title, study.shown, start, study.near_noise_tolerance)
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
-    """Draw by how much the seeds' misfits exceed their noise, and that of the best.
+    """Draw by how much the seeds' misfits exceed their noise, and that of the typical one.
 
     Parameters
     ----------
@@ -60,19 +60,19 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
-    best = int(lowest_misfit(found)["seed"])
-    history = read_history(histories, settings.method, best)
-    reached = at_noise_floor(found, settings.noise_floor_tolerance)
+    shown = int(typical(found)["seed"])
+    history = read_history(histories, settings.method, shown)
+    reached = near_noise(found, settings.near_noise_tolerance)
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
         excess = 100 * (rows["best_misfit_rad"] / unit[seed] - 1)
         style: dict[str, Any] = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.7}
-        if seed == best:
+        if seed == shown:
             style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
         axes.plot(rows["generation"], excess, **style)
     axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
-    axes.plot([], [], color=FITTED, label=f"seed {best}, lowest misfit")
+    axes.plot([], [], color=FITTED, label=f"seed {shown}, typical")
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     if settings.mutation_start is not None:
@@ -93,7 +93,11 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     axes.set_xlim(0, history["generation"].max())
     axes.set_xlabel(METHODS[settings.method].step)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
-    share = f": {reached.sum()} of {len(found)} at the noise floor" if noisy else ""
+    if noisy:
+        words = near_noise_words(settings.near_noise_tolerance)
+        near = 100 * settings.near_noise_tolerance
+        axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
+    share = f": {reached.sum()} of {len(found)} {words}" if noisy else ""
     axes.set_title(settings.title + share)
     axes.legend(loc="upper right")
     return drawn
@@ -103,7 +107,7 @@ CONVERGENCE = drawing(
     draw,
     name="convergence",
     caption="Figure 8 of the paper: the best misfit of every seed over the RMS of the noise in its "
-    "trace, step by step.",
+    "trace, step by step. Typical is the seed of median excess at the end.",
     settings=settings,
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
     cases=lambda study: study.cases,

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
-from biogrip.identify.success import lowest_misfit
+from biogrip.identify.success import typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words
 from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
@@ -30,7 +30,7 @@ def settings(study: Study, case: Case) -> Settings:
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
-    """Draw every parameter's evolution for the seeds and for the best.
+    """Draw every parameter's evolution for the seeds and for the typical one.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     """
     truth, step = settings.truth, METHODS[settings.method].step
     found = read_identifications(identifications, settings.method)
-    best = int(lowest_misfit(found)["seed"])
-    history = read_history(histories, settings.method, best)
+    shown = int(typical(found)["seed"])
+    history = read_history(histories, settings.method, shown)
     parameters = truth.model.parameters
     identified = truth.published.identified
     drawn = figure(PAGE_IN, 3.9)
@@ -50,7 +50,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     for axes, parameter in zip(grid, parameters, strict=False):
         for seed, rows in history.groupby("seed"):
             style = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.6}
-            if seed == best:
+            if seed == shown:
                 style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
             axes.step(rows["generation"], rows[parameter.column], where="post", **style)
         if truth.parameters.get(parameter.name, 0) > 0:
@@ -59,6 +59,10 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
         axes.set_yscale("log")
         axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
+        if truth.parameters.get(parameter.name, 0) > 0:
+            last = history.loc[history["seed"] == shown, parameter.column].iloc[-1]
+            ends = _beside(last / truth.parameters[parameter.name])
+            axes.set_title(f"seed {shown} ends {ends}", loc="right", fontsize=7)
         axes.set_xlim(0, history["generation"].max())
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
@@ -71,7 +75,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
         grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
         grid[0].plot([], [], color=FITTED)[0],
     ]
-    labels = [seeds_in_words(len(found)), f"seed {best}, lowest misfit"]
+    labels = [seeds_in_words(len(found)), f"seed {shown}, typical"]
     if truth.parameters:
         lines.append(grid[0].plot([], [], color=TARGET, linestyle="--")[0])
         labels.append("target")
@@ -83,11 +87,22 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     return drawn
 
 
+def _beside(ratio: float) -> str:
+    """Say how far a value is from the target; decades of an axis hide what a few percent are."""
+    if not 0.5 < ratio < 2:
+        return f"at {ratio:.2g} times the target"
+    percent = 100 * (ratio - 1)
+    if abs(percent) < 0.05:
+        return "at the target"
+    return f"{abs(percent):.2g} % {'above' if percent > 0 else 'below'} the target"
+
+
 EVOLUTION = drawing(
     draw,
     name="evolution",
     caption="As Figure 10 of the paper: the parameters of the best individual, step by step, for "
-    "every seed.",
+    "every seed. Typical is the seed of median excess of the misfit over the noise in its trace. "
+    "Named above each panel: how far from the target it ends.",
     settings=settings,
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
     cases=lambda study: study.cases,

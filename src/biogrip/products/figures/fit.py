@@ -1,4 +1,4 @@
-"""Figures 9, 11 and 12: target, noisy measurement, best fit and residual."""
+"""Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residual."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import Fit, best_fit, scale_of
+from biogrip.products.figures.results import Fit, scale_of, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
 from biogrip.products.files.identifications import PATH
 from biogrip.products.files.traces import MEASUREMENTS
@@ -21,22 +21,23 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Settings:
-    """A case in print, what its identification assumes, and the method that is shown."""
+    """A case in print, what its identification assumes, whose fit, and the paper's axis."""
 
     title: str
     problem: CaseProblem
     method: str
+    axis_rad: tuple[float, ...]
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the best fit of a case depends on."""
-    return Settings(case.title, case.problem, study.shown)
+    """Choose what the fit of a case depends on."""
+    return Settings(case.title, case.problem, study.shown, case.published.axis_rad)
 
 
 def draw(
     settings: Settings, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
-    """Draw the best fit of a case.
+    """Draw the fit of a case's typical seed.
 
     Parameters
     ----------
@@ -46,16 +47,16 @@ def draw(
         Of the case: CSV, Parquet, and YAML if its gripper was calibrated.
     """
     problem = settings.problem.calibrated(calibrated)
-    fit = best_fit(problem, settings.method, identifications, measurements)
+    fit = typical_fit(problem, settings.method, identifications, measurements)
     step = METHODS[settings.method].step
-    label = f"best fit (seed {fit.seed}, {step} {fit.generations})"
-    return draw_fit(fit, label, settings.title)
+    label = f"typical fit (seed {fit.seed}, {step} {fit.generations})"
+    return draw_fit(fit, label, settings.title, settings.axis_rad)
 
 
-def draw_fit(fit: Fit, label: str, title: str) -> Figure:
-    """Draw a trace, its fit, and what the fit leaves of it."""
+def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
+    """Draw a trace, its fit, and what the fit leaves of it; on an axis that holds the paper's."""
     factor, unit = scale_of(fit.fitted_rad, "rad")
-    drawn = figure(COLUMN_IN, 3.4)
+    drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
     traces.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **style)
@@ -64,11 +65,11 @@ def draw_fit(fit: Fit, label: str, title: str) -> Figure:
         traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
     traces.set_ylabel(f"closing rotation ({unit})")
-    # Room for the legend above the data.
-    low, high = factor * fit.measured_rad.min(), factor * fit.measured_rad.max()
-    traces.set_ylim(low - 0.05 * (high - low), high + 0.38 * (high - low))
-    traces.legend(loc="upper right")
-    traces.set_title(title)
+    low, high = (end([*axis_rad, end(fit.measured_rad)]) for end in (np.min, np.max))
+    margin = 0.02 * (high - low)
+    traces.set_ylim(factor * (low - margin), factor * (high + margin))
+    drawn.legend(loc="outside upper left", ncols=2)
+    drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
     residual = factor * (fit.measured_rad - fit.fitted_rad)
     residuals.plot(fit.time_s, residual, color=MEASURED, **style)
     if fit.target_rad is not None:
@@ -86,9 +87,9 @@ def draw_fit(fit: Fit, label: str, title: str) -> Figure:
 FIT = drawing(
     draw,
     name="fit",
-    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and the best fit "
-    "of all seeds, and below what the fit leaves of the measurement (points) and of the target "
-    "(line).",
+    caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and its fit, of the "
+    "seed of median excess of the misfit over the noise in its trace; and below what the fit "
+    "leaves of the measurement (points) and of the target (line).",
     settings=settings,
     reads={
         "identifications": the(PATH),

@@ -1,4 +1,4 @@
-"""Linear against nonlinear model: traces, and the domain in which they agree to 1 %."""
+"""Linear against nonlinear model: their difference, and the domain in which they agree to 1 %."""
 
 from pathlib import Path
 
@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from biogrip.experiment.protocol import TorqueHistory, torque_history
+from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.truth import Truth
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import BLUE, ORANGE, PAGE_IN, figure, panel
+from biogrip.products.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.stages.model_difference import Settings, scaled, settings
@@ -24,7 +24,7 @@ _MOST_CASES = 3
 
 
 def draw(settings: Settings, differences: Path) -> Figure:
-    """Draw both models for the last case at twenty times the torque, and maps of their difference.
+    """Draw the difference for the last case at twenty times the torque, and maps of it.
 
     Parameters
     ----------
@@ -37,8 +37,8 @@ def draw(settings: Settings, differences: Path) -> Figure:
     cases = dict(list(settings.cases.items())[:_MOST_CASES])
     drawn = figure(PAGE_IN, 2.6)
     traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
-    _traces(traces, torque_history(settings.phases), *list(cases.values())[-1])
-    for index, (name, (truth, _)) in enumerate(cases.items()):
+    _difference(traces, *list(cases.values())[-1])
+    for index, (name, (truth, *_)) in enumerate(cases.items()):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
             index="torque_factor", columns="reference_angle_deg", values="difference_over_peak"
@@ -50,12 +50,12 @@ def draw(settings: Settings, differences: Path) -> Figure:
             grid.index,
             shares,
             norm=LogNorm(1e-5, 30),
-            cmap="cividis",
+            cmap="cividis_r",
             shading="nearest",
         )
         if np.nanmax(shares) > 1:
             lines = axes.contour(
-                grid.columns, grid.index, shares, [1.0], colors="white", linewidths=1.2
+                grid.columns, grid.index, shares, [1.0], colors="black", linewidths=1.2
             )
             axes.clabel(lines, fmt="1 %%", fontsize=7)
         axes.set_yscale("log")
@@ -71,19 +71,21 @@ def draw(settings: Settings, differences: Path) -> Figure:
     return drawn
 
 
-def _traces(axes: Axes, protocol: TorqueHistory, truth: Truth, gripper: Gripper) -> None:
+def _difference(axes: Axes, truth: Truth, gripper: Gripper, phases: tuple[Phase, ...]) -> None:
+    """Draw nonlinear minus linear rotation, for the traces themselves cannot be told apart."""
     values = [truth.parameters[name] for name in truth.model.names]
     network = truth.model.network(np.array([values]))
-    torque = scaled(protocol, _SHOWN_FACTOR)
+    torque = scaled(torque_history(phases), _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]
-    nonlinear = linear + correction(gripper, network, torque, FINE).at(time_s)[0]
-    axes.plot(time_s, 1e3 * linear, color=BLUE, label="linear")
-    axes.plot(time_s, 1e3 * nonlinear, "--", color=ORANGE, label="nonlinear")
+    difference = correction(gripper, network, torque, FINE).at(time_s)[0]
+    axes.plot(time_s, 1e3 * difference, color=BLUE)
+    axes.axhline(0, color=TARGET, linewidth=0.6)
     axes.set_xlabel("time (s)")
-    axes.set_ylabel("closing rotation (mrad)")
-    axes.legend()
+    axes.set_ylabel("nonlinear - linear rotation (mrad)")
+    peak = f"peak {1e3 * np.max(np.abs(linear)):.3g} mrad"
+    axes.annotate(peak, (0.98, 0.04), xycoords="axes fraction", ha="right", fontsize=7)
     panel(axes, "a", f"{truth.title}, {_SHOWN_FACTOR:g} x torque")
 
 
@@ -91,7 +93,7 @@ LINEARISATION_MAP = drawing(
     draw,
     name="linearisation_map",
     file="linearisation",
-    caption=CAPTION,
+    caption=f"(a) Nonlinear minus linear rotation of one case. (b to d) {CAPTION}",
     settings=settings,
     reads={"differences": the(DIFFERENCES.path)},
     when=lambda study: bool(study.simulated),

@@ -8,19 +8,20 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.experiment.truth import Truth
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.success import at_noise_floor
+from biogrip.identify.success import near_noise, near_noise_words
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import (
     SHOWN_SEEDS,
-    Fit,
-    best_fit,
+    TypicalFit,
     first_seeds,
     scale_of,
     seeds_in_words,
+    typical_fit,
 )
 from biogrip.products.figures.style import (
     ALL_SEEDS,
@@ -34,6 +35,7 @@ from biogrip.products.figures.style import (
 )
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import MEASUREMENTS
+from biogrip.products.files.verdicts import EXPECTED, read_verdicts, told_from_zero
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Study
@@ -57,14 +59,14 @@ class Settings:
         What the identification of the first assumes.
     method
         Whose identifications.
-    noise_floor_tolerance
+    near_noise_tolerance
         By which share a misfit may exceed the noise, to be taken for as good.
     """
 
     cases: tuple[Truth, ...]
     problem: CaseProblem
     method: str
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
 
 
 def shown_cases(study: Study) -> list[str]:
@@ -76,23 +78,24 @@ def settings(study: Study) -> Settings:
     """Choose what the overview shows."""
     cases = [study.cases[name] for name in shown_cases(study)]
     truths = tuple(case.truth for case in cases)
-    return Settings(truths, cases[0].problem, study.shown, study.noise_floor_tolerance)
+    return Settings(truths, cases[0].problem, study.shown, study.near_noise_tolerance)
 
 
 def draw(
     settings: Settings,
     identifications: list[Path],
+    expected: list[Path],
     measurements: list[Path],
     calibrated: list[Path],
 ) -> Figure:
-    """Draw the first case's best fit, and identified over target values of a few cases.
+    """Draw the first case's typical fit, and identified over target values of a few cases.
 
     Parameters
     ----------
     settings
         What is shown.
-    identifications
-        Of the cases, CSV, in their order.
+    identifications, expected
+        Of the cases, CSV and JSON, in their order.
     measurements, calibrated
         Of the first, Parquet, and YAML if its gripper was calibrated.
     """
@@ -100,14 +103,15 @@ def draw(
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
     problem = settings.problem.calibrated(calibrated)
-    fit = best_fit(problem, settings.method, identifications[0], measurements)
+    fit = typical_fit(problem, settings.method, identifications[0], measurements)
     _fit(axes[0], cases[0], fit)
     seeds = 0
     for index, (case, path) in enumerate(zip(cases, identifications, strict=True)):
         found = read_identifications(path, settings.method)
         seeds = len(found)
-        tolerance = settings.noise_floor_tolerance
-        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index)
+        tolerance = settings.near_noise_tolerance
+        told = told_from_zero(read_verdicts(expected[index]))
+        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index, told)
     legend: dict[str, Any] = {}
     for panel_axes in axes[1:]:
         legend |= {
@@ -118,14 +122,14 @@ def draw(
         legend.values(),
         legend.keys(),
         loc="outside lower right",
-        ncols=4,
+        ncols=5,
         markerscale=2.5,
         title=seeds_in_words(seeds) if seeds > SHOWN_SEEDS else None,
     )
     return drawn
 
 
-def _fit(axes: Axes, case: Truth, fit: Fit) -> None:
+def _fit(axes: Axes, case: Truth, fit: TypicalFit) -> None:
     factor, unit = scale_of(fit.fitted_rad, "rad")
     axes.plot(
         fit.time_s,
@@ -138,7 +142,13 @@ def _fit(axes: Axes, case: Truth, fit: Fit) -> None:
     axes.plot([], [], ".", color=MEASURED, label="noisy measurement", markersize=4)
     if fit.target_rad is not None:
         axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label="best fit")
+    axes.plot(
+        fit.time_s,
+        factor * fit.fitted_rad,
+        "--",
+        color=FITTED,
+        label=f"typical fit (seed {fit.seed})",
+    )
     axes.set_ylim(top=1.55 * factor * fit.measured_rad.max())
     axes.set_xlim(fit.time_s[0], fit.time_s[-1])
     axes.set_xlabel("time (s)")
@@ -153,44 +163,26 @@ def _scatter(
     found: pd.DataFrame,
     tolerance: float,
     index: int,
+    told: set[str],
 ) -> None:
-    reached = at_noise_floor(found, tolerance)
+    reached = near_noise(found, tolerance)
+    words = near_noise_words(tolerance)
     ticks = []
-    for x, (label, columns, target, paper) in enumerate(_quantities(case)):
-        ratio = _clipped(found[columns].sum(axis=1).to_numpy(float) / target)
-        # A fixed sideways scatter, by seed, keeps points apart.
-        place = x + 0.5 * ((found["seed"].to_numpy() * 0.618034) % 1 - 0.5)
-        style: dict[str, Any] = {
-            "linestyle": "",
-            "marker": "o",
-            "markersize": 2,
-            "alpha": 0.6,
-            "markeredgewidth": 0,
-        }
-        axes.plot(
-            place[~reached],
-            ratio[~reached],
-            color=ALL_SEEDS,
-            label="fit above it",
-            **style,
-        )
-        axes.plot(
-            place[reached],
-            ratio[reached],
-            color=FITTED,
-            label="fit at the noise floor",
-            **style,
-        )
-        if paper is not None:
-            axes.plot(
-                [x - 0.4, x + 0.4],
-                2 * [_clipped(np.array([paper / target]))[0]],
-                color=PAPER,
-                label="paper",
+    quantities = [item for item in _quantities(case) if item[0] in told]
+    for x, (_, label, columns, target, paper) in enumerate(quantities):
+        ratio = found[columns].sum(axis=1).to_numpy(float) / target
+        place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
+        for which, color, name in ((~reached, ALL_SEEDS, "other fits"), (reached, FITTED, words)):
+            _points(
+                axes, place[which], ratio[which], color, f"fit {words}" if name == words else name
             )
+        if paper is not None:
+            shown = float(np.clip(paper / target, 1 / _WORST, _WORST))
+            axes.plot([x - 0.4, x + 0.4], [shown, shown], color=PAPER, label="paper")
         ticks.append(label)
     axes.axhline(1, color=TARGET, linewidth=0.8, label="truth")
     axes.set_yscale("log")
+    axes.plot([], [], "^", color=TARGET, markersize=1.6, label="beyond the axis")
     axes.set_ylim(1 / (2 * _WORST), 2 * _WORST)
     axes.set_yticks([1e-3, 1e-2, 0.1, 1, 10, 100, 1e3])
     if index:
@@ -203,8 +195,8 @@ def _scatter(
 
 def _quantities(
     case: Truth,
-) -> list[tuple[str, list[str], float, float | None]]:
-    """Label, columns, target and the paper's value of each parameter, and of c + c_p."""
+) -> list[tuple[str, str, list[str], float, float | None]]:
+    """Name, label, columns, target and the paper's value of each parameter, and of c + c_p."""
     identified = case.published.identified
     found = []
     for group in case.model.quantities:
@@ -213,14 +205,20 @@ def _quantities(
         paper = sum(identified[parameter.name] for parameter in group) if known else None
         label = "+".join(parameter.symbol for parameter in group)
         if target > 0:
-            found.append((label, [p.column for p in group], target, paper))
+            name = " + ".join(parameter.name for parameter in group)
+            found.append((name, label, [p.column for p in group], target, paper))
     return found
 
 
-def _clipped(ratio: Array) -> Array:
-    """Put what is off the axis on its edge."""
-    clipped: Array = np.clip(ratio, 1 / _WORST, _WORST)
-    return clipped
+def _points(axes: Axes, place: NDArray[np.floating], ratio: Array, color: str, label: str) -> None:
+    """Draw points, and triangles on the edge for those beyond the axis."""
+    style: dict[str, Any] = {"color": color, "linestyle": "", "markeredgewidth": 0, "alpha": 0.55}
+    inside = (ratio > 1 / _WORST) & (ratio < _WORST)
+    axes.plot(place[inside], ratio[inside], marker="o", markersize=2.2, label=label, **style)
+    edges = (("v", ratio <= 1 / _WORST, 1 / _WORST), ("^", ratio >= _WORST, _WORST))
+    for marker, outside, edge in edges:
+        height = np.full(int(outside.sum()), edge)
+        axes.plot(place[outside], height, marker=marker, markersize=3.5, **style)
 
 
 def _first(study: Study) -> str:
@@ -230,12 +228,13 @@ def _first(study: Study) -> str:
 OVERVIEW = drawing(
     draw,
     name="overview",
-    caption="(a) Target, noisy measurement and best fit of the first case. (b to d) Identified "
-    "over target value of every seed of the first three cases, for each parameter and for c + c_p; "
-    "values off the axis are drawn at its edge.",
+    caption="(a) Target, noisy measurement and typical fit of the first case. (b to d) Identified "
+    "over target value of every seed of the first three cases, for c + c_p and each parameter that "
+    "traces can tell from zero; triangles at the edge stand for values off the axis.",
     settings=settings,
     reads={
         "identifications": of_cases(PATH, shown_cases),
+        "expected": of_cases(EXPECTED, shown_cases),
         "measurements": Reads(lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))),
         "calibrated": Reads(
             lambda plan, _: calibration_of().files(plan, {"case": _first(plan.study)})

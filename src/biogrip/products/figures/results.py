@@ -1,5 +1,6 @@
-"""What the figures of results read: a case's best seed, its trace and its fit."""
+"""What the figures of results read: a case's typical seed, its trace and its fit."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.success import lowest_misfit
+from biogrip.identify.success import typical
 from biogrip.products.batches import parse_batch
 from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.traces import read_measurements
@@ -39,8 +40,8 @@ class Fit:
 
 
 @dataclass(frozen=True)
-class BestFit(Fit):
-    """The identification of lowest misfit.
+class TypicalFit(Fit):
+    """The identification of the typical seed, see `typical`.
 
     Parameters
     ----------
@@ -52,10 +53,10 @@ class BestFit(Fit):
     generations: int
 
 
-def best_fit(
+def typical_fit(
     problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
-) -> BestFit:
-    """Read the seed of lowest misfit and simulate its answer.
+) -> TypicalFit:
+    """Read the typical seed and simulate its answer.
 
     Parameters
     ----------
@@ -69,20 +70,39 @@ def best_fit(
         Its noisy traces, Parquet, named after their batch of seeds.
     """
     found = read_identifications(identifications, method)
-    best = lowest_misfit(found)
-    seed = int(best["seed"])
-    recorded = read_measurements(_holding(seed, measurements), [seed])
+    shown = typical(found)
+    seed = int(shown["seed"])
+    values = {p.name: float(shown[p.column]) for p in problem.model.parameters}
+    fit = fit_of(problem, values, _holding(seed, measurements), seed)
+    return TypicalFit(**vars(fit), seed=seed, generations=int(shown["generations"]))
+
+
+def fit_of(
+    problem: CaseProblem, parameters: Mapping[str, float], measurements: Path, seed: int
+) -> Fit:
+    """Simulate a sample beside a trace that it is to fit.
+
+    Parameters
+    ----------
+    problem
+        What the identification assumes.
+    parameters
+        Values by name, SI units.
+    measurements
+        Noisy traces, Parquet.
+    seed
+        Which of them.
+    """
+    recorded = read_measurements(measurements, [seed])
     model = problem.model
-    network = model.network(np.array([[float(best[p.column]) for p in model.parameters]]))
+    network = model.network(np.array([[parameters[name] for name in model.names]]))
     simulated = simulated_rotation(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
     )[0]
     measured = recorded.rotation_rad[seed]
     nuisance = nuisance_basis(recorded.time_s, offset=problem.offset, drift=problem.drift)
     fitted = simulated + within(nuisance, measured - simulated)
-    return BestFit(
-        recorded.time_s, recorded.target_rad, measured, fitted, seed, int(best["generations"])
-    )
+    return Fit(recorded.time_s, recorded.target_rad, measured, fitted)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
@@ -95,8 +115,8 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
-def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
-    """Read the histories, by one method, of the seeds that are drawn and of the best.
+def read_history(path: Path, method: str, shown: int) -> pd.DataFrame:
+    """Read the histories, by one method, of the seeds that are drawn and of one more.
 
     Raises
     ------
@@ -109,7 +129,7 @@ def read_history(path: Path, method: str, best: int) -> pd.DataFrame:
             path,
             filters=[
                 [by_method, ("seed", "<", SHOWN_SEEDS)],
-                [by_method, ("seed", "==", best)],
+                [by_method, ("seed", "==", shown)],
             ],
         )
     except (OSError, ValueError) as error:

@@ -1,4 +1,4 @@
-"""Heat maps of a sweep: who reaches the noise floor, and how far errors are above their bound."""
+"""Heat maps of a sweep: who ends in the true basin, and how far above the bound errors are."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ from biogrip.products.figures.style import PAGE_IN, figure, panel
 from biogrip.products.heat_maps import (
     CAPTION,
     HeatMaps,
-    headlines,
+    headlines_of,
     heat_maps,
     points_of_cases,
     read_points,
@@ -35,7 +35,7 @@ _WITHOUT_BOUND = "#dddddd"
 
 
 def draw(maps: HeatMaps, points: list[Path]) -> Figure:
-    """Draw the shares at the noise floor, and the errors of the best and the worst determined.
+    """Draw the shares in the true basin, and errors there of the best and the worst determined.
 
     Numbers in the cells are those of the first method; in brackets stand the
     share of the second, and the bound.
@@ -56,9 +56,9 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
         found = read_points(points, name)
         panel(grid[0, index], "abc"[index], title, most_letters=24)
         _shares(grid[0, index], maps, found, height / rows)
-        chosen = headlines(found)
+        chosen = headlines_of(found)
         for axes, quantity in zip(grid[1:, index], chosen, strict=False):
-            axes.set_title(f"{_symbol(quantity)}: error (bound) in %", fontsize=7.5)
+            axes.set_title(f"{_symbol(quantity)}: error there (bound) in %", fontsize=7.5)
             _errors(axes, maps, found[found["quantity"] == quantity], height / rows)
         for axes in grid[1 + len(chosen) :, index]:
             axes.set_axis_off()
@@ -73,20 +73,20 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
     drawn.supxlabel(maps.columns.title, fontsize=8)
     first, *others = (METHODS[method].title for method in maps.methods)
     bar = drawn.colorbar(ScalarMappable(_SHARE, "cividis"), ax=list(grid[0]), pad=0.01)
-    lines = ["seeds at the noise floor (%)", first, *(f"({other})" for other in others[:1])]
+    lines = ["seeds in the true basin (%)", first, *(f"({other})" for other in others[:1])]
     bar.set_label("\n".join(lines), fontsize=7)
     bar = drawn.colorbar(
         ScalarMappable(_RATIO, "cividis_r"), ax=list(grid[1:].flat), pad=0.01, extend="both"
     )
     bar.set_ticks(_RATIO_TICKS, labels=[f"{tick:g}" for tick in _RATIO_TICKS])
-    bar.set_label(f"median error of the {first} / bound", fontsize=7)
+    bar.set_label(f"median error in the true basin / bound, {first}", fontsize=7)
     drawn.suptitle(maps.title, fontsize=8, x=0.01, ha="left")
     return drawn
 
 
 def _shares(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) -> None:
     shares = [
-        100 * _grid(maps, points[points["method"] == method], "success_share")
+        100 * _grid(maps, points[points["method"] == method], "basin_share")
         for method in maps.methods[:2]
     ]
     _heat_map(axes, maps, shares[0], _SHARE, "cividis")
@@ -95,7 +95,7 @@ def _shares(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) 
 
 def _errors(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) -> None:
     first = points[points["method"] == maps.methods[0]]
-    error = _grid(maps, first, "median_absolute_error_percent")
+    error = _grid(maps, first, "basin_error_percent")
     bound = _grid(maps, first, "bound_percent")
     # An error of exactly zero has no logarithm, but a colour: the best.
     ratio = np.clip(error / bound, _RATIO.vmin, _RATIO.vmax)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.experiment.truth import Truth
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
@@ -31,7 +33,9 @@ from biogrip.products.figures.style import (
 )
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
-from biogrip.products.product import the
+from biogrip.products.files.verdicts import EXPECTED, read_verdicts
+from biogrip.products.product import JUDGEMENT, the
+from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Case, Study
 
 # Beyond this bound (of a logarithm) an axis covers decades, not percents.
@@ -42,19 +46,26 @@ _DECADES = 1e4
 
 @dataclass(frozen=True)
 class Settings:
-    """The sample, what its identification assumes, and the noise that it meets."""
+    """The sample, what its identification assumes, the noise that it meets, and a confidence."""
 
     truth: Truth
     problem: CaseProblem
     noise: Noise
+    confidence: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Choose what the scatter of a case depends on."""
-    return Settings(case.truth, case.problem, case.noise)
+    return Settings(case.truth, case.problem, case.noise, case.confidence)
 
 
-def draw(settings: Settings, identifications: Path, target: Path) -> Figure:
+def draw(
+    settings: Settings,
+    identifications: Path,
+    target: Path,
+    expected: Path,
+    calibrated: list[Path],
+) -> Figure:
     """Draw identified over target for every quantity and method.
 
     Parameters
@@ -63,9 +74,15 @@ def draw(settings: Settings, identifications: Path, target: Path) -> Figure:
         The sample.
     identifications, target
         Of the case, CSV.
+    expected
+        What its traces should tell, JSON.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
     """
+    items = read_verdicts(expected)["quantities"]
+    verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    truth, posed = settings.truth, settings.problem
+    truth, posed = settings.truth, settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     log_truth = posed.logs(truth.parameters)
     _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
@@ -81,16 +98,21 @@ def draw(settings: Settings, identifications: Path, target: Path) -> Figure:
             continue
         ratios = found[[p.column for p in names]].sum(axis=1) / value
         limit = bound(sensitivity, noise_rad, log_truth, quantity)
-        _quantity(axes, found["method"], ratios.to_numpy(float), limit)
+        verdict = verdicts[quantity.label]
+        # Where the truth is not determined the tangent at it says nothing of where fits end.
+        known = limit if verdict == DETERMINED else np.inf
+        _quantity(axes, found["method"], ratios.to_numpy(float), known, settings.confidence)
         _paper(axes, truth.published.identified, [p.name for p in names], value)
-        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, limit), 60)
+        panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
-    _legend(drawn, truth, list(found["method"].unique()), found["seed"].nunique())
+    _legend(drawn, settings, list(found["method"].unique()), found["seed"].nunique())
     return drawn
 
 
-def _quantity(axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float) -> None:
+def _quantity(
+    axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float, confidence: float
+) -> None:
     """One column of points a method; what lies beyond the axis stands on its edge."""
     loose = limit > _LOOSE
     top = _DECADES if loose else 1 + _WIDTHS * limit
@@ -119,8 +141,11 @@ def _quantity(axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float
         low, middle, high = np.clip(np.percentile(mine, [25, 50, 75]), bottom, top)
         axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
-    if not loose:
-        axes.axhspan(1 - 1.96 * limit, 1 + 1.96 * limit, color=SHADE, zorder=0, linewidth=0)
+    if np.isfinite(limit):
+        reach = NormalDist().inv_cdf((1 + confidence) / 2) * limit
+        # Of the logarithm, straight where the axis is.
+        low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
+        axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
     axes.axhline(1, color=TARGET, linewidth=0.6)
     if loose:
         axes.set_yscale("log")
@@ -140,12 +165,12 @@ def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target
         axes.axhline(value, color=PAPER, linewidth=1.2, linestyle=(0, (4, 2)))
 
 
-def _title(quantity: Quantity, limit: float) -> str:
-    known = f"{100 * limit:.2g} %" if limit < 1 else "none"
+def _title(quantity: Quantity, limit: float, verdict: str) -> str:
+    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict
     return f"{quantity.symbol}: {known}"
 
 
-def _legend(drawn: Figure, truth: Truth, methods: list[str], seeds: int) -> None:
+def _legend(drawn: Figure, settings: Settings, methods: list[str], seeds: int) -> None:
     handles: list[Any] = []
     axes = drawn.axes[0]
     for name in methods:
@@ -153,9 +178,13 @@ def _legend(drawn: Figure, truth: Truth, methods: list[str], seeds: int) -> None
         handles += axes.plot(
             [], [], "o", color=color, markersize=4, label=METHODS[name].title, markeredgewidth=0
         )
-    handles.append(
-        axes.fill([], [], color=SHADE, label="95 % by the Cramér-Rao bound, named above")[0]
+    handles += axes.plot(
+        [], [], "^", color=TARGET, markersize=4, label="beyond the axis", markeredgewidth=0
     )
+    percent = f"{100 * settings.confidence:g} %"
+    label = f"{percent} by the Cramér-Rao bound (named above), rest known"
+    handles.append(axes.fill([], [], color=SHADE, label=label)[0])
+    truth = settings.truth
     if truth.published.identified:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
@@ -166,11 +195,18 @@ def _legend(drawn: Figure, truth: Truth, methods: list[str], seeds: int) -> None
 SCATTER = drawing(
     draw,
     name="scatter",
-    caption="Identified over target values for every method and seed; shaded: 95 % by the "
-    "Cramér-Rao bound; dashed: the paper. Bars are quartiles, triangles stand for values beyond "
-    "the axis.",
+    caption="Identified over target values for every method and seed; shaded, where "
+    "traces determine it: the confidence interval by the Cramér-Rao bound, for which parameters "
+    "without information are taken as known; dashed: the paper. Bars are quartiles, triangles "
+    "stand for values beyond the axis.",
     settings=settings,
-    reads={"identifications": the(PATH), "target": the(TARGETS)},
+    reads={
+        "identifications": the(PATH),
+        "target": the(TARGETS),
+        "expected": the(EXPECTED),
+        "calibrated": calibration_of(),
+    },
     cases=lambda study: study.simulated,
     sheet="case_figures",
+    weight=JUDGEMENT,
 )

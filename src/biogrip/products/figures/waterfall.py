@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.identify.methods import METHODS
-from biogrip.identify.success import chi_square_rise
+from biogrip.identify.success import chi_square_rise, near_noise_words
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import COLUMN_IN, GREY, METHOD_STYLES, TARGET, figure
 from biogrip.products.files.identifications import PATH, read_identifications
@@ -27,19 +27,19 @@ class Settings:
         The case in print.
     samples
         Samples in a trace.
-    optimum_tolerance, noise_floor_tolerance
-        What counts as the optimum, and as the noise floor.
+    optimum_tolerance, near_noise_tolerance
+        What counts as the optimum, and as near the noise.
     """
 
     title: str
     samples: int
     optimum_tolerance: float
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Choose what the waterfall of a case depends on."""
-    tolerances = study.optimum_tolerance, study.noise_floor_tolerance
+    tolerances = study.optimum_tolerance, study.near_noise_tolerance
     return Settings(case.title, case.samples, *tolerances)
 
 
@@ -58,16 +58,21 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     tolerance = settings.optimum_tolerance
     drawn = figure(COLUMN_IN, 3.0)
     axes = drawn.subplots()
-    for method in found["method"].unique():
+    methods = found["method"].unique()
+    # Where curves coincide each is seen beside the thinner ones on top of it.
+    for method, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         mine = np.sort(rise[found["method"] == method])
         share = 100 * np.mean(mine <= tolerance)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{METHODS[method].title}: {share:.0f} %"
-        axes.plot(place, mine, label=label, **METHOD_STYLES[method])
+        axes.plot(place, mine, label=label, linewidth=width, **METHOD_STYLES[method])
     axes.axhline(tolerance, color=TARGET, linewidth=0.8, linestyle="--")
-    floor = settings.samples * ((1 + settings.noise_floor_tolerance) ** 2 - 1)
-    axes.axhline(floor, color=GREY, linewidth=0.8, linestyle=":")
-    for height, text in ((tolerance, "global optimum"), (floor, "noise floor")):
+    near = settings.samples * ((1 + settings.near_noise_tolerance) ** 2 - 1)
+    axes.axhline(near, color=GREY, linewidth=0.8, linestyle=":")
+    for height, text in (
+        (tolerance, "global optimum"),
+        (near, near_noise_words(settings.near_noise_tolerance)),
+    ):
         axes.annotate(
             text,
             (99.0, height),
@@ -77,7 +82,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
             ha="right",
         )
     axes.set_yscale("log")
-    axes.set_ylim(_LOWEST / 2, 5 * max(floor, float(rise.max())))
+    axes.set_ylim(_LOWEST / 2, 5 * max(near, float(rise.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
@@ -92,7 +97,8 @@ def draw(settings: Settings, identifications: Path) -> Figure:
 WATERFALL = drawing(
     draw,
     name="waterfall",
-    caption="How far above the global optimum each method ends, seed by seed, sorted.",
+    caption="How far above the global optimum each method ends, seed by seed, sorted. Dashed: what "
+    "counts as the optimum; dotted: the study's tolerance above the noise, which is much more.",
     settings=settings,
     reads={"identifications": the(PATH)},
     cases=lambda study: study.simulated,

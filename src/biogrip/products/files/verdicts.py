@@ -25,6 +25,7 @@ def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
         "misfit_rad": rounded(likelihood.misfit_rad),
         "noise_rad": rounded(likelihood.noise_rad),
         "threshold": rounded(likelihood.threshold),
+        "certainty": rounded(likelihood.certainty),
         "quantities": [_finding(finding) for finding in diagnosis.findings],
         "trades": [
             {
@@ -60,6 +61,11 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     return found
 
 
+def told_from_zero(verdicts: dict[str, Any]) -> set[str]:
+    """Return the quantities that are not just bounded above, so that ratios to them mean much."""
+    return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
+
+
 def _finding(finding: "Finding") -> dict[str, Any]:
     profile = finding.profile
     return {
@@ -70,6 +76,7 @@ def _finding(finding: "Finding") -> dict[str, Any]:
         "value": rounded(finding.value),
         "low": rounded(finding.low),
         "high": rounded(finding.high),
+        "excluded": [[rounded(start), rounded(end)] for start, end in finding.gaps],
         "deviation": rounded(finding.deviation),
         "in_words": finding.words(),
         "profile": {

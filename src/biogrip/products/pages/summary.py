@@ -8,12 +8,13 @@ import jinja2
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.products.figures.fit import FIT
+from biogrip.products.figures.judged_fit import JUDGED_FIT
 from biogrip.products.figures.profiles import PROFILES
 from biogrip.products.figures.valley import VALLEY
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, the, wildcards_of
+from biogrip.products.stages.judgement import TRACE
 from biogrip.study.study import Study
 
 _TEMPLATE = "summary.html.j2"
@@ -43,7 +44,7 @@ class Settings:
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the page of a case says."""
     case = study.case(job["case"])
-    trace = case.file if case.recorded else "seed 0 of the simulated traces"
+    trace = case.file if case.recorded else f"seed {TRACE} of the simulated traces"
     template = Path(__file__).with_name(_TEMPLATE).read_text(encoding="utf-8")
     return Settings(case.name, case.title, case.sample.model.title, trace, template)
 
@@ -87,7 +88,7 @@ def _embedded(path: Path) -> str:
 
 def _figures(plan: Plan, job: Wildcards) -> list[str]:
     valley = [VALLEY] if plan.study.case(job["case"]).has_valley else []
-    return [figure.writes["png"].format(**job) for figure in (FIT, PROFILES, *valley)]
+    return [figure.writes["png"].format(**job) for figure in (JUDGED_FIT, PROFILES, *valley)]
 
 
 SUMMARY = Product(

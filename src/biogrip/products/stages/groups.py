@@ -5,7 +5,8 @@ from collections.abc import Iterator, Sequence
 _TOGETHER = 63
 
 
-def groups(seeds: Sequence[int]) -> Iterator[Sequence[int]]:
+def groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
     """Yield the seeds of a batch, some at a time; no result depends on which these are."""
-    for first in range(0, len(seeds), _TOGETHER):
-        yield seeds[first : first + _TOGETHER]
+    count = times * _TOGETHER
+    for first in range(0, len(seeds), count):
+        yield seeds[first : first + count]

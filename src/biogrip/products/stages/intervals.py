@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.experiment.noise import Noise, add_noise, standard_deviation
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import with_fixed
+from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.fisher import covariance
-from biogrip.identifiability.many_limits import limits_of
-from biogrip.identifiability.profile import likelihood_of
-from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identifiability.many_limits import limits_and_deeper, limits_of
+from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
@@ -26,6 +26,7 @@ from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.full_judgements import EVERY, Shown, judged_in_full, refitted, shown_of
 from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
@@ -84,7 +85,8 @@ def estimate(
 
     The noise of a seed is the same as in its measurement. A second estimate has
     the parameters of which the trace carries no information at their true values,
-    as the Cramer-Rao bound has them.
+    as the Cramer-Rao bound has them. Every so many seeds are judged in full, as
+    users are shown it, see `judged_in_full`.
 
     Parameters
     ----------
@@ -108,6 +110,14 @@ def estimate(
     )
 
 
+@dataclass(frozen=True)
+class _Quantities:
+    """All of them, and the indices of those that traces should determine."""
+
+    every: list[Quantity]
+    wanted: list[int]
+
+
 def _rows(
     settings: Settings,
     posed: CaseProblem,
@@ -116,42 +126,99 @@ def _rows(
     rotation: Array,
     wanted: set[str],
 ) -> Iterator[tuple[str | int, ...]]:
-    case, noise, parameters = settings.case, settings.noise, settings.parameters
-    identify = identifier("least_squares", settings.least_squares)
-    quantities = [q for q in parameters_and_sum(posed.searched) if q.label in wanted]
-    truth = posed.logs(parameters)
+    every = parameters_and_sum(posed.searched)
+    chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in wanted])
+    rest_known, told, truth = _rest_known(settings, posed, time_s, rotation)
+    progress = Progress(f"{settings.case}, intervals", len(seeds))
+    # As many groups together as hold enough seeds that are judged in full.
+    for some in groups(seeds, EVERY):
+        lines: dict[int, list[list[str]]] = {}
+        in_full: dict[int, Likelihood] = {}
+        for group in groups(some):
+            traces = _traces(settings, group, rotation)
+            likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
+            simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
+            known = np.tile(truth, (len(group), 1))
+            known[:, told] = fitted_from(simpler, truth[told])
+            for index, seed in enumerate(group):
+                best = likelihoods[index].best
+                lines[seed] = _lines(chosen, best, limits[index], known[index])
+                if judged_in_full(seed):
+                    in_full[seed] = likelihoods[index]
+            progress.done(len(group))
+        shown = shown_of(list(in_full.values()), chosen.every, settings.confidence)
+        verdicts = dict(zip(in_full, shown, strict=True))
+        yield from _of_seeds(settings.case, chosen, lines, verdicts)
+
+
+def _rest_known(
+    settings: Settings, posed: CaseProblem, time_s: Array, rotation: Array
+) -> tuple[SampleModel, IntArray, Array]:
+    """Model without the parameters that traces say nothing of, which it has, and the truth."""
+    truth = posed.logs(settings.parameters)
     _, sensitivity = posed.of(time_s, rotation).residuals(truth)
-    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, noise)))
+    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, settings.noise)))
     told = np.flatnonzero(np.isfinite(spread))
     names = posed.searched.names
-    given = {name: parameters[name] for i, name in enumerate(names) if i not in told}
-    rest_known = with_fixed(posed.searched, given)
-    progress = Progress(f"{case}, intervals", len(seeds))
-    for group in groups(seeds):
-        streams = {
-            purpose: [stream(settings.study_seed, case, seed, purpose) for seed in group]
-            for purpose in ("noise", "coverage")
-        }
-        traces = [add_noise(rotation, noise, rng) for rng in streams["noise"]]
-        problems = [posed.of(time_s, trace) for trace in traces]
-        found = identify(problems, streams["coverage"], silent)
-        likelihoods = [
-            likelihood_of(
-                problem, np.log(each.parameters), each.misfit_rad, confidence=settings.confidence
-            )
-            for problem, each in zip(problems, found, strict=True)
-        ]
-        limits = limits_of(likelihoods, quantities)
-        simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
-        known = np.tile(truth, (len(group), 1))
-        known[:, told] = fitted_from(simpler, truth[told])
-        for index, seed in enumerate(group):
-            for which, quantity in enumerate(quantities):
-                best, other = quantity.log(likelihoods[index].best), quantity.log(known[index])
-                numbers = (best, *limits[index, which], other)
-                texts = ["" if math.isnan(u) else f"{math.exp(u):.5g}" for u in numbers]
-                yield case, quantity.label, seed, *texts
-        progress.done(len(group))
+    given = {name: settings.parameters[name] for i, name in enumerate(names) if i not in told}
+    return with_fixed(posed.searched, given), told, truth
+
+
+def _traces(settings: Settings, group: Sequence[int], rotation: Array) -> list[Array]:
+    rngs = [stream(settings.study_seed, settings.case, seed, "noise") for seed in group]
+    return [add_noise(rotation, settings.noise, rng) for rng in rngs]
+
+
+def _fitted(
+    settings: Settings,
+    posed: CaseProblem,
+    group: Sequence[int],
+    time_s: Array,
+    traces: list[Array],
+    chosen: _Quantities,
+) -> tuple[list[Likelihood], Array]:
+    """Optima of a group and their limits; where these lead deeper, both are found again."""
+    rngs = [stream(settings.study_seed, settings.case, seed, "coverage") for seed in group]
+    problems = [posed.of(time_s, trace) for trace in traces]
+    identify = identifier("least_squares", settings.least_squares)
+    confidence = settings.confidence
+    found = [
+        likelihood_of(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
+        for problem, each in zip(problems, identify(problems, rngs, silent), strict=True)
+    ]
+    quantities = [chosen.every[index] for index in chosen.wanted]
+    limits, deeper = limits_and_deeper(found, quantities)
+    for trace, x in deeper.items():
+        if (again := refitted(found[trace], x, confidence)) is not None:
+            found[trace], limits[trace] = again, limits_of([again], quantities)[0]
+    return found, limits
+
+
+def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:
+    """Estimate, limits and estimate with the rest known, of every quantity; some are empty."""
+    lines = [[_text(quantity.log(best)), "", "", ""] for quantity in chosen.every]
+    for which, index in enumerate(chosen.wanted):
+        lines[index][1:] = [_text(u) for u in (*limits[which], chosen.every[index].log(known))]
+    return lines
+
+
+def _of_seeds(
+    case: str,
+    chosen: _Quantities,
+    lines: Mapping[int, list[list[str]]],
+    verdicts: Mapping[int, Sequence[Shown]],
+) -> Iterator[tuple[str | int, ...]]:
+    for seed, of_seed in lines.items():
+        for index, (quantity, line) in enumerate(zip(chosen.every, of_seed, strict=True)):
+            shown = verdicts[seed][index] if seed in verdicts else None
+            if shown or index in chosen.wanted:
+                limits = (shown.low, shown.high) if shown else (None, None)
+                texts = ["" if limit is None else f"{limit:.5g}" for limit in limits]
+                yield case, quantity.label, seed, *line, shown.verdict if shown else "", *texts
+
+
+def _text(logarithm: float) -> str:
+    return "" if math.isnan(logarithm) else f"{math.exp(logarithm):.5g}"
 
 
 def _determined(expected: Path) -> set[str]:

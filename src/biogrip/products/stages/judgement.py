@@ -2,18 +2,24 @@
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from biogrip.experiment.noise import Noise, rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
-from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.valley import valley_data
-from biogrip.identify.answer import silent
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.profile import MISSED
+from biogrip.identifiability.valley import valley_and_deeper
+from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.methods import METHODS, identifier
 from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.problem import Problem
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
 from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
 from biogrip.products.plan import Wildcards
@@ -100,21 +106,31 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     identify = identifier("least_squares", settings.least_squares)
     rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
     (found,) = identify([problem], [rng], silent)
-    told = diagnose(
-        problem,
-        posed.searched,
-        found,
-        confidence=settings.confidence,
-        noise_rad=posed.noise_rad,
-    )
+    told, valley = _diagnosed(problem, posed, found, settings.confidence)
     data = {
         "case": settings.case,
         "model": posed.model.name,
         "confidence": settings.confidence,
         **diagnosis_data(told),
-        "valley": valley_data(told.likelihood, posed.searched),
+        "valley": valley,
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
+
+
+def _diagnosed(
+    problem: Problem, posed: CaseProblem, found: Identification, confidence: float
+) -> tuple[Diagnosis, dict[str, Any] | None]:
+    """Judge a trace, and once more if its valley leads deeper than its optimum."""
+    model, noise_rad = posed.searched, posed.noise_rad
+    told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+    valley, deeper = valley_and_deeper(told.likelihood, model)
+    if deeper is not None:
+        fit = settled(problem, local_fit(problem, deeper))
+        if told.likelihood.rise(fit.misfit_rad) < -MISSED:
+            found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
+            told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+            valley, _ = valley_and_deeper(told.likelihood, model)
+    return told, valley
 
 
 def expect(

@@ -27,22 +27,17 @@ class Settings:
 
     Parameters
     ----------
-    phases
-        The study's protocol.
     cases
-        Sample and gripper of each case, by name.
+        Sample, gripper and protocol of each case, by name.
     """
 
-    phases: tuple[Phase, ...]
-    cases: Mapping[str, tuple[Truth, Gripper]]
+    cases: Mapping[str, tuple[Truth, Gripper, tuple[Phase, ...]]]
 
 
 def settings(study: Study) -> Settings:
     """Choose what is compared."""
     cases = {name: study.cases[name] for name in study.simulated}
-    return Settings(
-        study.phases, {name: (case.truth, case.gripper) for name, case in cases.items()}
-    )
+    return Settings({n: (case.truth, case.gripper, case.phases) for n, case in cases.items()})
 
 
 def compare(settings: Settings, differences: Path) -> None:
@@ -51,8 +46,8 @@ def compare(settings: Settings, differences: Path) -> None:
 
 
 def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
-    torque = torque_history(settings.phases)
-    for name, (truth, gripper) in settings.cases.items():
+    for name, (truth, gripper, phases) in settings.cases.items():
+        torque = torque_history(phases)
         model = truth.model
         values = [truth.parameters[p] for p in model.names]
         network = model.network(np.tile(values, (len(FACTORS), 1)))

@@ -1,5 +1,6 @@
 """How well a case is identified from point to point of a sweep."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise, rms
 from biogrip.experiment.sampling import Sampling
-from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.identifiability.at_truth import bounds_percent, headlines
+from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import nearest_encodable
-from biogrip.identify.success import at_noise_floor
+from biogrip.identify.success import near_noise
+from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.rows import RowFile
 from biogrip.products.plan import Plan, Wildcards
@@ -26,11 +29,15 @@ POINTS = RowFile(
     "a sweep",
     (
         *("point", "row", "column", "method", "quantity", "seeds"),
-        *("success_share", "median_absolute_error_percent", "bound_percent"),
+        *("near_noise_share", "basin_share"),
+        *("median_absolute_error_percent", "basin_error_percent", "bound_percent"),
     ),
     "results/robustness/{sweep}/{case}.csv",
     words=("row", "column"),
 )
+
+# Logarithm of the factor, and number of bounds, within which a value is in the basin of the truth.
+_FACTOR, _BOUNDS = math.log(2), 4.0
 
 
 @dataclass(frozen=True)
@@ -62,7 +69,7 @@ class Settings:
     ----------
     methods
         Identifiers.
-    noise_floor_tolerance
+    near_noise_tolerance
         By which share a misfit may exceed the noise, to be taken for as good.
     parameters
         True values by name, SI units.
@@ -71,7 +78,7 @@ class Settings:
     """
 
     methods: tuple[str, ...]
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
     parameters: Mapping[str, float]
     points: Mapping[str, PointSettings]
 
@@ -85,10 +92,12 @@ def settings(study: Study, job: Wildcards) -> Settings:
             point.row.text, point.column.text, case.problem, case.noise, case.sampling
         )
     parameters = study.cases[job["case"]].parameters
-    return Settings(tuple(study.methods), study.noise_floor_tolerance, parameters, points)
+    return Settings(tuple(study.methods), study.near_noise_tolerance, parameters, points)
 
 
-def judge(settings: Settings, identifications: list[Path], points: Path) -> None:
+def judge(
+    settings: Settings, identifications: list[Path], calibrated: list[Path], points: Path
+) -> None:
     """Judge the identifications of every point of a sweep over a case.
 
     Parameters
@@ -97,6 +106,8 @@ def judge(settings: Settings, identifications: list[Path], points: Path) -> None
         By what.
     identifications
         Those of every point, CSV, named like it.
+    calibrated
+        Calibrations, YAML, of those points that rely on one, named like them.
     points
         A row per point, method and quantity, CSV.
 
@@ -105,49 +116,99 @@ def judge(settings: Settings, identifications: list[Path], points: Path) -> None
     BiogripError
         If a point has no identifications.
     """
-    POINTS.write(points, _rows(settings, {path.stem: path for path in identifications}))
+    POINTS.write(points, _rows(settings, {path.stem: path for path in identifications}, calibrated))
 
 
-def _rows(settings: Settings, files: Mapping[str, Path]) -> Iterator[tuple[str | int, ...]]:
+def _rows(
+    settings: Settings, files: Mapping[str, Path], calibrated: list[Path]
+) -> Iterator[tuple[str | int, ...]]:
+    calibrations = {path.stem: path for path in calibrated}
+    bounds = {
+        name: _bounds(settings, point, [calibrations[name]] if name in calibrations else [])
+        for name, point in settings.points.items()
+    }
+    heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
     for name, point in settings.points.items():
         if name not in files:
             raise BiogripError(f"{name}: no file of identifications is given.")
-        for found in _judged(settings, point, files[name]):
-            yield name, point.row, point.column, *found
+        for judged in _judged(settings, point, files[name], bounds[name], heads):
+            yield name, point.row, point.column, *judged
+
+
+def _bounds(
+    settings: Settings, point: PointSettings, calibrated: list[Path]
+) -> list[tuple[Quantity, float]]:
+    problem = point.problem.calibrated(calibrated)
+    time_s = point.sampling.over(problem.torque.end_s)
+    return bounds_percent(problem, point.noise, settings.parameters, time_s)
 
 
 def _judged(
-    settings: Settings, point: PointSettings, path: Path
+    settings: Settings,
+    point: PointSettings,
+    path: Path,
+    bounds: list[tuple[Quantity, float]],
+    heads: list[str],
 ) -> Iterator[tuple[str | int, ...]]:
     """Judge one point, for every method and quantity."""
     problem, parameters = point.problem, settings.parameters
     time_s = point.sampling.over(problem.torque.end_s)
-    bounds = bounds_percent(problem, point.noise, parameters, time_s)
     searched = problem.searched.parameters
+    members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
+    truths = {label: sum(parameters[p.name] for p in of) for label, of in members.items()}
     for method in settings.methods:
         found = read_identifications(path, method)
-        share = float(np.mean(_succeeded(settings, point, time_s, found)))
+        values = {
+            label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
+            for label, of in members.items()
+        }
+        near = float(np.mean(_succeeded(settings, point, time_s, found)))
+        inside = np.ones(len(found), dtype=bool)
         for q, percent in bounds:
-            members = [searched[index] for index in q.members]
-            truth = sum(parameters[p.name] for p in members)
-            values = found[[p.column for p in members]].sum(axis=1).to_numpy(float)
-            error = 100 * np.median(np.abs(values - truth)) / truth if truth else np.nan
-            numbers = (_text(number) for number in (share, float(error), percent))
-            yield method, q.label, len(found), *numbers
+            if q.label in heads:
+                inside &= in_basin(values[q.label], truths[q.label], percent / 100)
+        for q, percent in bounds:
+            errors = _errors_percent(values[q.label], truths[q.label])
+            within = _median(errors[inside])
+            share = float(np.mean(inside)) if heads else np.nan
+            numbers = (near, share, _median(errors), within, percent)
+            yield method, q.label, len(found), *(_text(number) for number in numbers)
+
+
+def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
+    """Whether identified values lie in the basin of the truth, (n_seeds,).
+
+    That is, within a factor of two, or, where noise leaves more than that, within four
+    times the bound of the logarithm. Without noise the bound is NaN.
+    """
+    with np.errstate(divide="ignore"):
+        away = np.abs(np.log(values / truth))
+    inside: BoolArray = away <= np.fmax(_FACTOR, _BOUNDS * bound)
+    return inside
+
+
+def _errors_percent(values: Array, truth: float) -> Array:
+    if not truth:
+        return np.full(len(values), np.nan)
+    return 100 * np.abs(values - truth) / truth
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else np.nan
 
 
 def _succeeded(
     settings: Settings, point: PointSettings, time_s: Array, found: pd.DataFrame
 ) -> np.ndarray:
-    """Whether each seed reached the noise floor, (n_seeds,).
+    """Whether each seed is near the noise, (n_seeds,).
 
-    Where there is no noise, the floor is what the genome can do: the misfit of the
+    Where there is no noise, it is held against what the genome can do: the misfit of the
     truth when it is rounded to two digits.
     """
     if point.noise.absent:
-        floor = _resolution_rad(point.problem, settings.parameters, time_s)
-        found = found.assign(noise_rms_rad=floor)
-    return at_noise_floor(found, settings.noise_floor_tolerance)
+        resolution = _resolution_rad(point.problem, settings.parameters, time_s)
+        found = found.assign(noise_rms_rad=resolution)
+    return near_noise(found, settings.near_noise_tolerance)
 
 
 def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
@@ -181,6 +242,12 @@ def _identifications(plan: Plan, job: Wildcards) -> list[str]:
     return [PATH.format(case=point.name) for point in points]
 
 
+def _calibrations(plan: Plan, job: Wildcards) -> list[str]:
+    points = plan.study.sweeps[job["sweep"]].points(job["case"])
+    relying = [point.name for point in points if plan.study.points[point.name].is_calibrated]
+    return [CALIBRATIONS.format(case=name) for name in relying]
+
+
 SWEEP_POINTS = Product(
     "sweep_points",
     {"points": POINTS.path},
@@ -188,6 +255,6 @@ SWEEP_POINTS = Product(
     settings,
     _jobs,
     message="Judging the sweep {sweep} over {case}",
-    reads={"identifications": Reads(_identifications)},
+    reads={"identifications": Reads(_identifications), "calibrated": Reads(_calibrations)},
     weight=Weight(30, 1000),
 )

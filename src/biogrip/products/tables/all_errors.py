@@ -5,25 +5,25 @@ from pathlib import Path
 from biogrip.products.files.rows import read_rows
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
-from biogrip.products.tables.errors import CAPTION, ERRORS, TABLE_COLUMNS
+from biogrip.products.tables.errors import CAPTION, ERRORS, TYPICAL, table_columns
 from biogrip.products.tables.layout import Cell, Table
 
-_WHOLE_NUMBERS = {"best_seed", "seeds"}
+_WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
 
-def all_errors(settings: None, tables: list[Path]) -> Table:
-    """Join the error tables of the cases, CSV."""
-    names = [column.name for column in TABLE_COLUMNS]
+def all_errors(near_noise_tolerance: float, tables: list[Path]) -> Table:
+    """Join the error tables of the cases, CSV, which were made with a tolerance."""
+    columns = table_columns(near_noise_tolerance)
+    names = [column.name for column in columns]
     rows: list[tuple[Cell, ...]] = [
         tuple(_cell(name, text) for name, text in zip(names, row, strict=True))
         for path in tables
         for row in read_rows(path, names)[1:]
     ]
     caption = (
-        "Identification errors of all cases. Best is the seed of lowest misfit. "
-        "Error = (target - identified) / target."
+        f"Identification errors of all cases. {TYPICAL} Error = (target - identified) / target."
     )
-    return Table(caption, TABLE_COLUMNS, rows)
+    return Table(caption, columns, rows)
 
 
 def _cell(name: str, text: str) -> Cell:
@@ -42,6 +42,6 @@ ALL_ERRORS = table(
     item="errors",
     caption=CAPTION,
     sheet="tables",
-    settings=lambda study: None,
+    settings=lambda study: study.near_noise_tolerance,
     reads={"tables": of_cases(ERRORS.writes["csv"], lambda study: study.cases)},
 )

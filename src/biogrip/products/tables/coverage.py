@@ -1,6 +1,6 @@
 """Whether intervals keep their promise, and estimates reach the Cramer-Rao bound."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,10 +11,18 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identifiability.verdicts import (
+    BOUNDED_ABOVE,
+    BOUNDED_BELOW,
+    DETERMINED,
+    NOT_DETERMINED,
+)
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import of_cases
+from biogrip.products.stages.full_judgements import EVERY
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
@@ -24,13 +32,19 @@ _COLUMNS = (
     Column("quantity", "Quantity"),
     Column("unit", "Unit"),
     Column("target", "Target", 4),
-    Column("bound_percent", "Cramér-Rao bound %", 3),
+    Column("bound_percent", "Cramér-Rao bound, rest known %", 3),
     Column("spread_percent", "Spread %", 3),
     Column("spread_over_bound", "Spread / bound", 3),
     Column("rest_known_over_bound", "The same, rest known", 3),
     Column("bias_percent", "Bias %", 2),
+    Column("confidence_percent", "Confidence %", 4),
     Column("coverage_percent", "Intervals that hold the truth %", 3),
     Column("seeds", "Seeds"),
+    Column("shown_seeds", "Seeds judged in full"),
+    Column("shown_determined", "Determined"),
+    Column("shown_determined_true", "True"),
+    Column("shown_one_sided", "Bounded on one side"),
+    Column("shown_one_sided_true", "True"),
 )
 
 
@@ -46,21 +60,33 @@ class CaseSettings:
         True values by name, SI units.
     noise
         What is added to the target.
+    confidence
+        Of the intervals.
+    calibrated
+        Whether a calibration replaces the gripper's arms.
     """
 
     problem: CaseProblem
     parameters: Mapping[str, float]
     noise: Noise
+    confidence: float
+    calibrated: bool
 
 
 def settings(study: Study) -> dict[str, CaseSettings]:
     """Choose what the intervals are held against, by case."""
     cases = {name: study.cases[name] for name in study.covered}
-    return {n: CaseSettings(c.problem, c.parameters, c.noise) for n, c in cases.items()}
+    return {
+        n: CaseSettings(c.problem, c.parameters, c.noise, c.confidence, c.is_calibrated)
+        for n, c in cases.items()
+    }
 
 
 def coverage(
-    settings: Mapping[str, CaseSettings], targets: list[Path], intervals: list[Path]
+    settings: Mapping[str, CaseSettings],
+    targets: list[Path],
+    intervals: list[Path],
+    calibrated: list[Path],
 ) -> Table:
     """Hold estimates and intervals of many seeds against the truth and the bound.
 
@@ -70,10 +96,13 @@ def coverage(
         Against what, by case.
     targets, intervals
         Those of the cases, CSV, in their order.
+    calibrated
+        Calibrations, YAML, of those cases that rely on one, in their order.
     """
+    calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
     for (name, case), target, file in zip(settings.items(), targets, intervals, strict=True):
-        posed = case.problem
+        posed = case.problem.calibrated([next(calibrations)] if case.calibrated else [])
         log_truth = posed.logs(case.parameters)
         found = INTERVALS.read(file)
         time_s, _, rotation = read_target(target)
@@ -81,34 +110,53 @@ def coverage(
         noise_rad = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(posed.searched):
             mine = found[found["quantity"] == quantity.label]
-            if mine.empty:
-                continue
             truth = float(np.exp(quantity.log(log_truth)))
-            best = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
-            error = 100 * np.log(mine["estimate"].to_numpy(float) / truth)
-            spread = _spread(mine["estimate"], truth)
-            rows.append(
-                (
-                    name,
-                    quantity.label,
-                    quantity.unit,
-                    truth,
-                    best,
-                    spread,
-                    spread / best,
-                    _spread(mine["estimate_rest_known"], truth) / best,
-                    float(np.mean(error)),
-                    100 * float(np.mean(_holds(mine, truth))),
-                    len(mine),
-                )
-            )
+            head = (name, quantity.label, quantity.unit, truth)
+            limit = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
+            fitted = mine[mine["estimate_rest_known"].notna()]
+            shown = mine[mine["verdict"].notna()]
+            if len(fitted) or np.any(shown["verdict"] != NOT_DETERMINED):
+                numbers = _spreads(fitted, truth, limit, case.confidence)
+                rows.append((*head, *numbers, len(shown), *_shown(shown, truth)))
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
-        "often the 95 % intervals hold the truth. Rest known: with the parameters of which the "
-        "traces carry no information at their true values, as the bound has them."
+        "often the intervals hold the truth. The bound is that of a simpler problem, and none of "
+        "the one that is fitted: parameters of which the traces carry no information are taken as "
+        "known. Fits have to find these too; they can only be too large, near zero as they are, "
+        "and what they take is missing elsewhere: hence the bias, and a spread above the bound. "
+        "Rest known: the spread with these parameters at their true values. On the right: what "
+        f"users are shown, verdicts from whole profiles, in every {EVERY}th seed, and how many of "
+        "them are true; a limit on one side is an end of the interval with two, and holds more "
+        "often than the confidence says."
     )
     return Table(caption, _COLUMNS, rows)
+
+
+def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> list[Cell]:
+    """Bound, spread and intervals of a quantity that traces should determine; else empty."""
+    if found.empty:
+        return [None] * 8
+    spread = _spread(found["estimate"], truth)
+    return [
+        bound,
+        spread,
+        spread / bound,
+        _spread(found["estimate_rest_known"], truth) / bound,
+        float(np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth))),
+        100 * confidence,
+        100 * float(np.mean(_holds(found, truth))),
+        len(found),
+    ]
+
+
+def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
+    """How many verdicts are determined, and of these true; the same of those on one side."""
+    holds = _holds(found, truth, "shown_")
+    for verdicts in ((DETERMINED,), (BOUNDED_BELOW, BOUNDED_ABOVE)):
+        chosen = found["verdict"].isin(verdicts).to_numpy()
+        yield int(np.sum(chosen))
+        yield int(np.sum(holds[chosen]))
 
 
 def _spread(estimates: "pd.Series[float]", truth: float) -> float:
@@ -116,10 +164,14 @@ def _spread(estimates: "pd.Series[float]", truth: float) -> float:
     return 100 * float(np.std(np.log(estimates.to_numpy(float) / truth), ddof=1))
 
 
-def _holds(found: pd.DataFrame, truth: float) -> Array:
-    low = found["low"].fillna(0.0).to_numpy(float)
-    high = found["high"].fillna(np.inf).to_numpy(float)
+def _holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
+    low = found[f"{which}low"].fillna(0.0).to_numpy(float)
+    high = found[f"{which}high"].fillna(np.inf).to_numpy(float)
     return ((low <= truth) & (truth <= high)).astype(float)
+
+
+def _calibrated(study: Study) -> list[str]:
+    return [name for name in study.covered if study.cases[name].is_calibrated]
 
 
 COVERAGE = table(
@@ -127,12 +179,13 @@ COVERAGE = table(
     name="coverage",
     item="coverage",
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
-    "their 95 % intervals hold the truth.",
+    "their intervals hold the truth; and how often the verdicts that users are shown are true.",
     sheet="tables",
     settings=settings,
     reads={
         "targets": of_cases(TARGETS, lambda study: study.covered),
         "intervals": of_cases(INTERVALS.path, lambda study: study.covered),
+        "calibrated": of_cases(CALIBRATIONS, _calibrated),
     },
     when=lambda study: bool(study.covered),
 )

@@ -8,30 +8,39 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
-from biogrip.identify.success import at_noise_floor, lowest_misfit
+from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import EVALUATION, the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
 from biogrip.study.study import Case, Study
 
-TABLE_COLUMNS = (
+_COLUMNS = (
     Column("case", "Case"),
     Column("parameter", "Parameter"),
     Column("unit", "Unit"),
     Column("target", "Target", 4),
     Column("paper_identified", "Paper", 4),
     Column("paper_error_percent", "Paper error %", 2),
-    Column("best_seed", "Best seed"),
-    Column("best_identified", "Best", 3),
-    Column("best_error_percent", "Best error %", 2),
+    Column("typical_seed", "Typical seed"),
+    Column("typical_identified", "Typical", 3),
+    Column("typical_error_percent", "Typical error %", 2),
     Column("median_identified", "Median", 3),
     Column("p05_identified", "5 %", 3),
     Column("p95_identified", "95 %", 3),
     Column("median_absolute_error_percent", "Median abs. error %", 2),
     Column("seeds", "Seeds"),
-    Column("noise_floor_share", "Share at noise floor", 2),
 )
+TYPICAL = (
+    "Typical is the seed of median excess of the misfit over the noise in its trace; the lowest "
+    "misfit would be that of the quietest trace."
+)
+
+
+def table_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
+    """Columns of an error table."""
+    share = f"Share {near_noise_words(near_noise_tolerance)}"
+    return (*_COLUMNS, Column("near_noise_share", share, 2))
 
 
 @dataclass(frozen=True)
@@ -44,28 +53,28 @@ class Settings:
         The sample.
     method
         Whose identifications.
-    noise_floor_tolerance
+    near_noise_tolerance
         By which share a misfit may exceed the noise, to be taken for as good.
     """
 
     case: str
     truth: Truth
     method: str
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Choose what the error table of a case depends on."""
-    return Settings(case.name, case.truth, study.shown, study.noise_floor_tolerance)
+    return Settings(case.name, case.truth, study.shown, study.near_noise_tolerance)
 
 
 def errors(settings: Settings, identifications: Path) -> Table:
     """Compare target and identified values of one case, given its identifications, CSV."""
     truth = settings.truth
     found = read_identifications(identifications, settings.method)
-    best = found.index.get_loc(lowest_misfit(found).name)
+    shown = found.index.get_loc(typical(found).name)
     known = bool(found["noise_rms_rad"].notna().all())
-    reached = at_noise_floor(found, settings.noise_floor_tolerance)
+    reached = near_noise(found, settings.near_noise_tolerance)
     share = float(np.mean(reached)) if known else None
     rows = []
     for names in truth.model.quantities:
@@ -81,9 +90,9 @@ def errors(settings: Settings, identifications: Path) -> Table:
                 names[0].unit,
                 target,
                 *_paper(truth, names, target),
-                int(found["seed"].iloc[best]),
-                float(values[best]),
-                float(error[best]),
+                int(found["seed"].iloc[shown]),
+                float(values[shown]),
+                float(error[shown]),
                 float(median),
                 float(low),
                 float(high),
@@ -95,11 +104,11 @@ def errors(settings: Settings, identifications: Path) -> Table:
     number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
     caption = (
         f"{number}{truth.title}: target and identified parameters over {len(found)} seeds. "
-        "Best is the seed of lowest misfit. Error = (target - identified) / target."
+        f"{TYPICAL} Error = (target - identified) / target."
         if truth.parameters
         else f"{truth.title}: parameters identified in the recorded trace."
     )
-    return Table(caption, TABLE_COLUMNS, rows)
+    return Table(caption, table_columns(settings.near_noise_tolerance), rows)
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
@@ -124,10 +133,10 @@ def _paper(
 
 CAPTION = (
     "Target values, the values and errors that the paper prints, and those of this study: the seed "
-    "of lowest misfit, median and 5 to 95 % over seeds, the median absolute error, and the share "
-    "of seeds whose misfit reaches the noise in their trace. Errors are "
-    "(target - identified) / target. Where c and c_p trade against each other, only the row "
-    "c + c_p is determined."
+    "of median excess of the misfit over the noise in its trace, median and 5 to 95 % over seeds, "
+    "the median absolute error, and the share of seeds whose misfit is within the study's "
+    "tolerance of the noise. Errors are (target - identified) / target. Where c and c_p trade "
+    "against each other, only the row c + c_p is determined."
 )
 
 ERRORS = table(

@@ -39,7 +39,7 @@ def linearisation(settings: None, differences: Path) -> Table:
         rows.append((case, float(angle), 100 * float(at_one), _crossing(factor, share)))
     caption = (
         "Largest difference of the linear from the nonlinear model, as a share of the peak, at the "
-        "protocol's torque, and the multiple of that torque at which it reaches 1 % "
+        "torque of the case's protocol, and the multiple of that torque at which it reaches 1 % "
         f"(empty: not up to {factor[-1]:g})."
     )
     return Table(caption, _COLUMNS, rows)
@@ -56,8 +56,8 @@ def _crossing(factor: np.ndarray, share: np.ndarray) -> float | None:
 
 CAPTION = (
     "The largest difference of the linear from the nonlinear model over the protocol, as a share "
-    "of the peak, over the reference angle and multiples of the protocol's torque. Left of and "
-    "above the 1 % line the paper's linearisation is worse than that."
+    "of the peak, over the reference angle and multiples of the torque of the case's protocol. "
+    "Left of and above the 1 % line the paper's linearisation is worse than that."
 )
 
 LINEARISATION = table(

@@ -1,7 +1,7 @@
 """The identifiers compared on the same traces."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import pandas as pd
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
-from biogrip.identify.success import at_noise_floor, chi_square_rise
+from biogrip.identify.success import chi_square_rise, near_noise, near_noise_words
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -23,7 +23,7 @@ _LEADING = (
     Column("method", "Method"),
     Column("seeds", "Seeds"),
     Column("optimum_share", "Share at global optimum", 3),
-    Column("noise_floor_share", "Share at noise floor", 2),
+    Column("near_noise_share", "Share {near_noise}", 2),
     Column("median_rise", "Median Δχ²", 2),
     Column("median_evaluations", "Median responses", 3),
 )
@@ -37,13 +37,13 @@ class Settings:
     ----------
     cases
         The samples, and how many samples their traces have, by name.
-    optimum_tolerance, noise_floor_tolerance
-        What counts as the optimum, and as the noise floor.
+    optimum_tolerance, near_noise_tolerance
+        What counts as the optimum, and as near the noise.
     """
 
     cases: Mapping[str, tuple[Truth, int]]
     optimum_tolerance: float
-    noise_floor_tolerance: float
+    near_noise_tolerance: float
 
 
 def settings(study: Study) -> Settings:
@@ -52,7 +52,7 @@ def settings(study: Study) -> Settings:
     return Settings(
         {name: (case.truth, case.samples) for name, case in cases.items()},
         study.optimum_tolerance,
-        study.noise_floor_tolerance,
+        study.near_noise_tolerance,
     )
 
 
@@ -77,7 +77,7 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
         rise = chi_square_rise(found, samples)
         for method in found["method"].unique():
             mine = found["method"] == method
-            reached = at_noise_floor(found[mine], settings.noise_floor_tolerance)
+            reached = near_noise(found[mine], settings.near_noise_tolerance)
             rows.append(
                 (
                     name,
@@ -90,14 +90,16 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
                     *_errors(found[mine], truth, list(labels)),
                 )
             )
+    words = near_noise_words(settings.near_noise_tolerance)
     columns = (
-        *_LEADING,
+        *(replace(c, heading=c.heading.format(near_noise=words)) for c in _LEADING),
         *(Column(f"error_percent {label}", f"Error {label} %", 2) for label in labels),
     )
     caption = (
         "Methods on the same traces. At the global optimum: chi-squared at most "
         f"{settings.optimum_tolerance:g} above the lowest that any method, or the truth, has on "
-        "that trace. Errors are medians of the absolute error."
+        f"that trace. A misfit {words} in the trace may be far above that in chi-squared. Errors "
+        "are medians of the absolute error."
     )
     return Table(caption, columns, rows)
 
@@ -119,8 +121,8 @@ METHODS_COMPARED = table(
     methods,
     name="methods",
     item="methods",
-    caption="The identifiers on the same traces: share of seeds at the global optimum and at the "
-    "noise floor, responses simulated, errors.",
+    caption="The identifiers on the same traces: share of seeds at the global optimum and within "
+    "the study's tolerance of the noise, responses simulated, errors.",
     sheet="tables",
     settings=settings,
     reads={"identifications": of_cases(PATH, lambda study: study.simulated)},

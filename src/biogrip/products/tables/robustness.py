@@ -3,16 +3,25 @@
 from pathlib import Path
 
 from biogrip.identify.methods import METHODS
+from biogrip.identify.success import near_noise_words
 from biogrip.products.heat_maps import (
     CAPTION,
     HeatMaps,
-    headlines,
+    headlines_of,
     heat_maps,
     points_of_cases,
     read_points,
 )
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+
+# Columns of a point, by method: name and heading in the table.
+_BY_METHOD = {
+    "near_noise_share": ("near_noise", "Share {near_noise}"),
+    "basin_share": ("basin", "Share in the true basin"),
+    "basin_error_percent": ("basin_error", "Median abs. error there %"),
+    "median_absolute_error_percent": ("error", "Median abs. error of all %"),
+}
 
 
 def robustness(maps: HeatMaps, points: list[Path]) -> Table:
@@ -28,7 +37,7 @@ def robustness(maps: HeatMaps, points: list[Path]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name in maps.cases:
         found = read_points(points, name)
-        for quantity in headlines(found):
+        for quantity in headlines_of(found):
             chosen = found[found["quantity"] == quantity]
             for (row, column), group in chosen.groupby(["row", "column"], sort=False):
                 by_method = group.set_index("method")
@@ -38,30 +47,31 @@ def robustness(maps: HeatMaps, points: list[Path]) -> Table:
                         maps.rows.values[row],
                         maps.columns.values[column],
                         quantity,
-                        *(float(by_method["success_share"][m]) for m in maps.methods),
-                        *(
-                            float(by_method["median_absolute_error_percent"][m])
-                            for m in maps.methods
-                        ),
+                        *(float(by_method[c][m]) for c in _BY_METHOD for m in maps.methods),
                         float(by_method["bound_percent"].iloc[0]),
                     )
                 )
+    words = near_noise_words(maps.near_noise_tolerance)
     titles = {method: METHODS[method].title for method in maps.methods}
     columns = (
         Column("case", "Case"),
         Column("row", _capital(maps.rows.title)),
         Column("column", _capital(maps.columns.title)),
         Column("quantity", "Quantity"),
-        *(Column(f"success_{m}", f"Share at noise floor, {t}", 2) for m, t in titles.items()),
-        *(Column(f"error_{m}", f"Median abs. error %, {t}", 2) for m, t in titles.items()),
-        Column("bound_percent", "Bound %", 2),
+        *(
+            Column(f"{name}_{m}", f"{heading.format(near_noise=words)}, {t}", 2)
+            for name, heading in _BY_METHOD.values()
+            for m, t in titles.items()
+        ),
+        Column("bound_percent", "Bound, rest known %", 2),
     )
     caption = (
-        f"{maps.title}: of every case the best and the worst determined quantity. Bound is "
-        "the standard deviation that noise leaves at least, to first order; the median absolute "
-        "error of an estimator that attains it is 0.67 of that. Without noise, where there is no "
-        "floor, the misfit of the truth rounded to two digits takes its place. The gripper's "
-        "values are reconstructed."
+        f"{maps.title}: of every case the best and the worst determined quantity. In the basin of "
+        "the truth are seeds within a factor of two of it, or four times the bound if that is "
+        "more, in both. Bound is the standard deviation that noise leaves at least, to first order "
+        "and with parameters without information taken as known; the median absolute error of an "
+        "estimator that attains it is 0.67 of that. Without noise, the misfit of the truth rounded "
+        "to two digits stands for the noise. The gripper's values are reconstructed."
     )
     return Table(caption, columns, rows)
 

@@ -1,7 +1,7 @@
 """What one trace of a case tells, quantity by quantity."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from biogrip.products.files.verdicts import PATH, read_verdicts
@@ -18,8 +18,9 @@ _COLUMNS = (
     Column("target", "Target", 4),
     Column("verdict", "Verdict"),
     Column("value", "Estimate", 3),
-    Column("low", "95 % from", 3),
-    Column("high", "95 % to", 3),
+    Column("low", "{percent} from", 3),
+    Column("high", "{percent} to", 3),
+    Column("excluded", "Except"),
     Column("expected_verdict", "Expected verdict"),
     Column("expected_low", "Expected from", 3),
     Column("expected_high", "Expected to", 3),
@@ -68,6 +69,7 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
                 item["value"] if item["verdict"] == "determined" else None,
                 item["low"],
                 item["high"],
+                " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"]),
                 foreseen.get("verdict"),
                 foreseen.get("low"),
                 foreseen.get("high"),
@@ -79,11 +81,15 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
         for trade in found["trades"]
     )
     caption = (
-        f"{settings.title}: what the trace of one seed tells, from profile likelihoods.{trades}"
+        f"{settings.title}: what the trace of one seed tells, from profile likelihoods.{trades} "
+        "Limits are the ends of an interval with two; one that stands alone holds with "
+        f"{50 * (1 + found['confidence']):g} %."
     )
     if others:
         caption += " Expected: the same of the trace without noise, held against its noise."
-    return Table(caption, _COLUMNS, rows)
+    percent = f"{100 * found['confidence']:g} %"
+    columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _COLUMNS)
+    return Table(caption, columns, rows)
 
 
 def _target(quantity: str, parameters: Mapping[str, float]) -> float | None:
@@ -96,7 +102,7 @@ VERDICTS = table(
     name="verdicts",
     item="verdicts",
     caption="What the trace of one seed of this case tells: a verdict on every quantity from its "
-    "profile likelihood (95 % limits), beside what the trace without noise leads to expect.",
+    "profile likelihood, with confidence limits, beside what to expect by the trace without noise.",
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,

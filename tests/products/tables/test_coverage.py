@@ -1,0 +1,85 @@
+"""Coverage of intervals and of verdicts, counted by hand."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.products.files.intervals import INTERVALS
+from biogrip.products.files.traces import write_target
+from biogrip.products.stages import intervals as stage
+from biogrip.products.tables.coverage import coverage, settings
+from biogrip.response.simulation import simulated_rotation
+from tests.helpers.default import study_of
+
+CASE = "liquid_drop_2"
+OVERLAY = """
+measurement: {rate_Hz: 1.0}
+identifiability: {confidence: 0.9}
+cases: {endothelial_cell: null, liquid_drop_1: null}
+"""
+
+
+@pytest.fixture
+def target(tmp_path: Path) -> Path:
+    case = study_of(OVERLAY).cases[CASE]
+    problem = case.problem
+    time_s = case.sampling.over(problem.torque.end_s)
+    network = problem.model.network(np.array([list(case.parameters.values())]))
+    rotation = simulated_rotation(
+        problem.gripper, network, problem.torque, time_s, nonlinear=False
+    )[0]
+    path = tmp_path / "target.csv"
+    nothing = np.zeros_like(time_s)
+    write_target(path, time_s, nothing, rotation, nothing)
+    return path
+
+
+def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> None:
+    rows = [
+        # Of k = 1 three intervals, two of which hold it; two seeds judged in full.
+        (CASE, "k", 0, 1.01, 0.9, 1.1, 1.0, "determined", 1.005, 1.2),
+        (CASE, "k", 1, 1.02, 0.9, 1.2, 1.01, "", "", ""),
+        (CASE, "k", 10, 1.3, 1.1, 1.5, 1.0, "bounded below", 0.95, ""),
+        # c_p = 1e-3 is only judged in full.
+        (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
+        (CASE, "c_p", 10, 0.1, "", "", "", "bounded above", "", 0.5e-3),
+        # Of k_p nothing is said.
+        (CASE, "k_p", 0, 0.1, "", "", "", "not determined", "", ""),
+    ]
+    INTERVALS.write(tmp_path / "i.csv", rows)
+    made = coverage(settings(study_of(OVERLAY)), [target], [tmp_path / "i.csv"], [])
+    names = [column.name for column in made.columns]
+    found = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
+    assert list(found) == ["k", "c_p"]
+    k, c_p = found["k"], found["c_p"]
+    assert (k["seeds"], k["confidence_percent"]) == (3, 90.0)
+    assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)
+    assert k["bias_percent"] == pytest.approx(100 * np.mean(np.log([1.01, 1.02, 1.3])))
+    shown = ["shown_seeds", "shown_determined", "shown_determined_true"]
+    shown += ["shown_one_sided", "shown_one_sided_true"]
+    assert [k[name] for name in shown] == [2, 1, 0, 1, 1]
+    assert [c_p[name] for name in shown] == [2, 0, 0, 2, 1]
+    assert c_p["bound_percent"] is None
+    assert "95" not in made.caption
+
+
+def test_every_tenth_seed_is_judged_in_full(tmp_path: Path, target: Path) -> None:
+    """Whatever the batch, and with the limits that whole profiles have."""
+    study = study_of(OVERLAY)
+    expected = tmp_path / "expected.json"
+    expected.write_text(
+        '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": []}'
+    )
+    chosen = stage.settings(study, {"case": CASE})
+    stage.estimate(chosen, range(9, 12), target, expected, [], tmp_path / "i.csv")
+    found = INTERVALS.read(tmp_path / "i.csv")
+    judged = found[found["verdict"].notna()]
+    assert judged["seed"].tolist() == [10] * 5
+    assert judged["quantity"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
+    assert found["seed"].tolist() == [9, *[10] * 5, 11]
+    assert judged["low"].notna().tolist() == [True, False, False, False, False]
+    k = judged.iloc[0]
+    # There is but one basin.
+    assert k["shown_low"] == pytest.approx(k["low"], rel=1e-3)
+    assert k["shown_high"] == pytest.approx(k["high"], rel=1e-3)
