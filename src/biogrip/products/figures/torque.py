@@ -37,7 +37,7 @@ def draw(settings: Settings) -> Figure:
     torque = torque_at(history, time_s)
     right = torque_at(history, time_s, "right")
     volts = actuator.voltage(comb, np.maximum(torque, 0))
-    drawn = figure(COLUMN_IN, 2.2)
+    drawn = figure(COLUMN_IN, 2.5)
     upper, lower = drawn.subplots(2, 1, sharex=True)
     ends = np.append(history.time_s, history.end_s)
     for axes, values, unit, colour in (
@@ -63,6 +63,7 @@ def draw(settings: Settings) -> Figure:
         upper.set_ylim(0, 1.35e9 * max(torque.max(), right.max()))
         lower.set_ylim(0, 1.35 * float(actuator.voltage(comb, max(torque.max(), right.max()))))
         upper.legend()
+    upper.set_title("to grip; closing the jaws comes on top", fontsize=7.5)
     upper.set_ylabel("torque (nN m)")
     lower.set_ylabel("voltage (V)")
     lower.set_xlabel("time (s)")
@@ -73,8 +74,9 @@ def draw(settings: Settings) -> Figure:
 TORQUE = drawing(
     draw,
     name="torque",
-    caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
-    "takes by eq. (9).",
+    caption="Figure 3 of the paper: torque of each comb drive that grips the sample, and "
+    "the voltage it takes by eq. (9). What closes the jaws onto a sample comes on top, see the "
+    "table of contacts.",
     settings=settings,
     sheet="study_figures",
 )
