@@ -213,13 +213,19 @@ def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     diagnosis, likelihood = told("liquid_drop_1")
     valley = valley_data(likelihood, MODEL)
     assert valley is not None
-    rises = np.array(valley["rises"])
-    sums = np.array(valley["x_values"]) + np.array(valley["y_values"])
+    along, arm = ({key: np.array(grid[key]) for key in grid} for grid in valley["grids"])
+    rises = along["rises"]
+    sums = along["x_values"] + along["y_values"]
     best = float(np.exp(diagnosis.findings[-1].profile.best))
     on = np.abs(sums / best - 1) < 1e-4
     assert np.all(rises[on] < likelihood.certainty)
     assert np.all(rises[sums / best < 0.93] > likelihood.certainty)
     assert rises.min() > -0.1
+    # Beyond the sum a weak, slow branch hides any c: c_p alone is what the sum was.
+    beyond = arm["x_values"] > 0.5 * best
+    lowest = [arm["rises"][:, i].min() for i in range(arm["rises"].shape[1]) if beyond[0, i]]
+    assert max(lowest) < likelihood.certainty
+    assert np.ptp(lowest) < 0.5
     assert valley_data(likelihood, MODELS["maxwell"]) is None
 
 

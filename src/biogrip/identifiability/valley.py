@@ -19,6 +19,9 @@ _BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
 # Share of one more than the rise by which a fit has to become better to be news to its neighbours.
 _NEWS = 1e-3
 _SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
+# A branch too weak and slow to be seen leaves the second alone with the sum, whatever the first.
+_FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
+_SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
 
 def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | None:
@@ -41,8 +44,9 @@ def valley_and_deeper(
     Returns
     -------
     dict or None
-        ``x`` and ``y``, names and units; and on a grid that follows the valley
-        ``x_values``, ``y_values`` and ``rises``, nested lists (n_sums, n_shares).
+        ``x`` and ``y``, names and units; ``best``; and under ``grids``, one along the
+        valley of constant sum and one along its arm of constant second parameter,
+        ``x_values``, ``y_values`` and ``rises``, nested lists.
         None unless exactly two exchangeable parameters were searched, among others.
     (n_parameters,) or None
         Log-parameters whose chi^2 is clearly below that of the optimum, so that this
@@ -53,15 +57,18 @@ def valley_and_deeper(
         return None, None
     best = np.exp(likelihood.best[pair])
     sums = best.sum() * _SUMS[:, None]
-    x_values, y_values = sums * _SHARES, sums * (1 - _SHARES)
-    rises, deeper = _rises(likelihood, model, pair, x_values, y_values)
+    arm = np.meshgrid(best.sum() * _FIRSTS, best.sum() * _SECONDS)
+    grids, deeper = [], None
+    for x_values, y_values in ((sums * _SHARES, sums * (1 - _SHARES)), arm):
+        rises, lower = _rises(likelihood, model, pair, x_values, y_values)
+        values = {"x_values": x_values, "y_values": y_values, "rises": rises}
+        grids.append({name: _listed(each) for name, each in values.items()})
+        deeper = deeper if lower is None else lower
     x, y = (model.parameters[index] for index in pair)
     data = {
         "x": {"name": x.name, "symbol": x.symbol, "unit": x.unit},
         "y": {"name": y.name, "symbol": y.symbol, "unit": y.unit},
-        "x_values": _listed(x_values),
-        "y_values": _listed(y_values),
-        "rises": _listed(rises),
+        "grids": grids,
         "best": [rounded(float(value)) for value in best],
     }
     return data, deeper
@@ -74,7 +81,7 @@ def _listed(values: Array) -> list[list[float | None]]:
 def _rises(
     likelihood: Likelihood, model: SampleModel, pair: list[int], x_values: Array, y_values: Array
 ) -> tuple[Array, Array | None]:
-    """Rise of chi^2 at every point of the grid, (n_sums, n_shares), and what is deeper."""
+    """Rise of chi^2 at every point of a grid, and what is deeper."""
     if fit_together([likelihood.problem]):
         return _rises_at_once(likelihood, pair, x_values, y_values)
     rises = np.empty_like(x_values)

@@ -149,9 +149,15 @@ def evolve_many(
                 break
         chosen = [rngs[population] for population in running.tolist()]
         children = cross(survivors.codes, genome, settings, chosen)
+        before = survivors.ranking[:, 0]
         if generation >= settings.mutation_start:
             mutate(children, genome, settings, chosen)
-        before = survivors.ranking[:, 0]
+            if settings.mutants == "all":
+                others = np.ascontiguousarray(survivors.codes[:, :, 1:])
+                mutate(others, genome, settings, chosen)
+                evaluations += others[0].size
+                others_now = _evaluated(others, misfits, genome, running)
+                survivors = survivors.first().joined(others_now)
         everyone = survivors.joined(_evaluated(children, misfits, genome, running))
         survivors = everyone.best(settings.survivors)
         improved[running[survivors.ranking[:, 0] < before]] = generation
@@ -182,6 +188,9 @@ class _Populations:
             np.concatenate((self.codes, other.codes), axis=2),
             np.concatenate((self.ranking, other.ranking), axis=1),
         )
+
+    def first(self) -> "_Populations":
+        return _Populations(self.codes[:, :, :1], self.ranking[:, :1])
 
     def only(self, which: NDArray[np.bool_]) -> "_Populations":
         return _Populations(self.codes[:, which], self.ranking[which])
@@ -236,7 +245,6 @@ def _identifications(
     codes = np.concatenate([generation.best_codes for generation in course], axis=1)
     best_misfit = np.concatenate([generation.best_misfit for generation in course])
     median_misfit = np.concatenate([generation.median_misfit for generation in course])
-    children = settings.population - settings.survivors
     found = []
     for population, has_stalled in enumerate(stalled):
         own = np.flatnonzero(running == population)
@@ -244,7 +252,7 @@ def _identifications(
             best_misfit[own].astype(float),
             median_misfit[own].astype(float),
             genome.parameters(codes[:, own]),
-            settings.population + children * np.arange(len(own)),
+            _evaluations(settings, len(own)),
         )
         found.append(
             Identification(
@@ -257,3 +265,12 @@ def _identifications(
             )
         )
     return found
+
+
+def _evaluations(settings: GeneticSettings, generations: int) -> IntArray:
+    """Misfits computed up to each generation, (n_generations,)."""
+    number = np.arange(generations)
+    counts = settings.population + (settings.population - settings.survivors) * number
+    if settings.mutants == "all":
+        counts += (settings.survivors - 1) * np.maximum(number - settings.mutation_start + 1, 0)
+    return counts

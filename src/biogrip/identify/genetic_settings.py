@@ -65,6 +65,13 @@ class GeneticSettings:
     ]
     min_generations: Annotated[int, Key("Do not stop earlier.", low=0, high=_MOST)]
     max_generations: Annotated[int, Key("Stop then at the latest.", low=1, high=_MOST)]
+    mutants: Annotated[
+        str,
+        Key(
+            "Who may mutate. `children`; or `all`: survivors, too, but for the best of them.",
+            choices=("children", "all"),
+        ),
+    ] = "children"
 
     def problems(self) -> Iterator[Problem]:
         """Find what leaves no children, and a stop before the start."""

@@ -9,6 +9,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Key, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.readings import ReadingBlock
 from biogrip.study.sweeps import SweepBlock
 from biogrip.study.typed import parts
 
@@ -129,6 +130,14 @@ class StudyConfig(Shared):
             "Grids of cases for heat maps, by name, of at most 2000 points together. Every point "
             "is a case like another, but for the two values; it is identified, and shown in heat "
             "maps and their table only."
+        ),
+    ] = field(default_factory=dict)
+    readings: Annotated[
+        Mapping[Annotated[str, _SWEEP_NAME], ReadingBlock],
+        Key(
+            "Readings of the paper, by name, each tried with the genetic algorithm on the noisy "
+            "traces of every simulated case, for a table.",
+            most=100,
         ),
     ] = field(default_factory=dict)
 

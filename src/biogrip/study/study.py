@@ -18,6 +18,7 @@ from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
+from biogrip.study.readings import read_blocks
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
 from biogrip.study.typed import built, plain
@@ -242,6 +243,14 @@ class Study:
     def sweeps(self) -> dict[str, Sweep]:
         """Sweeps by name."""
         return sweeps_of(self.config.sweeps)
+
+    @cached_property
+    def readings(self) -> dict[str, dict[str, Case]]:
+        """The simulated cases under each reading, by its name and theirs."""
+        found: dict[str, dict[str, Case]] = {name: {} for name in self.config.readings}
+        for reading, name, block in read_blocks(self.config.readings, self.config.cases):
+            found[reading] |= self._cases({name: built(CaseBlock, block)})
+        return found
 
     def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
         actuator, seeds = self.config.actuator, self.config.seeds

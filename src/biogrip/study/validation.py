@@ -10,6 +10,7 @@ from biogrip.keys import Key, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import MOST_EXPLAINED, shape_at, value_problems
+from biogrip.study.readings import read_blocks
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
 from biogrip.study.sweeps import point_blocks, points_of, sweeps_of
@@ -48,6 +49,7 @@ def checked(
     _refuse(_assumed_problems(study.cases), files)
     _refuse(sweep_problems(study.sweeps, study.cases), files)
     _refuse(_point_problems(study), files)
+    _refuse(_reading_problems(study), files)
     if for_workflow:
         _refuse(_workflow_problems(study.cases), files)
     return study
@@ -146,6 +148,14 @@ def _point_problems(study: StudyConfig) -> Iterator[Problem]:
             contact = case.contact_problems(study.actuator)
             found = found or [((*path, *place), text) for place, text in contact]
         yield from (placed(by_name, problem) for problem in found)
+
+
+def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
+    """Check every case under every reading like one that the user wrote."""
+    for reading, _, block in read_blocks(study.readings, study.cases):
+        path = ("readings", reading, "changes")
+        found = [((*path, *place), text) for place, text in value_problems(_CASE, block)]
+        yield from found or block_problems(path, built(CaseBlock, block))
 
 
 def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:

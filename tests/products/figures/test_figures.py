@@ -27,6 +27,7 @@ def drawn(module: Any) -> Figure:
 def test_torque_shows_the_protocol_and_its_voltages() -> None:
     left, right = drawn(torque).axes
     assert (left.get_ylabel(), right.get_ylabel()) == ("torque (nN m)", "voltage (V)")
+    assert "closing the jaws comes on top" in left.get_title("left")
     assert [text.get_text() for text in left.texts] == ["1.6 nN m", "0.32 nN m"]
     # 27 to 55 V to touch a sample, whose squares add up with those of the grip.
     volts = [text.get_text() for text in right.texts]
@@ -107,3 +108,27 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
 )
 def test_prefixes(value: float, expected: tuple[float, str]) -> None:
     assert scale_of(np.array([-value, 0.0]), "rad") == expected
+
+
+def test_tips_are_drawn_as_far_closed_as_samples_let_them() -> None:
+    """Enlarged, which is said, for 3 mrad would not be seen."""
+    tips = drawn(linkage).axes[1]
+    legend = tips.get_legend()
+    assert legend
+    text = legend.get_texts()[1].get_text()
+    told = re.fullmatch(r"closed by ([\d.]+) mrad \(drawn (\d+) times\)", text)
+    assert told
+    # The softest sample of the study gives way by 3.2 mrad.
+    assert float(told[1]) == pytest.approx(3.2, abs=0.05)
+    at_rest, _, closed, _ = (
+        np.asarray(line.get_xydata())
+        for line in tips.lines
+        if len(np.asarray(line.get_xdata())) == 2 and line.get_linewidth() == 2
+    )
+    (before,), (after,) = (
+        np.degrees(np.arctan2(*np.diff(arm, axis=0).T[::-1])) for arm in (at_rest, closed)
+    )
+    turned = 1e3 * np.radians(before - after)
+    assert turned == pytest.approx(float(told[1]) * int(told[2]), rel=0.02)
+    texts = {text.get_text() for text in tips.texts}
+    assert {"$x$", "$u_B$", "$u_C$"} <= texts

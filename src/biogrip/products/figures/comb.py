@@ -19,10 +19,13 @@ from biogrip.products.figures.torque import Settings, settings
 def draw(settings: Settings) -> Figure:
     """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
     comb, steps = settings.actuator, torque_history(settings.phases)
-    drawn = figure(PAGE_IN, 2.7)
-    whole, detail, curve = drawn.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
+    drawn = figure(PAGE_IN, 4.4)
+    places = drawn.add_gridspec(2, 2, height_ratios=[1.0, 1.3], width_ratios=[1.1, 1.0])
+    whole = drawn.add_subplot(places[0, :])
+    detail, curve = (drawn.add_subplot(places[1, column]) for column in range(2))
 
-    _fingers(whole, comb, comb.fingers)
+    # On its side, it has the width of the page.
+    _fingers(whole, comb, comb.fingers, turned_deg=-90)
     panel(whole, "a", f"all {comb.fingers} fingers")
     _scale_bar(whole, comb, 200)
 
@@ -55,7 +58,7 @@ def draw(settings: Settings) -> Figure:
     return drawn
 
 
-def _fingers(axes: Axes, comb: CombDrive, count: int) -> None:
+def _fingers(axes: Axes, comb: CombDrive, count: int, turned_deg: float = 0.0) -> None:
     """Draw floating and fixed fingers as they overlap at rest, in micrometres."""
     half = 0.5 * comb.initial_overlap_deg
     fingers = []
@@ -69,7 +72,7 @@ def _fingers(axes: Axes, comb: CombDrive, count: int) -> None:
             Wedge(
                 (0, 0),
                 1e6 * (r + comb.finger_width_m),
-                *angles,
+                *(angle + turned_deg for angle in angles),
                 width=1e6 * comb.finger_width_m,
             )
             for r, angles, c in fingers
@@ -82,12 +85,15 @@ def _fingers(axes: Axes, comb: CombDrive, count: int) -> None:
 
 
 def _scale_bar(axes: Axes, comb: CombDrive, length_um: float) -> None:
-    y = 1e6 * comb.first_radius_m - 60
-    axes.plot([-length_um / 2, length_um / 2], [y, y], color=BLACK, linewidth=1.5)
-    axes.annotate(f"{length_um:g} µm", (0, y - 15), ha="center", va="top", fontsize=7)
-    for text, x, colour in (("floating", -90, BLUE), ("fixed", 90, ORANGE)):
-        y_top = 1e6 * comb.outer_radius_m + 25
-        axes.annotate(text, (x, y_top), ha="center", color=colour, fontsize=7)
+    """Draw a scale below the comb on its side, and say which fingers are which."""
+    first, last = 1e6 * comb.first_radius_m, 1e6 * comb.outer_radius_m
+    reach = last * math.sin(math.radians(comb.finger_angle_deg - 0.5 * comb.initial_overlap_deg))
+    y = -0.9 * reach
+    axes.plot([first, first + length_um], [y, y], color=BLACK, linewidth=1.5)
+    axes.annotate(f"{length_um:g} µm", (first + length_um + 8, y), va="center", fontsize=7)
+    for text, side, colour in (("floating", 1, BLUE), ("fixed", -1, ORANGE)):
+        place = (first, side * 0.65 * reach)
+        axes.annotate(text, place, ha="left", va="center", color=colour, fontsize=7)
 
 
 def _dimensions(axes: Axes, comb: CombDrive) -> None:
@@ -113,7 +119,8 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
 COMB = drawing(
     draw,
     name="comb",
-    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest; "
+    caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest, (a) on "
+    "its side; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
     settings=settings,
     sheet="study_figures",

@@ -69,7 +69,7 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
-    drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
+    traces.set_title(title)
     residual = factor * (fit.measured_rad - fit.fitted_rad)
     residuals.plot(fit.time_s, residual, color=MEASURED, **style)
     if fit.target_rad is not None:

@@ -85,7 +85,7 @@ def _difference(axes: Axes, truth: Truth, gripper: Gripper, phases: tuple[Phase,
     axes.set_xlabel("time (s)")
     axes.set_ylabel("nonlinear - linear rotation (mrad)")
     peak = f"peak {1e3 * np.max(np.abs(linear)):.3g} mrad"
-    axes.annotate(peak, (0.98, 0.04), xycoords="axes fraction", ha="right", fontsize=7)
+    axes.annotate(peak, (0.98, 0.94), xycoords="axes fraction", ha="right", fontsize=7)
     panel(axes, "a", f"{truth.title}, {_SHOWN_FACTOR:g} x torque")
 
 

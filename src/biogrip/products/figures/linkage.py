@@ -1,30 +1,55 @@
 """Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
+from biogrip.experiment.truth import Truth
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.elements import damper, spring
 from biogrip.products.figures.nomenclature import nomenclature
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
+from biogrip.response.simulation import simulated_rotation
+from biogrip.study.study import Study
 
 # Section 2: the largest sample the gripper is made for; the model itself needs no size.
 _SAMPLE_M = 120e-6
+_ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 0}
 
 
-def draw(gripper: Gripper) -> Figure:
+# Turned as much in the drawing, arms are seen to have turned, and still look like arms.
+_SEEN_RAD = 0.012
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The gripper, and what closes it onto which samples."""
+
+    gripper: Gripper
+    truths: tuple[tuple[Truth, CaseProblem], ...]
+
+
+def settings(study: Study) -> Settings:
+    """Choose the gripper and the samples."""
+    cases = [study.cases[name] for name in study.simulated]
+    return Settings(study.gripper, tuple((case.truth, case.problem) for case in cases))
+
+
+def draw(settings: Settings) -> Figure:
     """Draw linkage, tips, names and networks."""
+    gripper = settings.gripper
     drawn = figure(PAGE_IN, 4.8)
     (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
     _linkage(whole, gripper)
     panel(whole, "a", "linkage A-B-C-D, to scale")
-    _tips(tips, gripper)
-    panel(tips, "b", "tips B and C, to scale")
+    _tips(tips, gripper, _largest_rotation_rad(settings))
+    panel(tips, "b", "tips B and C")
     nomenclature(names)
     panel(names, "c", "angles and displacements, not to scale", most_letters=40)
     _networks(networks)
@@ -75,21 +100,34 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
     axes.set_axis_off()
 
 
-def _tips(axes: Axes, gripper: Gripper) -> None:
-    """Tips at the reference (soft lines) and closed by 10 mrad (hard lines), in micrometres."""
-    closing = 0.01
-    for rotation, colour, label in (
-        (0.0, GREY, "reference"),
-        (closing, BLUE, "closed by 10 mrad"),
+def _largest_rotation_rad(settings: Settings) -> float:
+    """Largest rotation of all samples; that of the drawing if there is none."""
+    peaks = [0.0]
+    for truth, problem in settings.truths:
+        time_s = np.linspace(0.0, problem.torque.end_s, 401)
+        network = truth.model.network(np.array([[truth.parameters[n] for n in truth.model.names]]))
+        rotation = simulated_rotation(
+            problem.gripper, network, problem.torque, time_s, nonlinear=False
+        )
+        peaks.append(float(rotation.max()))
+    return max(peaks) or _SEEN_RAD
+
+
+def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
+    """Tips at the reference and closed as far as ever, turned several times as much."""
+    times = max(1, round(_SEEN_RAD / rotation_rad))
+    enlarged = f" (drawn {times} times)" if times > 1 else ""
+    reference, moved = (
+        {name: (1e3 * x, 1e3 * y) for name, (x, y) in _joints(gripper, turned).items()}
+        for turned in (0.0, times * rotation_rad)
+    )
+    for joints, colour, label in (
+        (reference, GREY, "reference"),
+        (moved, BLUE, f"closed by {1e3 * rotation_rad:.2g} mrad{enlarged}"),
     ):
-        joints = {name: (1e3 * x, 1e3 * y) for name, (x, y) in _joints(gripper, rotation).items()}
         for foot, tip in (("A", "B"), ("D", "C")):
             axes.plot(*zip(joints[foot], joints[tip], strict=True), color=colour, linewidth=2)
         axes.plot([], [], color=colour, linewidth=2, label=label)
-        if rotation:
-            moved = joints
-        else:
-            reference = joints
     (b_x, b_y), (c_x, _) = moved["B"], moved["C"]
     height = 1e6 * _SAMPLE_M
     axes.add_patch(Circle((0, reference["B"][1]), height / 2, fill=False, color=GREY))
@@ -105,13 +143,26 @@ def _tips(axes: Axes, gripper: Gripper) -> None:
             "",
             (wrist + side * 5, b_y - 95),
             (wrist + side * 65, b_y - 80),
-            arrowprops={"arrowstyle": "->", "lw": 1, "color": BLACK},
+            arrowprops=_ARROW,
         )
         axes.annotate(name, (wrist + side * 78, b_y - 80), ha="center", va="center")
-    axes.plot([-50, 50], [b_y - 150, b_y - 150], color=BLACK, linewidth=1.5)
-    axes.annotate("100 µm", (0, b_y - 158), ha="center", va="top", fontsize=7)
+    # Displacements of the tips along x, counted from the reference.
+    level = reference["B"][1] + height / 2 + 16
+    for text, at_rest, at_end, shift in (
+        ("$u_B$", reference["B"][0], b_x, -9),
+        ("$u_C$", reference["C"][0], c_x, 9),
+    ):
+        axes.plot([at_rest, at_rest], [level - 10, level + 8], color=BLACK, linewidth=0.6)
+        axes.annotate("", (at_end, level), (at_rest, level), arrowprops=_ARROW)
+        label_at = (at_rest + shift, level)
+        axes.annotate(text, label_at, ha="left" if shift > 0 else "right", va="center", fontsize=7)
+    start = (-155, b_y + 30)
+    axes.annotate("", (start[0] + 45, start[1]), start, arrowprops=_ARROW)
+    axes.annotate("$x$", (start[0] + 50, start[1]), va="center", fontsize=7)
+    axes.plot([-30, 70], [b_y - 150, b_y - 150], color=BLACK, linewidth=1.5)
+    axes.annotate("100 µm", (20, b_y - 158), ha="center", va="top", fontsize=7)
     axes.set_xlim(-160, 160)
-    axes.set_ylim(b_y - 185, b_y + 150)
+    axes.set_ylim(b_y - 185, b_y + 165)
     axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
     axes.legend(loc="upper center", ncols=1)
@@ -155,12 +206,13 @@ LINKAGE = drawing(
     draw,
     name="linkage",
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
-    "of 120 µm; (b) its tips at the reference and closed by 10 mrad, to scale; (c) "
+    "of 120 µm; (b) its tips at the reference and closed as far as the study's softest sample lets "
+    "them, the rotation enlarged as it says, and their displacements along x; (c) "
     "what the angles and displacements are called: reference (hat, soft lines), deformed (tilde, "
     "hard lines), increments theta = tilde - hat and the closing rotations phi, displacements u of "
     "the tips and x of the node between spring and damper, all to the right; (d) the constitutive "
     "models. Arm length and angle are those of the config; in the default study they "
     "are reconstructed.",
-    settings=lambda study: study.gripper,
+    settings=settings,
     sheet="study_figures",
 )

@@ -1,15 +1,19 @@
 """Profile likelihoods: what chi-squared says against other values of a quantity."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator
+from matplotlib.ticker import MaxNLocator
+from scipy.interpolate import PchipInterpolator
 
+from biogrip.arrays import Array
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, PAGE_IN, SHADE, TARGET, figure, panel
 from biogrip.products.files.verdicts import PATH, read_verdicts
@@ -50,16 +54,20 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
-    drawn = figure(PAGE_IN, 2.3)
+    drawn = figure(PAGE_IN, 2.5)
     grid = drawn.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
     for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
         if item["quantity"] in foreseen:
-            profile = foreseen[item["quantity"]]["profile"]
-            label = "expected without noise"
-            axes.plot(profile["values"], profile["rises"], color=GREY, label=label)
-        profile = item["profile"]
-        axes.plot(profile["values"], profile["rises"], color=FITTED, label="this trace")
-        axes.axhline(found["threshold"], color=TARGET, linestyle="--", linewidth=0.7)
+            curve = _curve(foreseen[item["quantity"]]["profile"])
+            axes.plot(*curve, color=GREY, label="expected without noise")
+        axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
+        for rise, style, label in (
+            (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
+            (found["certainty"], ":", "99.9 %, to close a side"),
+        ):
+            line = axes.axhline(rise, color=TARGET, linestyle=style, linewidth=0.7)
+            if index == 0:
+                line.set_label(label)
         _limits(axes, item)
         names = item["quantity"].split(" + ")
         if set(names) <= set(settings.parameters):
@@ -68,26 +76,56 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
         low, high = _window(item)
         if high / low > _WIDE:
             axes.set_xscale("log")
-            axes.xaxis.set_major_locator(LogLocator(numticks=4))
+            axes.set_xticks(*decade_ticks(low, high))
             axes.minorticks_off()
         else:
-            axes.xaxis.set_major_locator(MaxNLocator(3))
+            axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
         axes.set_xlim(low, high)
         axes.set_ylim(0, _HIGHEST)
         axes.set_xlabel(f"{item['symbol']} ({item['unit']})")
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
-    drawn.legend(handles, labels, loc="outside lower right", ncols=4)
+    drawn.legend(handles, labels, loc="outside lower right", ncols=5)
     drawn.suptitle(settings.title, x=0.01, ha="left", fontsize=8)
     return drawn
+
+
+def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
+    """Draw a profile smoothly through its points: of the square root of the rise, by cubics.
+
+    They do not overshoot (Fritsch & Carlson 1980), and a parabola is a straight line to them.
+    """
+    # Rounded values may coincide.
+    values, places = np.unique(np.array(profile["values"]), return_index=True)
+    roots = np.sqrt(np.clip(np.array(profile["rises"])[places], 0.0, 4 * _HIGHEST))
+    dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
+    return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
+
+
+def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
+    """Return three ticks of a logarithmic axis at most, and their labels, that do not collide."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    decades = list(range(first, last + 1))
+    if len(decades) >= 2:
+        step = -(-(len(decades) - 1) // 2)
+        chosen = decades[::step]
+        return [10.0**d for d in chosen], [f"$10^{{{d}}}$" for d in chosen]
+    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
+    found = [value for value in steps if low <= value <= high]
+    # Their labels are wide.
+    inside = [found[0], found[-1]] if len(found) > 2 else found
+    return inside, [f"{value:g}" for value in inside]
 
 
 def _limits(axes: Axes, item: dict[str, Any]) -> None:
     low, high = item["low"], item["high"]
     values = item["profile"]["values"]
     if low is not None or high is not None:
-        axes.axvspan(low or values[0], high or values[-1], color=SHADE, zorder=0, linewidth=0)
+        ends = [low or values[0], *(end for gap in item["excluded"] for end in gap)]
+        ends.append(high or values[-1])
+        for start, end in zip(ends[::2], ends[1::2], strict=True):
+            axes.axvspan(start, end, color=SHADE, zorder=0, linewidth=0)
     for limit in (low, high):
         if limit is not None:
             axes.axvline(limit, color=BLUE, linewidth=0.7)
@@ -97,18 +135,18 @@ def _window(item: dict[str, Any]) -> tuple[float, float]:
     """Where the profile is below the top of the axis, and a little more."""
     values, rises = (np.array(item["profile"][key]) for key in ("values", "rises"))
     inside = np.flatnonzero(rises < _HIGHEST)
-    first, last = max(inside[0] - 1, 0), min(inside[-1] + 1, len(values) - 1)
-    low, high = float(values[inside[0]]), float(values[inside[-1]])
-    # The next point of the grid may be far off.
-    margin = max((high / low) ** 0.25, 1.002)
-    return max(float(values[first]), low / margin), min(float(values[last]), high * margin)
+    ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
+    low, high = (float(end([x for x in ends if x is not None])) for end in (min, max))
+    margin = max((high / low) ** 0.05, 1.0002)
+    return max(float(values[0]), low / margin), min(float(values[-1]), high * margin)
 
 
 PROFILES = drawing(
     draw,
     name="profiles",
-    caption="Profile likelihoods of one seed, and without noise (grey); shaded: 95 % interval; "
-    "dashed: its threshold.",
+    caption="Profile likelihoods of one seed, and without noise (grey); shaded: the confidence "
+    "interval; dashed: its threshold; dotted: what a profile has to reach at an end of the range "
+    "for that side to be closed.",
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,

@@ -166,7 +166,7 @@ def _paper(axes: Axes, identified: Mapping[str, float], names: list[str], target
 
 
 def _title(quantity: Quantity, limit: float, verdict: str) -> str:
-    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict
+    known = f"{100 * limit:.2g} %" if np.isfinite(limit) else verdict.split(" above")[0]
     return f"{quantity.symbol}: {known}"
 
 

@@ -3,11 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.arrays import Array
 from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import first_seeds, seeds_in_words
@@ -66,26 +69,26 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     identified = read_identifications(identifications, settings.method)
     drawn = figure(COLUMN_IN, 3.1)
     axes = drawn.subplots()
-    rises = np.maximum(np.array(valley["rises"]), 0.0)
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
-    filled = axes.contourf(
-        valley["x_values"], valley["y_values"], rises, _LEVELS, colors=colours, extend="max"
-    )
+    for grid in valley["grids"]:
+        # The square root of the rise is nearly straight, so that is what is interpolated.
+        roots = np.sqrt(np.maximum(np.array(grid["rises"], dtype=float), 0.0))
+        filled = axes.contourf(
+            grid["x_values"],
+            grid["y_values"],
+            roots,
+            np.sqrt(_LEVELS),
+            colors=colours,
+            extend="max",
+        )
     total = sum(valley["best"])
     label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
     axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
     drawn_seeds = seeds_in_words(len(identified))
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
-    axes.plot(
-        *np.clip(first_seeds(identified)[columns].to_numpy(float), 0, _SHOWN * total).T,
-        "o",
-        color=FITTED,
-        markersize=2.5,
-        markeredgewidth=0,
-        alpha=0.8,
-        clip_on=False,
-        label=f"{METHODS[settings.method].title}, {drawn_seeds}",
-    )
+    points = first_seeds(identified)[columns].to_numpy(float)
+    label = f"{METHODS[settings.method].title}, {drawn_seeds}"
+    _points(axes, points, _SHOWN * total, label)
     for place, color, marker, name in (
         (settings.parameters, TARGET, "*", "truth"),
         (settings.identified, PAPER, "D", "paper"),
@@ -111,17 +114,30 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     axes.set_title(settings.title)
     axes.set_aspect("equal")
     drawn.legend(loc="outside lower center", ncols=2)
-    bar = drawn.colorbar(filled, ax=axes, ticks=_LEVELS)
+    bar = drawn.colorbar(filled, ax=axes, ticks=list(np.sqrt(_LEVELS)))
     bar.ax.set_yticklabels([f"{level:g}" for level in _LEVELS])
     bar.set_label("rise of χ²")
     return drawn
+
+
+def _points(axes: Axes, points: Array, end: float, label: str) -> None:
+    """Draw fits, and triangles on the edge for those beyond the axes."""
+    style: dict[str, Any] = {"color": FITTED, "linestyle": "", "markeredgewidth": 0, "alpha": 0.8}
+    right, above = (points > end).T
+    inside = ~right & ~above
+    axes.plot(*points[inside].T, "o", markersize=2.5, clip_on=False, label=label, **style)
+    for marker, outside in ((">", right), ("^", above & ~right)):
+        if np.any(outside):
+            at = np.minimum(points[outside], end).T
+            axes.plot(*at, marker, markersize=4.5, clip_on=False, label="beyond the axis", **style)
 
 
 VALLEY = drawing(
     draw,
     name="valley",
     caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade "
-    "against each other, and where the fits of all seeds lie in it.",
+    "against each other, its arm along which c is that of a branch too weak and slow to be seen (it "
+    "goes on further), and where the fits of all seeds lie in it. White: not computed.",
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],

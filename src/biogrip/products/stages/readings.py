@@ -1,0 +1,148 @@
+"""Stage 3: what the genetic algorithm finds under other readings of the paper."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.identify.answer import Identification
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.genetic import identify_many
+from biogrip.identify.genetic_settings import GeneticSettings
+from biogrip.products.files.readings import READINGS
+from biogrip.products.files.traces import TARGETS, read_target
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Weight, the
+from biogrip.products.stages.groups import groups
+from biogrip.progress import Progress
+from biogrip.study.study import Case, Study
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A case as a reading has it.
+
+    Parameters
+    ----------
+    problem
+        What is identified.
+    genetic
+        How the population evolves.
+    noise
+        What is added to the target.
+    """
+
+    problem: CaseProblem
+    genetic: GeneticSettings
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the readings of a case depend on.
+
+    Parameters
+    ----------
+    study_seed, case, seeds
+        Whose random streams, and how many.
+    readings
+        By name.
+    """
+
+    study_seed: int
+    case: str
+    seeds: int
+    readings: Mapping[str, Reading]
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what a case's readings depend on."""
+    name = job["case"]
+    readings = {reading: _reading(cases[name]) for reading, cases in study.readings.items()}
+    return Settings(study.study_seed, name, study.case(name).seeds, readings)
+
+
+def read(settings: Settings, target: Path, rows: Path) -> None:
+    """Identify every noisy trace of a case under every reading.
+
+    Noise and algorithm draw as in the study itself, so that a reading that changes
+    nothing finds what the study finds.
+
+    Parameters
+    ----------
+    settings
+        How.
+    target
+        A target, CSV.
+    rows
+        A row per reading and seed, CSV.
+    """
+    READINGS.write(rows, _rows(settings, target))
+
+
+def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
+    time_s, _, rotation = read_target(target)
+    case = settings.case
+    progress = Progress(f"{case}, readings", len(settings.readings) * settings.seeds)
+    for name, reading in settings.readings.items():
+        posed = reading.problem
+        for seeds in groups(range(settings.seeds)):
+            streams = {
+                purpose: [stream(settings.study_seed, case, seed, purpose) for seed in seeds]
+                for purpose in ("noise", "genetic")
+            }
+            traces = [add_noise(rotation, reading.noise, rng) for rng in streams["noise"]]
+            problems = [posed.of(time_s, trace) for trace in traces]
+            found = identify_many(problems, reading.genetic, streams["genetic"])
+            for seed, trace, answer in zip(seeds, traces, found, strict=True):
+                names = posed.searched.names
+                values = {**posed.fixed, **dict(zip(names, answer.parameters, strict=True))}
+                yield (
+                    case,
+                    name,
+                    seed,
+                    *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
+                    f"{answer.misfit_rad:.6e}",
+                    f"{rms(trace - rotation):.6e}",
+                    _last_improvement(answer),
+                )
+            progress.done(len(seeds))
+
+
+def _last_improvement(answer: Identification) -> int:
+    """Generation in which the best misfit fell for the last time."""
+    falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
+    return int(falls[-1]) + 1 if len(falls) else 0
+
+
+def _reading(case: Case) -> Reading:
+    genetic: Any = case.method("genetic")
+    return Reading(case.problem, genetic, case.noise)
+
+
+def read_cases(study: Study) -> list[str]:
+    """Cases that readings are tried on: simulated, and with the paper's parameters."""
+    ours = {parameter.name for parameter in SINGLE_BRANCH}
+    names = study.simulated if study.readings else []
+    return [name for name in names if set(study.case(name).sample.model.names) <= ours]
+
+
+def _jobs(plan: Plan) -> list[Wildcards]:
+    return [{"case": name} for name in read_cases(plan.study)]
+
+
+READ = Product(
+    "read",
+    {"rows": READINGS.path},
+    read,
+    settings,
+    _jobs,
+    message="Identifying {case} under every reading of the paper",
+    reads={"target": the(TARGETS)},
+    weight=Weight(120, 1000),
+)
