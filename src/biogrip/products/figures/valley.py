@@ -136,8 +136,8 @@ VALLEY = drawing(
     draw,
     name="valley",
     caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade "
-    "against each other, its arm along which c is that of a branch too weak and slow to be seen (it "
-    "goes on further), and where the fits of all seeds lie in it. White: not computed.",
+    "against each other, its arm along which c is that of a branch too weak and slow to be seen "
+    "(it goes on further), and where the fits of all seeds lie in it. White: not computed.",
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],

@@ -20,6 +20,8 @@ from biogrip.study.study import Study
 
 # What the paper finds is compared in these together; c_p no trace determines.
 _TOGETHER = ("k", "k_p", "c")
+# What is printed is rounded, to a share of about this.
+_ROUNDING = 0.005
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,7 @@ def _as_close(truth: Truth, found: pd.DataFrame) -> BoolArray | None:
         return None
     within = [
         np.abs(found[columns[name]].to_numpy(float) - truth.parameters[name])
-        <= abs(published[name] - truth.parameters[name]) + 0.005 * truth.parameters[name]
+        <= abs(published[name] - truth.parameters[name]) + _ROUNDING * truth.parameters[name]
         for name in names
     ]
     return np.all(within, axis=0)
