@@ -11,7 +11,9 @@ import pytest
 
 from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
-from tests.helpers.runs import SMALL, TINY, built_once, made_without_snakemake, snakemake
+from tests.helpers.default import study_of
+from tests.helpers.in_process import make_in_process
+from tests.helpers.runs import SMALL, TINY, built_once, snakemake
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -54,10 +56,10 @@ def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """A finished small study, one for all workers; copy it before changing anything."""
+    """Results of a small study, one for all workers; Snakemake does not know of them."""
     return built_once(
         "finished",
-        lambda folder: made_without_snakemake(folder, SMALL),
+        lambda folder: make_in_process(folder, study_of(SMALL)),
         tmp_path_factory,
         worker_id,
     )

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
 from tests.helpers.places import ROOT
 
 # A whole study in a few seconds: real physics and algorithm, little of each.
@@ -142,13 +140,6 @@ def copied_tree(folder: Path) -> Tree:
         shutil.copytree(ROOT / name, folder / name)
     shutil.copy(ROOT / "Snakefile", folder)
     return Tree(folder, folder / "study")
-
-
-def made_without_snakemake(folder: Path, config: str) -> None:
-    """Make all of a study in this process, and have Snakemake take note of it."""
-    make_in_process(folder, study_of(config))
-    run = snakemake(folder, "--touch", config=config)
-    assert run.status == 0, run.output
 
 
 def built_once(

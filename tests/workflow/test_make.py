@@ -20,7 +20,7 @@ METHOD = ("--method", "least_squares")
 # Every module of ours whose functions run while a product is made, in a process for each: what
 # is kept from one job to the next would not be called again.
 WATCHED = """
-import json, os, sys
+import cProfile, json, os, sys
 from pathlib import Path
 import biogrip
 from biogrip.products.catalogue import products
@@ -29,21 +29,22 @@ from biogrip.running.resolved import read_study
 package = str(Path(biogrip.__file__).parent)
 plan = Plan(read_study(Path("results")), Path("results"))
 def seen_by(name, job):
-    seen = set()
-    def watch(frame, event, argument):
-        code = frame.f_code
-        # Modules are imported on the way; only what is called counts.
-        if event == "call" and code.co_filename.startswith(package) and code.co_name != "<module>":
-            seen.add(code.co_filename)
+    profile = cProfile.Profile()
     product = products()[name]
     make = product.make
     def watched(*given, **files):
-        sys.setprofile(watch)
+        profile.enable()
         make(*given, **files)
-        sys.setprofile(None)
+        profile.disable()
     object.__setattr__(product, "make", watched)
     product.run(plan, job)
-    return sorted(seen)
+    # Modules are imported on the way; only what is called counts.
+    called = {
+        entry.code.co_filename
+        for entry in profile.getstats()
+        if not isinstance(entry.code, str) and entry.code.co_name != "<module>"
+    }
+    return sorted(file for file in called if file.startswith(package))
 for name, job in json.load(sys.stdin):
     if child := os.fork():
         assert os.waitpid(child, 0)[1] == 0, name

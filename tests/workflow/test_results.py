@@ -135,10 +135,10 @@ def test_another_study_seed_changes_everything_random(finished: Path, tmp_path: 
 
 
 def test_report_shows_every_table_and_figure_with_its_labels(
-    finished_copy: Path, tmp_path: Path
+    tiny_copy: Path, tmp_path: Path
 ) -> None:
     report = tmp_path / "report.html"
-    run = snakemake(finished_copy, "--report", str(report))
+    run = snakemake(tiny_copy, "--report", str(report), config=TINY)
     assert run.status == 0, run.output
     page = report.read_text()
     items = {product.item for product in products().values() if product.category}
