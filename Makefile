@@ -15,7 +15,7 @@ LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --pytho
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish lint format bench report docs pinned lock clean
+.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench report docs pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -53,6 +53,10 @@ check: $(READY)
 
 publish: $(READY)
 	$(BIN)/snakemake -j$(JOBS) publish
+
+# What the overlays give that the documentation speaks of; takes longer than the study.
+publish-overlays: $(READY)
+	$(BIN)/snakemake -j$(JOBS) publish_robustness publish_readings
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -21,6 +21,11 @@ rule all:
         "All of the study is there"
 
 
+rule all_maps:
+    input:
+        [file for file in ALL_FILES if "/robustness_" in file],
+
+
 rule all_tables:
     input:
         [file for file in ALL_FILES if file.startswith("results/tables/")],

@@ -69,7 +69,7 @@ def _number(what: str, published: Path) -> str:
 
 
 def _rows(table: str, conditions: str, published: Path) -> pd.DataFrame:
-    files = sorted(published.glob(f"*/{table}.csv"))
+    files = sorted(published.rglob(f"{table}.csv"))
     if not files:
         raise ValueError(f"{table}: no such table")
     rows = pd.read_csv(files[0], dtype=str, keep_default_na=False, na_values=[""])

@@ -118,6 +118,7 @@ def _parser() -> argparse.ArgumentParser:
     publish.set_defaults(command=_publish)
     publish.add_argument("results", type=Path, help="results of a finished study")
     publish.add_argument("published", type=Path, help="folder to publish in")
+    publish.add_argument("--only", default="*", help="those with such names, e.g. readings*")
 
     compare = commands.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
@@ -209,7 +210,7 @@ def _clean(options: argparse.Namespace) -> None:
 def _publish(options: argparse.Namespace) -> None:
     from biogrip.running.published import publish
 
-    print(publish(options.results, options.published))
+    print(publish(options.results, options.published, options.only))
 
 
 def _compare(options: argparse.Namespace) -> None:

@@ -2,11 +2,18 @@
 
 PUBLISHED = Path(workflow.basedir) / "results" / "published"
 
+# What is published beside the default study's results, by the name of its config: the rule
+# that makes it, and its names.
+OVERLAYS = {
+    "robustness": ("all_maps", "robustness_*"),
+    "readings": ("readings", "readings"),
+}
+
 # The default study, whatever this run was configured with; nothing of it is kept.
 RUN_AFRESH = (
     "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
     "snakemake -j {threads} --snakefile {params.snakefile:q} "
-    '--directory "$scratch" --quiet all -- {params.targets} >> {log:q} 2>&1'
+    '--directory "$scratch" --quiet all {params.config} -- {params.targets} >> {log:q} 2>&1'
 )
 
 
@@ -19,6 +26,7 @@ rule check:
     threads: workflow.cores
     params:
         snakefile=workflow.main_snakefile,
+        config="",
         targets="all_tables",
     message:
         "Running the default study afresh and comparing its tables with the published ones"
@@ -33,6 +41,7 @@ rule publish:
     threads: workflow.cores
     params:
         snakefile=workflow.main_snakefile,
+        config="",
         targets="all",
         published=PUBLISHED,
     message:
@@ -40,3 +49,25 @@ rule publish:
     shell:
         f"{RUN_AFRESH}; "
         'biogrip publish "$scratch/results" {params.published:q} 2>> {log:q} | tee -a {log:q}'
+
+
+for overlay, (target, only) in OVERLAYS.items():
+
+    rule:
+        name:
+            f"publish_{overlay}"
+        log:
+            f"results/logs/publish_{overlay}.log",
+        threads: workflow.cores
+        params:
+            snakefile=workflow.main_snakefile,
+            config=f"--configfile {Path(workflow.basedir) / 'config' / overlay}.yaml",
+            targets=target,
+            published=PUBLISHED / overlay,
+            only=only,
+        message:
+            f"Running config/{overlay}.yaml afresh and publishing its tables and figures"
+        shell:
+            f"{RUN_AFRESH}; "
+            'biogrip publish "$scratch/results" {params.published:q} --only {params.only:q} '
+            "2>> {log:q} | tee -a {log:q}"

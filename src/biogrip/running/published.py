@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from fnmatch import fnmatch
 from pathlib import Path
 
 from biogrip.errors import BiogripError
@@ -15,7 +16,7 @@ SUMS = "SHA256SUMS"
 FOLDERS = {"tables": (".csv", ".md", ".tex"), "figures": (".png", ".pdf")}
 
 
-def publish(results: Path, published: Path) -> str:
+def publish(results: Path, published: Path, only: str = "*") -> str:
     """Replace published tables and figures by those of a finished study.
 
     Only what was published before, and is still as it was, is replaced or removed.
@@ -26,6 +27,8 @@ def publish(results: Path, published: Path) -> str:
         Results of the study.
     published
         Folder to publish in.
+    only
+        Which of them, as a pattern of their names without ending.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def publish(results: Path, published: Path) -> str:
         file.relative_to(results)
         for folder, kinds in FOLDERS.items()
         for file in sorted((results / folder).glob("*.*"))
-        if file.suffix in kinds
+        if file.suffix in kinds and fnmatch(file.stem, only)
     ]
     if not new:
         raise BiogripError(f"{results}: holds no tables and figures to publish.")
