@@ -44,14 +44,17 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         # c_p = 1e-3 is only judged in full.
         (CASE, "c_p", 0, 0.1, "", "", "", "bounded above", "", 0.5),
         (CASE, "c_p", 10, 0.1, "", "", "", "bounded above", "", 0.5e-3),
-        # Of k_p nothing is said.
-        (CASE, "k_p", 0, 0.1, "", "", "", "not determined", "", ""),
+        # k_p = 1e-4 is below the range that is searched, and the limit between the two.
+        (CASE, "k_p", 0, 0.1, "", "", "", "bounded above", "", 1.05e-4),
+        # Of c nothing is said.
+        (CASE, "c", 0, 0.1, "", "", "", "not determined", "", ""),
     ]
     INTERVALS.write(tmp_path / "i.csv", rows)
     made = coverage(settings(study_of(OVERLAY)), [target], [tmp_path / "i.csv"], [])
     names = [column.name for column in made.columns]
     found = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
-    assert list(found) == ["k", "c_p"]
+    assert list(found) == ["k", "k_p", "c_p"]
+    assert (found["k_p"]["target"], found["k_p"]["shown_one_sided_true"]) == (1e-4, 1)
     k, c_p = found["k"], found["c_p"]
     assert (k["seeds"], k["confidence_percent"]) == (3, 90.0)
     assert k["coverage_percent"] == pytest.approx(100 * 2 / 3)

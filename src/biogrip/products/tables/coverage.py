@@ -42,9 +42,9 @@ _COLUMNS = (
     Column("seeds", "Seeds"),
     Column("shown_seeds", "Seeds judged in full"),
     Column("shown_determined", "Determined"),
-    Column("shown_determined_true", "True"),
+    Column("shown_determined_true", "Determined and true"),
     Column("shown_one_sided", "Bounded on one side"),
-    Column("shown_one_sided_true", "True"),
+    Column("shown_one_sided_true", "Bounded and true"),
 )
 
 
@@ -110,7 +110,9 @@ def coverage(
         noise_rad = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(posed.searched):
             mine = found[found["quantity"] == quantity.label]
-            truth = float(np.exp(quantity.log(log_truth)))
+            # Not as lifted into the search range.
+            names = [posed.searched.names[index] for index in quantity.members]
+            truth = sum(case.parameters[member] for member in names)
             head = (name, quantity.label, quantity.unit, truth)
             limit = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
             fitted = mine[mine["estimate_rest_known"].notna()]
