@@ -73,7 +73,7 @@ def _rows(table: str, conditions: str, published: Path) -> pd.DataFrame:
     if not files:
         raise ValueError(f"{table}: no such table")
     rows = pd.read_csv(files[0], dtype=str, keep_default_na=False, na_values=[""])
-    for condition in filter(None, re.split(r", *", conditions)):
+    for condition in filter(None, re.split(r", *(?=\w+!?=)", conditions)):
         match = _CONDITION.fullmatch(condition)
         if match is None or match["column"] not in rows:
             raise ValueError(f"{condition!r}: allowed columns are {', '.join(rows)}")
