@@ -79,7 +79,7 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
         ScalarMappable(_RATIO, "cividis_r"), ax=list(grid[1:].flat), pad=0.01, extend="both"
     )
     bar.set_ticks(_RATIO_TICKS, labels=[f"{tick:g}" for tick in _RATIO_TICKS])
-    bar.set_label(f"median error in the true basin / bound, {first}", fontsize=7)
+    bar.set_label(f"median error there / bound\n{first}", fontsize=7)
     drawn.suptitle(maps.title, fontsize=8, x=0.01, ha="left")
     return drawn
 
