@@ -7,7 +7,7 @@ from matplotlib.image import imread
 
 
 def assert_drawn(path: Path) -> None:
-    """See that a figure is not blank, and that something in colour is all over it.
+    """See that a figure is not blank, and that something in colour goes across it.
 
     What figures show is pinned (`tests/products/figures/test_pinned.py`); here it is that
     other data, too, come to a picture, and are not drawn outside of it.
@@ -17,5 +17,5 @@ def assert_drawn(path: Path) -> None:
     rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
     assert len(rows), f"{path.name}: nothing is drawn in colour"
     height, width = ink.shape
-    assert np.ptp(rows) > 0.4 * height, f"{path.name}: what is drawn is too low"
+    assert np.ptp(rows) > 0.1 * height, f"{path.name}: what is drawn is too low"
     assert np.ptp(columns) > 0.4 * width, f"{path.name}: what is drawn is too narrow"

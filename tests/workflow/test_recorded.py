@@ -53,9 +53,10 @@ def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None
 
 
 def test_the_example_is_what_its_truth_makes(tmp_path: Path) -> None:
-    study = study_of((ROOT / "data" / "example_truth.yaml").read_text())
+    config = (ROOT / "data" / "example_truth.yaml").read_text()
     trace = "results/traces/example/seed_0.csv"
-    make_in_process(tmp_path, study, [trace])
+    run = snakemake(tmp_path, trace, config=config)
+    assert run.status == 0, run.output
     assert (tmp_path / trace).read_bytes() == EXAMPLE.read_bytes()
 
 

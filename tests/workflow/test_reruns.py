@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from biogrip.products.stages.model_difference import DIFFERENCES
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.runs import SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
@@ -30,6 +31,7 @@ def test_a_case_more_changes_no_number(finished_copy: Path) -> None:
     for name in JOINT:
         for file in (finished_copy / "results" / "tables").glob(f"{name}.*"):
             file.unlink()
+    (finished_copy / DIFFERENCES.path).unlink()
     make_in_process(finished_copy, study_of(SMALL + NEW_CASE))
     after = tables(finished_copy)
     joint = {f"tables/{name}" for name in JOINT}
@@ -52,7 +54,9 @@ def test_other_numbers_of_seeds_rerun_no_finished_job_and_change_no_number(
     before = (tiny_copy / target).read_text().splitlines()
     larger = replaced(TINY, "batch_size: 1", "batch_size: 2")
     for seeds, fresh in ((3, 1), (6, 2), (1, 0)):
-        run = snakemake(tiny_copy, target, config=replaced(larger, "seeds: 2", f"seeds: {seeds}"))
+        run = snakemake(
+            tiny_copy, target, config=replaced(larger, "\nseeds: 2", f"\nseeds: {seeds}")
+        )
         assert run.status == 0, run.output
         done = run.jobs("target"), run.jobs("measurement"), run.jobs("identification")
         assert done == (0, fresh, 2 * fresh)
@@ -68,7 +72,7 @@ def test_other_numbers_of_seeds_rerun_no_finished_job_and_change_no_number(
     [
         ("rate_Hz: 0.5", "rate_Hz: 2.0", {"target", "measurement", "identification"}),
         ("rate_Hz: 0.5", "rate_Hz: 0.5, noise: {level: 0.2}", {"measurement", "identification"}),
-        ("seeds: 2", "seeds: 2\nevaluation: {near_noise_tolerance: 0.03}", set()),
+        ("\nseeds: 2", "\nseeds: 2\nevaluation: {near_noise_tolerance: 0.03}", set()),
     ],
 )
 def test_a_setting_reruns_what_depends_on_it(

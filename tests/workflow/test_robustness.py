@@ -6,8 +6,6 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.runs import replaced, snakemake, tables
 
@@ -38,7 +36,8 @@ POINTS = [f"liquid_drop_2--small--{level}--0_00{mm}" for level in ("0", "0_1") f
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("robustness")
-    make_in_process(folder, study_of(SWEEP), WANTED)
+    run = snakemake(folder, *WANTED, config=SWEEP)
+    assert run.status == 0, run.output
     return folder
 
 
