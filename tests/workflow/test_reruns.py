@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.products.stages.model_difference import DIFFERENCES
+from biogrip.products.files.differences import DIFFERENCES
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.runs import SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
