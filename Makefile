@@ -11,7 +11,8 @@ BENCH_READY := .venv-bench/.installed
 LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --python-version 3.11 \
   --generate-hashes --no-header --no-annotate --quiet
 
-# What runs in minutes: all but the tests that start Snakemake again and again.
+# What runs in minutes: all but the tests that start Snakemake again and again. test_results.py runs
+# a small study from its targets to its report.
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
@@ -28,11 +29,13 @@ test: $(READY)
 test-lowest:
 	$(PYTHON) -m venv --clear .venv-lowest
 	.venv-lowest/bin/python -m pip install --quiet uv
-	.venv-lowest/bin/uv pip compile pyproject.toml --resolution lowest-direct --quiet --no-header \
-	  --output-file .venv-lowest/lowest.txt
-	.venv-lowest/bin/python -m pip install --quiet -r .venv-lowest/lowest.txt \
-	  pytest pytest-xdist mpmath hatchling editables
+	.venv-lowest/bin/uv pip compile pyproject.toml --extra dev --extra bench --resolution lowest-direct \
+	  --quiet --no-header --output-file .venv-lowest/lowest.txt
+	.venv-lowest/bin/python -m pip install --quiet -r .venv-lowest/lowest.txt
 	.venv-lowest/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	.venv-lowest/bin/ruff check .
+	.venv-lowest/bin/ruff format --check .
+	.venv-lowest/bin/snakefmt --check Snakefile workflow
 	.venv-lowest/bin/python -m pytest -q -n $(JOBS) $(QUICK)
 
 test-pythons:
