@@ -259,3 +259,23 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
     )
     assert seen[:2] == [1, 1]
     assert seen[2] > 1
+
+
+def test_survivors_that_mutate_are_evaluated_again_and_the_best_is_kept() -> None:
+    counted = []
+
+    def counting(parameters: Array) -> Array:
+        counted.append(len(parameters))
+        return bowl(parameters)
+
+    settings = replace(PAPER, mutation_start=5, mutants="all", max_generations=30)
+    answer = evolve(counting, GENOME, settings, np.random.default_rng(0)).identification
+    assert np.all(np.diff(answer.history.best_misfit) <= 0)
+    assert answer.generations == 30
+    assert np.diff(answer.history.evaluations).tolist() == [250] * 4 + [250 + 249] * 26
+    assert answer.evaluations == sum(counted)
+    children_only = evolve(
+        bowl, GENOME, replace(settings, mutants="children"), np.random.default_rng(0)
+    ).identification
+    assert np.array_equal(answer.history.best_misfit[:5], children_only.history.best_misfit[:5])
+    assert not np.array_equal(answer.history.best_misfit, children_only.history.best_misfit)
