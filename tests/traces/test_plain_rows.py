@@ -52,7 +52,7 @@ def test_the_same_numbers_and_lines(
     assert plain_rows(path, 2, 2, [0, 1], ",") is not None
     columns = Columns("time_s", "rotation_rad")
     bulk = read_recording(path, columns)
-    monkeypatch.setattr(recordings, "plain_rows", lambda *_: None)
+    monkeypatch.setattr("biogrip.traces.plain_rows.plain_rows", lambda *_: None)
     careful = read_recording(path, columns)
     for name in ("time_s", "rotation_rad", "lines", "without_number"):
         np.testing.assert_array_equal(getattr(bulk, name), getattr(careful, name))

@@ -27,7 +27,6 @@ def drawn(module: Any) -> Figure:
 def test_torque_shows_the_protocol_and_its_voltages() -> None:
     left, right = drawn(torque).axes
     assert (left.get_ylabel(), right.get_ylabel()) == ("torque (nN m)", "voltage (V)")
-    assert "closing the jaws comes on top" in left.get_title("left")
     assert [text.get_text() for text in left.texts] == ["1.6 nN m", "0.32 nN m"]
     # 27 to 55 V to touch a sample, whose squares add up with those of the grip.
     volts = [text.get_text() for text in right.texts]
