@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from biogrip.traces import recordings
 from biogrip.traces.plain_rows import plain_rows
 from biogrip.traces.recordings import Columns, read_recording
 
