@@ -17,8 +17,6 @@ rule all:
     default_target: True
     input:
         ALL_FILES,
-    message:
-        "All of the study is there"
 
 
 rule all_maps:

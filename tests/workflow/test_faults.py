@@ -206,7 +206,7 @@ def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None
     assert done.returncode != 0
     assert "gripper.md: regenerated, but not published" in done.stderr
     row = next(line for line in done.stderr.splitlines() if "99.9" in line)
-    for word in ("errors", "endothelial_cell k_p", "best_identified", "99.9"):
+    for word in ("errors", "endothelial_cell k_p", "typical_identified", "99.9"):
         assert word in row
     same = biogrip(tmp_path, "compare", now, now)
     assert same.returncode == 0

@@ -77,7 +77,7 @@ def test_a_case_has_its_results(study: Path, name: str) -> None:
     for figure in FIGURES:
         assert_drawn(study / "figures" / f"{figure}_{name}.png")
     errors = pd.read_csv(study / "tables" / f"errors_{name}.csv")
-    assert errors["best_identified"].notna().all()
+    assert errors["typical_identified"].notna().all()
     found = pd.read_csv(study / "identifications" / f"{name}.csv")
     assert len(found) == 2
     # Misfits end near the 1 % noise, not near the signal, a hundred times that.

@@ -216,7 +216,8 @@ def called(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, se
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    return {name: set(files) for name, files in map(json.loads, done.stdout.splitlines())}
+    lines = [line for line in done.stdout.splitlines() if line.startswith("[")]
+    return {name: set(files) for name, files in map(json.loads, lines)}
 
 
 @pytest.mark.parametrize("name", JOBS)

@@ -34,7 +34,7 @@ def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None
     errors = pd.read_csv(results / "tables" / "errors_my_trace.csv")
     assert errors["parameter"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
     assert errors["target"].isna().all()
-    assert errors["best_error_percent"].isna().all()
+    assert errors["typical_error_percent"].isna().all()
     verdicts = pd.read_csv(results / "tables" / "verdicts_my_trace.csv")
     assert verdicts["verdict"].tolist()[:2] == ["determined", "determined"]
     for figure in ("fit", "profiles", "valley", "convergence", "evolution"):

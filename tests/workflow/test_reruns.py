@@ -14,7 +14,7 @@ from tests.helpers.in_process import make_in_process
 from tests.helpers.runs import SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
 
 # Tables that put cases together and have a row, or a few, for each.
-JOINT = ("errors", "linearisation", "methods", "models", "coverage")
+JOINT = ("errors", "linearisation", "methods", "models", "coverage", "mechanics", "contact_loss")
 NEW_CASE = """  my_cell:
     sample: {model: liquid_drop, k: 20.0, k_p: 5.0, c: 8e1}
 """

@@ -32,7 +32,7 @@ def test_results_have_the_names_and_columns_they_promise(finished: Path) -> None
     results = finished / "results"
     for case in CASES:
         target = pd.read_csv(results / "targets" / f"{case}.csv")
-        assert list(target.columns) == ["time_s", "torque_Nm", "rotation_rad"]
+        assert list(target.columns) == ["time_s", "torque_Nm", "rotation_rad", "jaw_force_N"]
         assert len(target) == 401
         assert target["rotation_rad"].max() > 0
         found = pd.read_csv(results / "identifications" / f"{case}.csv")
