@@ -17,5 +17,5 @@ def assert_drawn(path: Path) -> None:
     rows, columns = np.flatnonzero(ink.any(axis=1)), np.flatnonzero(ink.any(axis=0))
     assert len(rows), f"{path.name}: nothing is drawn in colour"
     height, width = ink.shape
-    assert np.ptp(rows) > 0.1 * height, f"{path.name}: what is drawn is too low"
+    assert np.ptp(rows) > 0.02 * height, f"{path.name}: what is drawn is too low"
     assert np.ptp(columns) > 0.4 * width, f"{path.name}: what is drawn is too narrow"
