@@ -73,15 +73,11 @@ def renewed(path: Path) -> str:
     text = path.read_text(encoding="utf-8")
     for name, content in GENERATED[path].items():
         pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
-        part = content()
-        text, count = re.subn(
-            pattern,
-            lambda match, part=part: f"{match[1]}\n{part}\n\n{match[2]}",
-            text,
-            flags=re.DOTALL,
-        )
-        if count != 1:
+        found = re.search(pattern, text, flags=re.DOTALL)
+        if found is None:
             raise ValueError(f"{path}: has no part {name} to be written.")
+        part = f"{found[1]}\n{content()}\n\n{found[2]}"
+        text = text[: found.start()] + part + text[found.end() :]
     return text
 
 

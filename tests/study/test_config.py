@@ -112,9 +112,9 @@ BAD = {
     "measurement: {noise: {level_rad: 1e-6}}": r"my.yaml, line 1: measurement.noise: found level "
     r"and level_rad, allowed is one of level and level_rad; null takes one away",
     "measurement: {noise: {level: null}}": r"measurement.noise: found neither, allowed is one",
-    f"cases: {{x: {{contact: loose, {DROP}}}}}": r"x.contact: found 'loose'. Allowed: bilateral, un",
-    f"cases: {{x: {{contact: unilateral, models: {{target: nonlinear}}, {DROP}}}}}": r"my.yaml, line "
-    r"1: cases.x.contact: found unilateral and a nonlinear target, allowed is models.target: linear",
+    f"cases: {{x: {{contact: loose, {DROP}}}}}": r"x.contact: found 'loose'. Allowed: bilateral",
+    f"cases: {{x: {{contact: unilateral, models: {{target: nonlinear}}, {DROP}}}}}": r"line 1: "
+    r"cases.x.contact: found unilateral and a nonlinear target, allowed is models.target: linear",
     "measurement: {noise: {kind: pink}}": r"noise.kind: found 'pink'. Allowed: gaussian, uniform",
     "genetic_algorithm: {survivors: 500}": r"survivors: found 500, allowed is less than population",
     "search_range: {k: {exponent: [3, -3]}}": r"found \[3, -3\], allowed is \[lowest, highest\]",
