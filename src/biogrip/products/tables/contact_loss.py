@@ -120,8 +120,11 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     if grip_of(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
         return []
     time_s = case.sampling.over(torque.end_s)
-    held = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+    held = _as_written(
+        simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+    )
     free = unilateral_response(case.gripper, network, torque, time_s)
+    let_go = _as_written(free.rotation_rad[0])
     if not free.parted_s:
         return []
     noise = [
@@ -130,7 +133,7 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     ]
     lost = free.parted_s[0]
     whole, until = np.ones(len(time_s), dtype=bool), time_s < lost
-    traces = ((held, whole), (free.rotation_rad[0], whole), (free.rotation_rad[0], until))
+    traces = ((held, whole), (let_go, whole), (let_go, until))
     found = [
         _medians(study_seed, name, case, time_s[kept], [(rotation + n)[kept] for n in noise])
         for rotation, kept in traces
@@ -140,16 +143,21 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     for index, quantity in enumerate(model.quantities):
         label = " + ".join(parameter.name for parameter in quantity)
         target = case.truth.target(quantity)
-        given, let_go, cut = (None if values is None else values[index] for values in found)
-        errors = [_error(target, value) for value in (let_go, cut)]
+        given, wrong, cut = (None if values is None else values[index] for values in found)
+        errors = [_error(target, value) for value in (wrong, cut)]
         unit = quantity[0].unit
-        rows.append((name, lost, label, unit, target, given, let_go, errors[0], cut, errors[1]))
+        rows.append((name, lost, label, unit, target, given, wrong, errors[0], cut, errors[1]))
     misfits = [
         None if values is None or not level else values[-1] / level
         for values, level in zip(found, rms, strict=True)
     ]
     rows.append((name, lost, "misfit", "noise", 1.0, *misfits[:2], None, misfits[2], None))
     return rows
+
+
+def _as_written(rotation_rad: Array) -> Array:
+    """Rotation to the digits of a target: fewer than those in which two processors differ."""
+    return np.array([float(f"{value:.8e}") for value in rotation_rad])
 
 
 def _medians(
