@@ -83,7 +83,6 @@ def renewed(path: Path) -> str:
     if path == SCHEMA:
         return file_schema()
     text = path.read_text(encoding="utf-8")
-<<<<<<< HEAD
     for name, content in PARTS.get(path, {}).items():
         match = re.search(
             rf"<!-- {name}: begin[^\n]*-->\n(.*)<!-- {name}: end -->", text, re.DOTALL
@@ -92,16 +91,6 @@ def renewed(path: Path) -> str:
             raise ValueError(f"{path}: has no part {name} to be written.")
         text = f"{text[: match.start(1)]}\n{content()}\n\n{text[match.end(1) :]}"
     return renewed_numbers(text)
-=======
-    for name, content in GENERATED[path].items():
-        pattern = rf"(<!-- {name}: begin[^\n]*-->\n).*(<!-- {name}: end -->)"
-        found = re.search(pattern, text, flags=re.DOTALL)
-        if found is None:
-            raise ValueError(f"{path}: has no part {name} to be written.")
-        part = f"{found[1]}\n{content()}\n\n{found[2]}"
-        text = text[: found.start()] + part + text[found.end() :]
-    return text
->>>>>>> wt13p
 
 
 if __name__ == "__main__":

@@ -69,8 +69,11 @@ def misses(
                 yield quantity.label, "profile", limit, rise / likelihood.threshold - 1
         for limit in limits:
             if np.isfinite(limit):
-                rises = np.array(rises_along(likelihood, quantity, limit, steps))
-                miss = min(rises / likelihood.threshold - 1, key=abs)
+                rises = list(rises_along(likelihood, quantity, limit, steps))
+                if min(abs(rise / likelihood.threshold - 1) for rise in rises) > ALLOWED:
+                    # Where the optimum's basin leads over into a lower one, it is that one's.
+                    rises.append(rise_at(likelihood, quantity, limit, rng, starts))
+                miss = min((rise / likelihood.threshold - 1 for rise in rises), key=abs)
                 yield quantity.label, "near", limit, float(miss)
 
 

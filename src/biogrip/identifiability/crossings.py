@@ -15,9 +15,12 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identify.local_fit import FAIR
 
 _MOST_FITS = 40
 _CLOSEST = 1e-7
+# Fits on the way that are tried from elsewhere, too: what is found is followed by the others.
+_FROM_ELSEWHERE = 1
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,8 @@ class Brackets:
         Rises of chi^2 there.
     inside_x, outside_x : (n, n_parameters)
         Log-parameters fitted there.
+    elsewhere : (n_starts, n, n_parameters)
+        Log-parameters from which fits are tried as well, where what they lead to may be deeper.
     """
 
     trace: IntArray
@@ -44,9 +49,30 @@ class Brackets:
     outside_rise: Array
     inside_x: Array
     outside_x: Array
+    elsewhere: Array
 
 
-def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: float) -> Array:
+@dataclass(frozen=True)
+class Crossings:
+    """Where n profiles cross the threshold within their brackets.
+
+    Parameters
+    ----------
+    at : (n,)
+        Logarithms of the quantities; NaN where a basin seen on the way is below the threshold
+        at the outer end, so that the crossing lies further out.
+    outside_rise : (n,)
+        Rises at the outer ends, as low as they are known now.
+    outside_x : (n, n_parameters)
+        Log-parameters fitted there.
+    """
+
+    at: Array
+    outside_rise: Array
+    outside_x: Array
+
+
+def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: float) -> Crossings:
     """Find where the rise equals the threshold.
 
     Parameters
@@ -59,13 +85,8 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         Of the fits, see `local_fit`.
     accuracy
         Of the square root of the rise.
-
-    Returns
-    -------
-    (n,)
-        Logarithms of the quantities.
     """
-    trace, which = brackets.trace, brackets.which
+    trace = brackets.trace
     wanted = np.sqrt(fits.threshold[trace])
     # Inside and outside, by row.
     ends = np.stack((brackets.inside, brackets.outside))
@@ -73,23 +94,30 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
     excess = np.sqrt(np.maximum((brackets.inside_rise, brackets.outside_rise), 0.0)) - wanted
     moved = np.full(len(trace), -1)
     found = ends[1].copy()
+    outermost = brackets.outside_rise.copy(), brackets.outside_x.copy()
     left = np.arange(len(trace))
-    for _ in range(_MOST_FITS):
+    for tries in range(_MOST_FITS):
         if not len(left):
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
         tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
         # The fits of the two ends may lie in different basins: what counts is the deeper one.
         between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
-        starts = np.concatenate((between, x[0, left], x[1, left]))
-        all_rises, all_fitted = fits.at(
-            np.tile(trace[left], 3), np.tile(which[left], 3), np.tile(tried, 3), starts, tolerance
-        )
-        all_rises, all_fitted = all_rises.reshape(3, -1), all_fitted.reshape(3, len(left), -1)
+        starts = np.concatenate((between[None], x[:, left]))
+        if tries < _FROM_ELSEWHERE and len(brackets.elsewhere):
+            elsewhere = brackets.elsewhere[:, left]
+            rises, fitted = _fitted_from(fits, brackets, left, tried, elsewhere, FAIR)
+            deepest = fitted[np.argmin(rises, axis=0), range(len(left))]
+            starts = np.concatenate((starts, deepest[None]))
+        all_rises, all_fitted = _fitted_from(fits, brackets, left, tried, starts, tolerance)
         deepest = np.argmin(all_rises, axis=0)
         rises, fitted = all_rises[deepest, range(len(left))], all_fitted[deepest, range(len(left))]
         over = np.sqrt(np.maximum(rises, 0.0)) - wanted[left]
-        found[left] = tried
+        # What is deeper than the basin of the outer end may be so at the outer end, too.
+        apart = np.sqrt(np.maximum(all_rises[2], 0.0)) - wanted[left] > over + accuracy
+        _lower(fits, brackets, outermost, left[apart], fitted[apart], tolerance)
+        void = outermost[0][left] < fits.threshold[trace[left]]
+        found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)
         ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
         # An end that stays a second time counts half, so that it moves, too.
@@ -98,5 +126,42 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         moved[left] = side
         # Where a deeper basin begins the rise may jump past the threshold.
         apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
-        left = left[(np.abs(over) > accuracy) & apart]
-    return found
+        left = left[(np.abs(over) > accuracy) & apart & ~void]
+    return Crossings(found, *outermost)
+
+
+def _fitted_from(
+    fits: HeldFits,
+    brackets: Brackets,
+    which: IntArray,
+    targets: Array,
+    starts: Array,
+    tolerance: float,
+) -> tuple[Array, Array]:
+    """Fit some brackets' quantities from starts (n_starts, n, n_parameters), as `HeldFits.at`."""
+    count = len(starts)
+    rises, fitted = fits.at(
+        np.tile(brackets.trace[which], count),
+        np.tile(brackets.which[which], count),
+        np.tile(targets, count),
+        np.concatenate(starts),
+        tolerance,
+    )
+    return rises.reshape(count, -1), fitted.reshape(starts.shape)
+
+
+def _lower(
+    fits: HeldFits,
+    brackets: Brackets,
+    outermost: tuple[Array, Array],
+    which: IntArray,
+    starts: Array,
+    tolerance: float,
+) -> None:
+    """Fit outer ends of some brackets from other starts, too; in place, the lower fit counts."""
+    if not len(which):
+        return
+    trace, quantity = brackets.trace[which], brackets.which[which]
+    rises, x = fits.at(trace, quantity, brackets.outside[which], starts, tolerance)
+    lower = rises < outermost[0][which]
+    outermost[0][which[lower]], outermost[1][which[lower]] = rises[lower], x[lower]

@@ -87,19 +87,20 @@ class HeldQuantities:
 
     def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
         """Normal equations with residuals for branches that do not relax in time."""
-        relaxing = self._relaxing[self._which[fit]]
-        if not relaxing.size:
+        beyond, slopes = self._late(x, fit)
+        if not slopes.size:
             return normal
-        beyond = np.sum(relaxing * x[:, None], axis=2) - self._longest
-        late = (beyond > 0) & np.any(relaxing != 0, axis=2)
-        beyond = np.where(late, HINGE * beyond, 0.0)
-        slopes = HINGE * relaxing * late[:, :, None]
         return replace(
             normal,
             square_sum=normal.square_sum + np.sum(beyond**2, axis=1),
             gradient=normal.gradient + np.sum(beyond[:, :, None] * slopes, axis=1),
             information=normal.information + slopes.swapaxes(1, 2) @ slopes,
         )
+
+    def price(self, x: Array) -> Array:
+        """What branches that do not relax in time add to the sums of squares, (n,)."""
+        beyond: Array = self._late(x, np.arange(len(x)))[0]
+        return np.sum(beyond**2, axis=1)
 
     def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
         """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
@@ -146,6 +147,13 @@ class HeldQuantities:
         chosen = np.argmax(weight, axis=1)[:, None] == np.arange(x.shape[1])
         marked: BoolArray = chosen & (weight > 0)
         return marked
+
+    def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
+        """Residuals of branches, (n, n_branches), and their slopes by the log-parameters."""
+        relaxing = self._relaxing[self._which[fit]]
+        beyond = np.sum(relaxing * x[:, None], axis=2) - self._longest
+        late = (beyond > 0) & np.any(relaxing != 0, axis=2)
+        return np.where(late, HINGE * beyond, 0.0), HINGE * relaxing * late[:, :, None]
 
     def _slopes(self, x: Array, fit: IntArray) -> Array:
         """Derivatives of the quantities' logarithms by the log-parameters, where they hold."""

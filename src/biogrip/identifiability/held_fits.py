@@ -78,7 +78,10 @@ class HeldFits:
             self._fits.high,
             self._residuals.duration_s,
         )
-        return self._rises(self._fits.fitted(near, trace, tolerance, held=held), trace)
+        found = self._fits.fitted(near, trace, tolerance, held=held)
+        # In the unit of the fits' residuals, as what the fits are held to is.
+        price = held.price(found.x) * (self._scale_rad / self._noise_rad)[trace] ** 2
+        return self._rises(found, trace) + price, found.x
 
     def with_fixed(
         self, trace: IntArray, x: Array, fixed: BoolArray, tolerance: float
@@ -97,16 +100,17 @@ class HeldFits:
             Of the fits, see `local_fit`.
         """
         low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
-        return self._rises(self._fits.fitted(x, trace, tolerance, low=low, high=high), trace)
+        found = self._fits.fitted(x, trace, tolerance, low=low, high=high)
+        return self._rises(found, trace), found.x
 
-    def _rises(self, found: Minima, trace: IntArray) -> tuple[Array, Array]:
+    def _rises(self, found: Minima, trace: IntArray) -> Array:
         excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
         rises = self._residuals.samples * excess / self._noise_rad[trace] ** 2
         for index in np.flatnonzero(rises < -MISSED):
             of_trace = int(trace[index])
             if of_trace not in self.deeper or rises[index] < self.deeper[of_trace][0]:
                 self.deeper[of_trace] = float(rises[index]), found.x[index].copy()
-        return rises, found.x
+        return rises
 
     def ranges(self) -> tuple[Array, Array]:
         """Lowest and highest logarithm of each quantity, (n_quantities,) each."""

@@ -56,6 +56,7 @@ def many_limits(
     # Inside and outside, by row.
     ends = np.stack((fits.at_best()[trace, which], np.full(len(trace), np.nan)))
     rises, x = np.zeros_like(ends), np.stack((fits.best[trace], fits.best[trace]))
+    limits = np.full(len(trace), np.nan)
     left = np.arange(len(trace))
     for _ in range(_MOST_DOUBLINGS):
         if not len(left):
@@ -64,21 +65,28 @@ def many_limits(
         rise, found = fits.at(trace[left], which[left], tried, x[0, left], tolerance)
         side = (rise >= fits.threshold[trace[left]]).astype(np.int64)
         ends[side, left], rises[side, left], x[side, left] = tried, rise, found
+        closed = left[side == 1]
+        # Limits are those of the optimum's own basin.
+        nowhere_else = np.empty((0, len(closed), x.shape[2]))
+        brackets = Brackets(
+            trace[closed],
+            which[closed],
+            ends[0, closed],
+            ends[1, closed],
+            rises[0, closed],
+            rises[1, closed],
+            x[0, closed],
+            x[1, closed],
+            nowhere_else,
+        )
+        crossed = crossings(fits, brackets, tolerance, accuracy)
+        limits[closed] = crossed.at
+        # Where another basin is below the threshold there, that is the way on.
+        on = np.isnan(crossed.at)
+        ends[0, closed[on]], rises[0, closed[on]] = brackets.outside[on], crossed.outside_rise[on]
+        x[0, closed[on]] = crossed.outside_x[on]
         stride[left] *= 2
-        left = left[(side == 0) & (tried > low[left]) & (tried < high[left])]
-    closed = np.flatnonzero(np.isfinite(ends[1]))
-    limits = np.full(len(trace), np.nan)
-    brackets = Brackets(
-        trace[closed],
-        which[closed],
-        ends[0, closed],
-        ends[1, closed],
-        rises[0, closed],
-        rises[1, closed],
-        x[0, closed],
-        x[1, closed],
-    )
-    limits[closed] = crossings(fits, brackets, tolerance, accuracy)
+        left = left[np.isnan(limits[left]) & (tried > low[left]) & (tried < high[left])]
     return limits.reshape(shape)
 
 

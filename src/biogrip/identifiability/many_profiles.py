@@ -132,6 +132,16 @@ class _Points:
             self.rises[at], self.x[at] = after[better], x[side][better]
         return news
 
+    def extremes(self) -> Array:
+        """Fits at both ends of each trace's profiles, (2 n_quantities, n_traces, n_parameters).
+
+        A basin that some profile comes to may be the deepest at the limit of another.
+        """
+        ends = np.stack((self.x[:, 0], self.x[np.arange(len(self.x)), self.count - 1]))
+        ends = ends.reshape(2, len(self.fits.best), -1, self.x.shape[2])
+        extremes: Array = np.concatenate(ends.swapaxes(1, 2))
+        return extremes
+
 
 def _from_optimum(points: _Points, middle: IntArray) -> None:
     """Fit every point but the optimum from the optimum."""
@@ -161,22 +171,30 @@ def _crossed(likelihoods: Sequence[Likelihood], points: _Points) -> tuple[BoolAr
     closed = np.stack(
         (points.rises[:, 0] > certainty, points.rises[everyone, points.count - 1] > certainty)
     )
-    below = (points.rises < threshold[:, None]) & np.isfinite(points.values)
-    first = np.argmax(below, axis=1)
-    last = below.shape[1] - 1 - np.argmax(below[:, ::-1], axis=1)
-    end, profile = np.nonzero(closed)
-    inside = np.where(end == 0, first[profile], last[profile])
-    outside = np.where(end == 0, inside - 1, inside + 1)
-    brackets = Brackets(
-        points.trace[profile],
-        points.which[profile],
-        points.values[profile, inside],
-        points.values[profile, outside],
-        points.rises[profile, inside],
-        points.rises[profile, outside],
-        points.x[profile, inside],
-        points.x[profile, outside],
-    )
     crossed = np.full(closed.shape, np.nan)
-    crossed[end, profile] = crossings(points.fits, brackets, FINE, _ACCURACY)
-    return closed, crossed
+    end, profile = np.nonzero(closed)
+    while len(profile):
+        below = (points.rises < threshold[:, None]) & np.isfinite(points.values)
+        first = np.argmax(below, axis=1)
+        last = below.shape[1] - 1 - np.argmax(below[:, ::-1], axis=1)
+        inside = np.where(end == 0, first[profile], last[profile])
+        outside = np.where(end == 0, inside - 1, inside + 1)
+        inner, outer = (profile, inside), (profile, outside)
+        brackets = Brackets(
+            points.trace[profile],
+            points.which[profile],
+            points.values[inner],
+            points.values[outer],
+            points.rises[inner],
+            points.rises[outer],
+            points.x[inner],
+            points.x[outer],
+            points.extremes()[:, points.trace[profile]],
+        )
+        found = crossings(points.fits, brackets, FINE, _ACCURACY)
+        crossed[end, profile] = found.at
+        points.rises[outer], points.x[outer] = found.outside_rise, found.outside_x
+        # Where the outer point has come below the threshold, the next bracket is further out.
+        on = np.isnan(found.at) & (outside > 0) & (outside < points.count[profile] - 1)
+        end, profile = end[on], profile[on]
+    return closed & np.isfinite(crossed), crossed
