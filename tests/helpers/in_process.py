@@ -1,6 +1,7 @@
 """A study made job by job in this process, in the order in which jobs read one another's files.
 
-What is made is what Snakemake's jobs make, by the same commands. Neither Snakemake nor a
+What is made is what Snakemake's jobs make, by the same commands; of a sheet of products only
+those that are wanted, if not all are. Neither Snakemake nor a
 process for each job has to be started, which takes most of the time of a small study.
 """
 
@@ -33,7 +34,10 @@ def make_in_process(folder: Path, study: Study, wanted: Iterable[str] | None = N
     with chdir(folder), _signals_kept():
         results = Path("results")
         write_study(study, results)
-        makers = _makers(sheets_of(products().values(), Plan(study, results)))
+        plan = Plan(study, results)
+        alone = [Sheet(p.name, (p,), plan, tuple(p.jobs(plan))) for p in products().values()]
+        sheets = sheets_of(products().values(), plan) if wanted is None else alone
+        makers = _makers(sheets)
         for file in makers if wanted is None else wanted:
             _make(file, makers)
 
