@@ -166,7 +166,8 @@ def test_a_profile_is_the_library_s(opened: Opened, finished: Path) -> None:
         (found,) = (q for q in verdicts["quantities"] if q["quantity"] == quantity)
         values = np.array(found["profile"]["values"])
         expected = np.array(found["profile"]["rises"])
-        shown = np.flatnonzero(expected < 4 * verdicts["threshold"])
+        # Further out another basin may begin, for which the page does not look.
+        shown = np.flatnonzero(expected < 3 * verdicts["threshold"])
         # The page's elements in their order: branch and parallel ones of each kind.
         names = opened.page.evaluate("biogrip.cases[0].elements.map(e => e.name)")
         chosen = "sum" if index == 4 else names.index(quantity)
@@ -177,7 +178,7 @@ def test_a_profile_is_the_library_s(opened: Opened, finished: Path) -> None:
             }""",
             [chosen, np.log(values[shown]).tolist()],
         )
-        assert np.allclose(rises, expected[shown], rtol=0.02, atol=0.05), quantity
+        assert np.allclose(rises, expected[shown], rtol=0.01, atol=0.01), quantity
         compared += len(shown)
     assert compared > 50
 
