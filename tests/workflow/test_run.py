@@ -79,8 +79,7 @@ def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:
         output, _ = run.communicate(timeout=300)
     assert run.returncode == 0, output
     assert output.splitlines()[-1] == (
-        "biogrip: done. Open results/tables/errors.md, results/figures/overview.png, "
-        "results/summaries/liquid_drop_2.html."
+        "biogrip: done. Open results/report.html, results/summaries/liquid_drop_2.html."
     )
     assert (tiny_copy / errors).read_bytes() == (tiny / errors).read_bytes()
 

@@ -185,7 +185,7 @@ class _Signals:
 def _to_open(results: Path) -> str:
     """Name what a reader should look at first."""
     pages = sorted((results / "summaries").glob("*.html"))
-    shown = [results / "tables" / "errors.md", results / "figures" / "overview.png", *pages]
+    shown = [results / "report.html", *pages]
     there = [str(path) for path in shown if path.is_file()]
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""
     return f"biogrip: done. Open {', '.join(there[:_SHOWN])}{more}." if there else "biogrip: done."

@@ -1,0 +1,184 @@
+"""The story at a glance: what fits agree on is what the experiment sees, and when it sees it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.sample import Network, SampleModel
+from biogrip.experiment.truth import Truth
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS
+from biogrip.identify.success import near_noise
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.overview import shown_cases
+from biogrip.products.figures.results import first_seeds
+from biogrip.products.figures.style import (
+    BLACK,
+    METHOD_STYLES,
+    PAGE_IN,
+    SHADE,
+    figure,
+    panel,
+)
+from biogrip.products.files.identifications import PATH, read_identifications
+from biogrip.products.files.traces import TARGETS, read_target
+from biogrip.products.product import Weight, of_cases
+from biogrip.study.study import Study
+
+SEEN = 0.1
+"""The experiment sees a modulus on which nine tenths of the fits near the noise agree so well."""
+
+_POINTS = 121
+_TITLE_LETTERS = 28
+_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#999999")
+
+
+@dataclass(frozen=True)
+class ShownCase:
+    """A sample, what its identification assumes, and the noise that it meets."""
+
+    truth: Truth
+    problem: CaseProblem
+    noise: Noise
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A few samples, whose identifications are drawn, and which of these are near the noise."""
+
+    cases: tuple[ShownCase, ...]
+    methods: tuple[str, ...]
+    near_noise_tolerance: float
+
+
+def settings(study: Study) -> Settings:
+    """Choose what is drawn: the shown method, and least squares where there is such."""
+    cases = [study.cases[name] for name in shown_cases(study)]
+    methods = [study.shown, *(["least_squares"] if "least_squares" in study.methods else [])]
+    return Settings(
+        tuple(ShownCase(case.truth, case.problem, case.noise) for case in cases),
+        tuple(dict.fromkeys(methods)),
+        study.near_noise_tolerance,
+    )
+
+
+def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -> Figure:
+    """Draw moduli over frequency, and sensitivities over time.
+
+    Parameters
+    ----------
+    settings
+        What is drawn.
+    identifications, targets
+        Of the cases in their order, CSV.
+    """
+    drawn = figure(PAGE_IN, 4.4)
+    axes = drawn.subplots(2, len(settings.cases), squeeze=False, height_ratios=[1.35, 1])
+    files = zip(settings.cases, identifications, targets, strict=True)
+    for column, (case, identified, target) in enumerate(files):
+        time_s, _, rotation = read_target(target)
+        logs = case.problem.logs(case.truth.parameters)
+        _, sensitivity = case.problem.of(time_s, rotation).residuals(logs)
+        relative = sensitivity / standard_deviation(rotation, case.noise)
+        _moduli(axes[0, column], settings, case, identified, time_s)
+        _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
+        panel(axes[0, column], "abc"[column], case.truth.title, _TITLE_LETTERS)
+        panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
+    axes[0, 0].set_ylabel("modulus (N/m)")
+    axes[1, 0].set_ylabel("sensitivity / noise")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    drawn.legend(handles, labels, loc="outside upper center", ncols=len(labels))
+    return drawn
+
+
+def _moduli(
+    axes: Axes,
+    settings: Settings,
+    case: ShownCase,
+    identified: Path,
+    time_s: Array,
+) -> None:
+    between = np.diff(time_s)
+    slowest, fastest = 1 / (time_s[-1] - time_s[0]), 1 / float(np.min(between))
+    omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
+    model = case.problem.model
+    near = []
+    for method in settings.methods:
+        found = first_seeds(read_identifications(identified, method))
+        fits = found[[p.column for p in model.parameters]].to_numpy(float)
+        moduli = _modulus(model.network(fits), omega)
+        near.append(moduli[near_noise(found, settings.near_noise_tolerance)])
+        style = METHOD_STYLES[method] | {"linewidth": 0.4, "alpha": 0.45}
+        for index, modulus in enumerate(moduli):
+            label = METHODS[method].title if index == 0 else None
+            for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
+                axes.plot(omega, part, **style | {"linestyle": dashed}, label=label)
+                label = None
+    fitting = np.concatenate(near)
+    seen = np.flatnonzero(_agreed(fitting)) if len(fitting) else np.array([], dtype=np.int64)
+    for run in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1) if len(seen) else []:
+        axes.axvspan(
+            omega[run[0]], omega[run[-1]], color=SHADE, linewidth=0, zorder=0,
+            label="seen by the experiment" if run[0] == seen[0] else None,
+        )  # fmt: skip
+    truth = _modulus(_network(model, case.truth), omega)[0]
+    axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
+    axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, $G''$")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    largest = float(np.max(np.abs(truth)))
+    axes.set_ylim(1e-5 * largest, 5 * largest)
+    axes.set_xlim(omega[0], omega[-1])
+    axes.set_xlabel("angular frequency (rad/s)")
+
+
+def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Array) -> None:
+    for parameter, row, colour in zip(model.parameters, relative, _COLOURS, strict=False):
+        axes.plot(time_s, row, color=colour, linewidth=1, label=parameter.symbol)
+    axes.axhspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
+    axes.set_xlim(time_s[0], time_s[-1])
+    axes.set_xlabel("time (s)")
+    axes.legend(ncols=2, columnspacing=0.8, handlelength=1)
+
+
+def _network(model: SampleModel, truth: Truth) -> Network:
+    return model.network(np.array([[truth.parameters[name] for name in model.names]]))
+
+
+def _modulus(network: Network, omega: Array) -> Array:
+    """Complex stiffness of n samples in N/m, force over shortening at s = i omega, (n, n_omega)."""
+    s = 1j * omega
+    rates = (network.k / network.c)[:, :, None]
+    branches = np.sum(network.k[:, :, None] * s / (s + rates), axis=1)
+    return network.k_p[:, None] + network.c_p[:, None] * s + branches
+
+
+def _agreed(moduli: Array) -> BoolArray:
+    """Where nine tenths of fits, (n, n_omega), have about the same modulus."""
+    low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
+    agreed: BoolArray = high < (1 + SEEN) * low
+    return agreed
+
+
+MODULI = drawing(
+    draw,
+    name="moduli",
+    caption="Upper row: storage modulus G' (solid) and loss modulus G'' (dashed) of the true "
+    "sample, and of all fits to its traces; shaded is the band in which nine tenths of the fits "
+    f"near the noise agree on the modulus to {SEEN:.0%}, whatever their parameters. Lower row: how "
+    "much the rotation changes with the logarithm of each parameter, in standard deviations of one "
+    "measured value's noise; within the shaded band a single value does not show it.",
+    settings=settings,
+    reads={
+        "identifications": of_cases(PATH, shown_cases),
+        "targets": of_cases(TARGETS, shown_cases),
+    },
+    when=lambda study: bool(study.simulated),
+    sheet="study_figures",
+    weight=Weight(10, 2000),
+)

@@ -1,0 +1,221 @@
+// The explorer: controls, and plots that follow them.
+(() => {
+  const INK = "#000000", MEASURED = "#56B4E9", FITTED = "#D55E00", BLUE = "#0072B2", GREY = "#999999";
+  const POINTS = 41, DRAWN = 801;
+  const cases = JSON.parse(document.getElementById("data").textContent).map(unpacked);
+  const element = (id) => document.getElementById(id);
+
+  function unpacked(given) {
+    const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+    const single = (text) => Array.from(new Float32Array(bytes(text)));
+    const times = Array.from(new Float64Array(bytes(given.time_s)));
+    return {
+      ...given, times, target: given.target_rad && single(given.target_rad),
+      trace: (index) => single(given.traces_rad[index]),
+      layout: {
+        elements: given.elements.map((e) => e.at),
+        low: given.elements.map((e) => e.low), high: given.elements.map((e) => e.high),
+      },
+    };
+  }
+
+  function draw(id, title, x, y, traces, layout = {}) {
+    const axis = { zeroline: false, automargin: true, linecolor: GREY, ticks: "outside", exponentformat: "power" };
+    Plotly.react(id, traces, {
+      title: { text: title, font: { size: 13 }, x: 0.02 }, font: { size: 11 },
+      margin: { l: 58, r: 10, t: 34, b: 42 }, showlegend: traces.length > 1,
+      legend: { orientation: "h", x: 1, xanchor: "right", y: 1.02, yanchor: "bottom", font: { size: 10 } },
+      xaxis: { ...axis, title: { text: x }, ...layout.xaxis }, yaxis: { ...axis, title: { text: y }, ...layout.yaxis },
+      shapes: layout.shapes || [], annotations: layout.annotations || [],
+    }, { responsive: true, displaylogo: false, displayModeBar: false });
+  }
+
+  function options(id, pairs) {
+    const select = element(id), before = select.value;
+    select.replaceChildren(...pairs.map(([value, text]) => new Option(text, value)));
+    if (pairs.some(([value]) => String(value) === before)) select.value = before;
+  }
+
+  const short = (value) => {
+    const rounded = Number(value.toPrecision(3));
+    return Math.abs(rounded) < 1e-3 && rounded !== 0 ? rounded.toExponential() : String(rounded);
+  };
+
+  function sampleWords(item, sample) {
+    return item.elements.map((e) => {
+      const [kind, branch] = e.at;
+      return `${e.name} ${short(branch === null ? sample[kind] : sample[kind][branch])} ${e.unit}`;
+    }).join(", ");
+  }
+
+  // One trace.
+
+  function chooseCase() {
+    const item = cases[element("case").value];
+    options("method", item.methods.map((m, i) => [i, m.title]));
+    options("seed", item.seeds.map((seed) => [seed, seed]));
+    const names = item.elements.map((e, i) => [i, e.name]);
+    const dampers = item.elements.filter((e) => e.at[0] !== "k" && e.at[0] !== "k_p").map((e) => e.name);
+    options("quantity", dampers.length === 2 ? [["sum", dampers.join(" + ")], ...names] : names);
+    showTrace();
+  }
+
+  function showTrace() {
+    const item = cases[element("case").value], seed = Number(element("seed").value);
+    const method = item.methods[element("method").value];
+    const fit = method.fits.find((f) => f.seed === seed);
+    const trace = item.trace(item.seeds.indexOf(seed)), times = item.times;
+    const without = inference.projection(times, item.offset, item.drift);
+    const respond = (sample) => Array.from(mechanics.rotation(item.gripper, sample, item.torque, times));
+    const lines = [{ x: times, y: trace, mode: "markers", marker: { size: 2, color: MEASURED }, name: item.target ? "noisy trace" : "recorded trace", type: "scattergl" }];
+    if (item.target) lines.push({ x: times, y: item.target, mode: "lines", line: { color: INK, width: 1.5 }, name: "target" });
+    let residual = [];
+    if (fit && item.closed_form) {
+      const fitted = respond(fit.sample), left = without(trace.map((value, i) => value - fitted[i]));
+      residual = left;
+      lines.push({ x: times, y: trace.map((value, i) => value - left[i]), mode: "lines", line: { color: FITTED, width: 1.5, dash: "dash" }, name: "fit" });
+    }
+    draw("plot-trace", "Trace and fit", "time (s)", "closing rotation (rad)", lines);
+    draw("plot-residual", "What the fit leaves", "time (s)", "trace − fit (rad)", [{ x: times, y: residual, mode: "markers", marker: { size: 2, color: MEASURED }, name: "residual", type: "scattergl" }]);
+    const history = fit ? fit.history : [];
+    draw("plot-history", history.length ? "How it was found" : "This method has no generations", "generation", "lowest misfit (rad)",
+      history.length ? [{ x: history[0], y: history[1], mode: "lines", line: { color: FITTED, shape: "hv" }, name: "lowest misfit" }] : [],
+      { yaxis: { type: "log" } });
+    const note = item.nonlinear ? " The study's model is nonlinear here; the page draws the linear one." : "";
+    element("fit-words").textContent = !item.closed_form
+      ? "Arms or torques differ: the page has no closed form for that, and shows traces only."
+      : fit ? `${method.title}, seed ${seed}: ${sampleWords(item, fit.sample)}; misfit ${short(fit.misfit_rad)} rad.${note}` : "";
+    element("plot-profile").dataset.ready = "";
+    clearTimeout(showTrace.later);
+    showTrace.later = setTimeout(() => { if (fit && item.closed_form) showProfile(item, trace, fit); }, 30);
+  }
+
+  function profileOf(item, trace, sample, quantity, values) {
+    const respond = (logs) => Array.from(
+      mechanics.rotation(item.gripper, inference.sampleOf(item.layout, logs), item.torque, item.times));
+    const start = inference.logsOf(item.layout, sample);
+    return inference.profile(item.layout, respond, trace, start, quantity, values, inference.projection(item.times, item.offset, item.drift), item.times[item.times.length - 1]);
+  }
+
+  function showProfile(item, trace, fit) {
+    const chosen = element("quantity").value, quantity = chosen === "sum" ? "sum" : Number(chosen);
+    const dampers = item.elements.map((e, i) => [e, i]).filter(([e]) => e.at[0] === "c" || e.at[0] === "c_p").map(([, i]) => i);
+    const members = quantity === "sum" ? dampers : [quantity];
+    const low = Math.max(...members.map((i) => item.layout.low[i])), high = Math.min(...members.map((i) => item.layout.high[i]));
+    const start = inference.logsOf(item.layout, fit.sample);
+    const middle = Math.log(members.reduce((sum, i) => sum + Math.exp(start[i]), 0));
+    const threshold = item.verdicts.threshold;
+    // A coarse look at the whole range first, then where the rise is small.
+    const coarse = Array.from({ length: 15 }, (_, i) => low + (high - low) * (i + 0.5) / 15).concat([middle]).sort((a, b) => a - b);
+    const seen = profileOf(item, trace, fit.sample, quantity, coarse);
+    const inside = coarse.filter((_, i) => seen.rises[i] < 4 * threshold);
+    const width = (high - low) / 15;
+    let from = Math.max(low, Math.min(...inside, middle) - width), to = Math.min(high, Math.max(...inside, middle) + width);
+    let fine = seen, values = coarse;
+    for (let n = 0; n < 3; n += 1) {
+      values = Array.from({ length: POINTS }, (_, i) => from + (to - from) * i / (POINTS - 1));
+      fine = profileOf(item, trace, fit.sample, quantity, values);
+      const near = values.filter((_, i) => fine.rises[i] < 4 * threshold);
+      if (near.length > POINTS / 4) break;
+      const step = (to - from) / (POINTS - 1);
+      const centre = near.length ? near : [values[fine.rises.indexOf(Math.min(...fine.rises))]];
+      from = Math.max(low, centre[0] - step); to = Math.min(high, centre[centre.length - 1] + step);
+    }
+    const name = element("quantity").selectedOptions[0].text, unit = item.elements[members[0]].unit;
+    draw("plot-profile", `How far ${name} can be moved`, `${name} (${unit})`, "rise of chi²",
+      [{ x: values.map(Math.exp), y: fine.rises, mode: "lines", line: { color: BLUE }, name: "profile" }],
+      { xaxis: { type: to - from > 2 ? "log" : "linear" }, yaxis: { range: [0, 4 * threshold] },
+        shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: threshold, y1: threshold, line: { color: GREY, dash: "dot" } }] });
+    element("plot-profile").dataset.ready = "yes";
+  }
+
+  // A sample of one's own.
+
+  const tried = { index: 0, logs: [], torque: 1, noise: 0 };
+
+  function sliders() {
+    const item = cases[tried.index];
+    const selector = document.createElement("label");
+    selector.append("start from");
+    const select = document.createElement("select");
+    select.id = "try-case";
+    select.append(...cases.map((c, i) => new Option(c.title, i)));
+    select.value = tried.index;
+    select.addEventListener("change", () => { tried.index = Number(select.value); startFrom(); });
+    selector.append(select);
+    const all = item.elements.map((e, i) => slider(`try-${e.name}`, e.name, e.unit, e.low, e.high, tried.logs[i], (u) => { tried.logs[i] = u; }));
+    all.push(slider("try-torque", "torque", "× the protocol's", Math.log(0.05), Math.log(20), Math.log(tried.torque), (u) => { tried.torque = Math.exp(u); }));
+    all.push(slider("try-noise", "noise", "rad", Math.log(1e-9), Math.log(1e-1), Math.log(tried.noise), (u) => { tried.noise = Math.exp(u); }));
+    element("sample-controls").replaceChildren(selector, ...all);
+  }
+
+  function slider(id, name, unit, low, high, value, moved) {
+    const label = document.createElement("label"), input = document.createElement("input"), output = document.createElement("output");
+    Object.assign(input, { type: "range", min: low, max: high, step: (high - low) / 2000, id });
+    input.value = value;
+    const say = (log) => { output.textContent = `${name} = ${short(Math.exp(log))} ${unit}`; };
+    input.addEventListener("input", () => { moved(Number(input.value)); say(Number(input.value)); showTried(); });
+    say(value);
+    label.append(output, input);
+    return label;
+  }
+
+  function startFrom() {
+    const item = cases[tried.index];
+    const sample = item.truth || item.methods[0].fits[0].sample;
+    tried.logs = inference.logsOf(item.layout, sample);
+    tried.torque = 1;
+    tried.noise = item.noise_rad || item.methods[0].fits[0].misfit_rad;
+    sliders();
+    showTried();
+  }
+
+  function showTried() {
+    const item = cases[tried.index];
+    if (!item.closed_form) {
+      element("force-words").textContent = "Arms or torques differ: the page has no closed form for that.";
+      return;
+    }
+    const torque = mechanics.scaled(item.torque, tried.torque);
+    const drawn = Array.from({ length: DRAWN }, (_, i) => item.end_s * i / (DRAWN - 1));
+    const sample = inference.sampleOf(item.layout, tried.logs);
+    const response = mechanics.rotation(item.gripper, sample, torque, drawn);
+    const force = mechanics.jawForce(item.gripper, sample, torque, drawn);
+    draw("plot-response", "Response, and the noise on it", "time (s)", "closing rotation (rad)", [
+      { x: [...drawn, ...drawn.slice().reverse()], y: [...Array.from(response, (v) => v + tried.noise), ...Array.from(response, (v) => v - tried.noise).reverse()], fill: "toself", mode: "none", fillcolor: "rgba(86,180,233,0.35)", name: "± standard deviation", hoverinfo: "skip" },
+      { x: drawn, y: Array.from(response), mode: "lines", line: { color: INK }, name: "response" }]);
+    draw("plot-force", "Force of the jaws", "time (s)", "force (N)", [{ x: drawn, y: Array.from(force), mode: "lines", line: { color: BLUE }, name: "force" }],
+      { shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: 0, y1: 0, line: { color: GREY } }] });
+    const lowest = Math.min(...force), most = Math.max(...force);
+    element("force-words").textContent = lowest < -1e-9 * most
+      ? `The jaws would have to pull, by ${short(-lowest)} N at most: without adhesion, contact is lost.`
+      : "The jaws press all the time.";
+    const respond = (logs) => mechanics.rotation(item.gripper, inference.sampleOf(item.layout, logs), torque, item.times);
+    const found = inference.deviations(item.layout, tried.logs, (logs) => Array.from(respond(logs)), tried.noise);
+    const names = item.elements.map((e) => e.name), units = item.elements.map((e) => e.unit);
+    const values = tried.logs.map(Math.exp);
+    const dampers = item.elements.map((e, i) => [e, i]).filter(([e]) => e.at[0] === "c" || e.at[0] === "c_p").map(([, i]) => i);
+    if (found.length > names.length) {
+      names.push(dampers.map((i) => names[i]).join(" + "));
+      units.push("N s/m");
+      values.push(dampers.reduce((sum, i) => sum + values[i], 0));
+    }
+    element("determined").replaceChildren(...names.map((name, i) => {
+      const row = document.createElement("tr");
+      const cells = [name, `${short(values[i])} ${units[i]}`,
+        found[i] < 1 ? `${short(100 * found[i])} %` : `a factor of ${short(Math.exp(Math.min(found[i], 50)))}`,
+        found[i] < 0.05 ? "determined" : found[i] < 0.5 ? "roughly" : "not determined"];
+      row.append(...cells.map((text) => Object.assign(document.createElement("td"), { textContent: text })));
+      return row;
+    }));
+  }
+
+  options("case", cases.map((c, i) => [i, c.title]));
+  element("case").addEventListener("change", chooseCase);
+  ["method", "seed", "quantity"].forEach((id) => element(id).addEventListener("change", showTrace));
+  if (cases.length) {
+    chooseCase();
+    startFrom();
+  }
+  window.biogrip = { cases, mechanics, inference, profileOf };
+})();

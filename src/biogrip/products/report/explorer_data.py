@@ -1,0 +1,214 @@
+"""What the explorer in the page of a study works with: traces, fits, and what made them."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.digits import rounded
+from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.sample import SampleModel
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS
+from biogrip.products.figures.results import read_history
+from biogrip.products.files.identifications import read_identifications
+from biogrip.products.files.traces import read_measurements
+from biogrip.products.files.verdicts import read_verdicts
+from biogrip.response.linear import is_symmetric
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MOST_SEEDS = 50
+MOST_BYTES = 3_000_000
+"""Of all traces in the page: it is to be read on a phone."""
+
+_NUMBER_BYTES = 4
+
+
+@dataclass(frozen=True)
+class ExploredCase:
+    """One case of the explorer.
+
+    Parameters
+    ----------
+    name, title
+        In files, and in print.
+    parameters
+        True values by name, as far as there are any.
+    problem
+        What the identification assumes.
+    noise
+        Noise on the rotation; None of a recorded trace.
+    nonlinear
+        Whether target or identification is nonlinear: the closed form is then an approximation.
+    """
+
+    name: str
+    title: str
+    parameters: Mapping[str, float]
+    problem: CaseProblem
+    noise: Noise | None
+    nonlinear: bool
+
+    @property
+    def closed_form(self) -> bool:
+        """Whether the page can compute responses: arms and torques are alike."""
+        return is_symmetric(self.problem.gripper, self.problem.torque)
+
+
+@dataclass(frozen=True)
+class CaseFiles:
+    """Results of one case; see the fields of the same name of the files."""
+
+    identifications: Path
+    histories: Path
+    verdicts: Path
+    measurements: Sequence[Path]
+    calibrated: Sequence[Path]
+
+
+def explorer_data(
+    cases: Sequence[ExploredCase], files: Sequence[CaseFiles], methods: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return what the explorer is given, as plain data.
+
+    Parameters
+    ----------
+    cases, files
+        The cases, and their results.
+    methods
+        By which their traces were identified.
+
+    Raises
+    ------
+    BiogripError
+        If a file cannot be read.
+    """
+    share = MOST_BYTES // max(len(cases), 1)
+    return [_case(case, f, methods, share) for case, f in zip(cases, files, strict=True)]
+
+
+def _case(
+    case: ExploredCase, files: CaseFiles, methods: Sequence[str], most_bytes: int
+) -> dict[str, Any]:
+    problem = case.problem.calibrated(files.calibrated)
+    model = problem.model
+    recorded = [read_measurements(path) for path in files.measurements]
+    traces = {seed: trace for part in recorded for seed, trace in part.rotation_rad.items()}
+    time_s, target = recorded[0].time_s, recorded[0].target_rad
+    stride = 1 + _NUMBER_BYTES * len(time_s) // most_bytes
+    room = most_bytes // (_NUMBER_BYTES * len(time_s[::stride]))
+    seeds = sorted(traces)[: max(1, min(MOST_SEEDS, room))]
+    sigma = 0.0
+    if case.noise is not None and target is not None:
+        sigma = float(np.sqrt(np.mean(standard_deviation(target, case.noise) ** 2)))
+    torque, gripper = problem.torque, problem.gripper
+    return {
+        "name": case.name,
+        "title": case.title,
+        "model": model.title,
+        "closed_form": case.closed_form,
+        "nonlinear": case.nonlinear,
+        "truth": _network(model, case.parameters),
+        "elements": _elements(problem),
+        "gripper": {
+            "k": gripper.left.stiffness_Nm_per_rad,
+            "c": gripper.left.damping_Nms_per_rad,
+            "lever": gripper.lever_m,
+        },
+        "torque": {
+            "jumps": [[start, order, float(h[0])] for start, order, h in torque.jumps],
+            "swings": [[t, omega, a[0].real, a[0].imag] for t, omega, a in torque.swings],
+        },
+        "end_s": torque.end_s,
+        "offset": problem.offset,
+        "drift": problem.drift,
+        "noise_rad": sigma,
+        "time_s": _packed(time_s[::stride], "<f8"),
+        "target_rad": None if target is None else _packed(target[::stride]),
+        "seeds": seeds,
+        "traces_rad": [_packed(traces[seed][::stride]) for seed in seeds],
+        "methods": [_method(name, model, files, seeds) for name in methods],
+        "verdicts": _verdicts(files.verdicts),
+    }
+
+
+def _elements(problem: CaseProblem) -> list[dict[str, Any]]:
+    """Elements of the network that the model has, and the logarithms of their search ranges."""
+    model, ranges = problem.model, problem.ranges
+    network = model.network(np.ones((1, len(model.names))))
+    branches = network.k.shape[1]
+    found: list[dict[str, Any]] = []
+    for kind, parallel, unit in (("k", network.k_p, "N/m"), ("c", network.c_p, "N s/m")):
+        for branch in range(branches):
+            name = kind if branches == 1 else f"{kind}_{branch + 1}"
+            found.append({"name": name, "unit": unit, "at": [kind, branch]})
+        if parallel[0] > 0:
+            found.append({"name": f"{kind}_p", "unit": unit, "at": [f"{kind}_p", None]})
+    for element in found:
+        genes = ranges[element["at"][0]]
+        element["low"], element["high"] = np.log(genes.low), np.log(genes.high)
+    return found
+
+
+def _network(model: SampleModel, parameters: Mapping[str, Any]) -> dict[str, Any] | None:
+    if not set(model.names) <= set(parameters):
+        return None
+    network = model.network(np.array([[float(parameters[name]) for name in model.names]]))
+    return {
+        "k_p": rounded(float(network.k_p[0])),
+        "c_p": rounded(float(network.c_p[0])),
+        "k": [rounded(float(k)) for k in network.k[0]],
+        "c": [rounded(float(c)) for c in network.c[0]],
+    }
+
+
+def _method(
+    name: str, model: SampleModel, files: CaseFiles, seeds: Sequence[int]
+) -> dict[str, Any]:
+    found = read_identifications(files.identifications, name)
+    rows = found[found["seed"].isin(seeds)].sort_values("seed").to_dict("records")
+    history = read_history(files.histories, name, seeds[0])
+    by_seed = dict(iter(history.groupby("seed"))) if len(history) else {}
+    return {
+        "name": name,
+        "title": METHODS[name].title,
+        "fits": [
+            {
+                "seed": int(row["seed"]),
+                "sample": _network(model, {p.name: row[p.column] for p in model.parameters}),
+                "misfit_rad": rounded(float(row["misfit_rad"])),
+                "history": _history(by_seed.get(row["seed"])),
+            }
+            for row in rows
+        ],
+    }
+
+
+def _history(rows: "pd.DataFrame | None") -> list[list[Any]]:
+    """Generations and the lowest misfit in them."""
+    if rows is None or len(rows) < 2:
+        return []
+    best = [rounded(float(misfit)) for misfit in rows["best_misfit_rad"]]
+    return [[int(generation) for generation in rows["generation"]], best]
+
+
+def _verdicts(path: Path) -> dict[str, Any]:
+    found = read_verdicts(path)
+    return {
+        "threshold": found["threshold"],
+        "quantities": [
+            {"quantity": q["quantity"], "in_words": q["in_words"], "profile": q["profile"]}
+            for q in found["quantities"]
+        ],
+    }
+
+
+def _packed(values: Array, kind: str = "<f4") -> str:
+    """Return numbers as base64, little-endian; single precision says more than any instrument."""
+    return base64.b64encode(values.astype(kind).tobytes()).decode()

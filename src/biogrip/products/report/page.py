@@ -1,0 +1,317 @@
+"""The page of the study: one file that needs nothing else, to read, print and explore."""
+
+import base64
+import json
+import platform
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import yaml
+from markupsafe import Markup
+
+from biogrip.errors import BiogripError
+from biogrip.files import write_text
+from biogrip.products.files.identifications import HISTORIES
+from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
+from biogrip.products.files.traces import MEASUREMENTS
+from biogrip.products.files.verdicts import PATH as VERDICTS
+from biogrip.products.files.verdicts import read_verdicts
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Reads, Weight
+from biogrip.products.report.explorer_data import CaseFiles, ExploredCase, explorer_data
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.study.study import Study
+from biogrip.study.typed import plain
+
+PAGE = "results/report.html"
+
+# What a page of at most 15 MB has left for pictures, of which base64 makes a third more.
+_MOST_PICTURE_BYTES = 5_000_000
+_SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
+_LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
+_FOLDERS = ("results/figures/", "results/tables/")
+_STORY = "moduli"
+_FIRST = ("all_errors", "methods", "coverage", "models")
+_EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A figure or table in the page.
+
+    Parameters
+    ----------
+    name, whose
+        Its name, and the case or sweep that it is of, if any.
+    caption
+        What it shows.
+    file
+        Where it stands among the results.
+    rule
+        The rule of the workflow that makes it.
+    command
+        What makes it again.
+    uses
+        What of the config it is made from.
+    """
+
+    name: str
+    whose: str
+    caption: str
+    file: str
+    rule: str
+    command: str
+    uses: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the page is made of beside results.
+
+    Parameters
+    ----------
+    cases
+        What the explorer shows.
+    recorded
+        Which of them were recorded.
+    methods
+        By which traces were identified; the one that is shown comes first.
+    figures, tables
+        What else is in the page.
+    config
+        The whole config, YAML.
+    sources
+        The page's own, by name.
+    """
+
+    cases: tuple[ExploredCase, ...]
+    recorded: tuple[str, ...]
+    methods: tuple[str, ...]
+    figures: tuple[Entry, ...]
+    tables: tuple[Entry, ...]
+    config: str
+    sources: Mapping[str, str]
+
+
+def settings(study: Study, _: Wildcards) -> Settings:
+    """Choose what the page shows."""
+    plan = Plan(study, Path("results"))
+    cases = [study.cases[name] for name in study.cases]
+    return Settings(
+        tuple(
+            ExploredCase(
+                case.name,
+                case.title,
+                case.parameters,
+                case.problem,
+                None if case.recorded else case.noise,
+                case.problem.nonlinear or (not case.recorded and case.nonlinear_target),
+            )
+            for case in cases
+        ),
+        tuple(case.name for case in cases if case.recorded),
+        (study.shown, *(method for method in study.methods if method != study.shown)),
+        tuple(_entries(plan, "Figures", "png")),
+        tuple(_entries(plan, "Tables", "html")),
+        yaml.safe_dump(plain(study.config), sort_keys=False, allow_unicode=True),
+        {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
+    )
+
+
+def write(
+    settings: Settings,
+    figures: list[Path],
+    tables: list[Path],
+    identifications: list[Path],
+    histories: list[Path],
+    verdicts: list[Path],
+    measurements: list[Path],
+    calibrated: list[Path],
+    page: Path,
+) -> None:
+    """Write the page.
+
+    Parameters
+    ----------
+    settings
+        What it shows.
+    figures, tables
+        As PNG and HTML, in the order of the entries.
+    identifications, histories, verdicts
+        Of all cases, in their order.
+    measurements, calibrated
+        Of all cases; those of a case are told by their folder, and by their name.
+    page
+        HTML.
+
+    Raises
+    ------
+    BiogripError
+        If an input cannot be read.
+    """
+    files = [
+        CaseFiles(
+            identified,
+            history,
+            verdict,
+            [path for path in measurements if path.parent.name == case.name],
+            [path for path in calibrated if path.stem == case.name],
+        )
+        for case, identified, history, verdict in zip(
+            settings.cases, identifications, histories, verdicts, strict=True
+        )
+    ]
+    data = explorer_data(settings.cases, files, settings.methods)
+    shown_tables = [
+        {"entry": entry, "html": _table(path)}
+        for entry, path in zip(settings.tables, tables, strict=True)
+    ]
+    shown_figures = [
+        {"entry": entry, "image": image}
+        for entry, image in zip(settings.figures, _images(figures), strict=True)
+    ]
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    text = environment.from_string(settings.sources["report.html.j2"]).render(
+        style=settings.sources["report.css"],
+        scripts=[settings.sources[name] for name in _SOURCES[2:]],
+        plotly=_plotly(),
+        # Within a script, no text of a case may end it.
+        data=json.dumps(data).replace("<", "\\u003c"),
+        cases=[
+            {"title": case.title, "recorded": case.name in settings.recorded, **read_verdicts(v)}
+            for case, v in zip(settings.cases, verdicts, strict=True)
+        ],
+        story=[item for item in shown_figures if _is_named(item, _STORY)],
+        figures=[item for item in shown_figures if not _is_named(item, _STORY)],
+        first_tables=_named(shown_tables, _FIRST),
+        evidence_tables=_named(shown_tables, _EVIDENCE),
+        other_tables=[
+            item
+            for item in shown_tables
+            if not any(_is_named(item, name) for name in (*_FIRST, *_EVIDENCE))
+        ],
+        config=settings.config,
+        versions={"Python": platform.python_version()}
+        | {name: version(name) for name in _LIBRARIES},
+    )
+    write_text(page, text)
+
+
+def _entries(plan: Plan, category: str, kind: str) -> Iterable[Entry]:
+    for product in _declared():
+        if product.category != category:
+            continue
+        for job in product.jobs(plan):
+            file = product.outputs(job)[kind]
+            # Times differ from run to run, and the page is not to.
+            if not file.startswith(_FOLDERS):
+                continue
+            whose = job.get("case") or job.get("sweep") or ""
+            options = "".join(f" --{name} {value}" for name, value in job.items())
+            chosen = product.settings(plan.study, job)
+            uses = (
+                tuple(field.name for field in fields(chosen))
+                if is_dataclass(chosen) and not isinstance(chosen, type)
+                else ()
+            )
+            yield Entry(
+                product.name,
+                whose,
+                product.caption,
+                file,
+                product.sheet or product.name,
+                f"biogrip make {product.name}{options}",
+                uses,
+            )
+
+
+@cache
+def _declared() -> tuple[Product, ...]:
+    # Every other product's module: known once all are declared.
+    from biogrip.products.catalogue import products
+
+    return tuple(products().values())
+
+
+def _images(paths: Sequence[Path]) -> Iterable[str | None]:
+    """Pictures within the page, as far as there is room."""
+    room = _MOST_PICTURE_BYTES
+    for path in paths:
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
+        room -= len(content)
+        data = base64.b64encode(content).decode()
+        yield f"data:image/png;base64,{data}" if room >= 0 else None
+
+
+def _table(path: Path) -> Markup:
+    """The table of a page that `biogrip.products.tables.layout` wrote, its text escaped there."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise BiogripError(f"{path}: cannot be read as a table: {error}.") from error
+    found = re.search(r"<table.*</table>", text, re.DOTALL)
+    if found is None:
+        raise BiogripError(f"{path}: holds no table.")
+    return Markup(found[0])
+
+
+def _named(tables: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
+    return [table for name in names for table in tables if _is_named(table, name)]
+
+
+def _is_named(item: Mapping[str, Any], name: str) -> bool:
+    found: bool = item["entry"].name == name
+    return found
+
+
+def _plotly() -> str:
+    from plotly.offline import get_plotlyjs
+
+    return get_plotlyjs()
+
+
+def _of_every_case(pattern: str) -> Reads:
+    return Reads(lambda plan, _: [pattern.format(case=name) for name in plan.study.cases])
+
+
+def _calibrated(plan: Plan, _: Wildcards) -> list[str]:
+    one = calibration_of()
+    return [file for name in plan.study.cases for file in one.files(plan, {"case": name})]
+
+
+def _measurements(plan: Plan, _: Wildcards) -> list[str]:
+    return [file for name in plan.study.cases for file in plan.batch_files(MEASUREMENTS, name)]
+
+
+REPORT = Product(
+    "report",
+    {"page": PAGE},
+    write,
+    settings,
+    lambda plan: [{}],
+    message="Writing the page of the study",
+    reads={
+        "figures": Reads(lambda plan, _: [e.file for e in _entries(plan, "Figures", "png")]),
+        "tables": Reads(lambda plan, _: [e.file for e in _entries(plan, "Tables", "html")]),
+        "identifications": _of_every_case(IDENTIFICATIONS),
+        "histories": _of_every_case(HISTORIES),
+        "verdicts": _of_every_case(VERDICTS),
+        "measurements": Reads(_measurements),
+        "calibrated": Reads(_calibrated),
+    },
+    weight=Weight(10, 2000),
+    category="Summaries",
+    item="report",
+    caption="What came out, and what it means, on one page to read and to explore.",
+)
