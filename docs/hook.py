@@ -21,9 +21,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     own = [file for file in files if file.src_dir != config.docs_dir]
     found = sorted({path for pattern in SHOWN for path in ROOT.glob(pattern)})
     shown = [
-        File(
-            path.relative_to(ROOT).as_posix(), str(ROOT), config.site_dir, use_directory_urls=False
-        )
+        File(path.relative_to(ROOT).as_posix(), str(ROOT), site, use_directory_urls=False)
         for path in found
         if path.is_file() and path.suffix not in _LEFT_OUT
     ]

@@ -19,7 +19,7 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
         "README.md",
         "CONTRIBUTING.md",
         "config/README.md",
-        *sorted(path.relative_to(ROOT) for path in (ROOT / "docs").glob("*.md")),
+        *sorted(path.relative_to(ROOT) for path in (ROOT / "docs").rglob("*.md")),
     ],
 )
 def test_links_lead_somewhere(document: str | Path) -> None:
@@ -42,7 +42,7 @@ def test_the_readme_leads_to_every_document() -> None:
             there = (ROOT / path).parent / link
             if there.is_file():
                 left.append(str(there.resolve().relative_to(ROOT)))
-    assert {f"docs/{file.name}" for file in (ROOT / "docs").glob("*.md")} <= found
+    assert {str(file.relative_to(ROOT)) for file in (ROOT / "docs").rglob("*.md")} <= found
 
 
 def test_the_readme_shows_what_the_example_prints(

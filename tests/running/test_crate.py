@@ -4,8 +4,8 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable
-from io import BytesIO
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile
