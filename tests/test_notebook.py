@@ -4,9 +4,9 @@ import os
 import re
 from pathlib import Path
 
-import nbformat
 import pytest
 from nbclient import NotebookClient
+from nbformat import NotebookNode, reads
 
 from biogrip import library
 from tests.helpers.places import ROOT
@@ -15,7 +15,7 @@ NOTEBOOK = ROOT / "docs" / "notebook.ipynb"
 
 
 def test_it_is_committed_without_outputs() -> None:
-    cells = nbformat.read(NOTEBOOK, as_version=4).cells
+    cells = _notebook().cells
     assert [c for c in cells if c.cell_type == "code" and (c.outputs or c.execution_count)] == []
 
 
@@ -25,7 +25,7 @@ def test_it_runs_and_says_what_a_trace_tells(
     # Neither does a kernel belong to the user, nor what it keeps.
     monkeypatch.setenv("IPYTHONDIR", str(tmp_path))
     monkeypatch.setenv("JUPYTER_RUNTIME_DIR", str(tmp_path))
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    notebook = _notebook()
     NotebookClient(notebook, timeout=300, kernel_name="python3").execute(cwd=os.fspath(tmp_path))
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     said = "".join(output.text for output in outputs if output.output_type == "stream")
@@ -39,3 +39,7 @@ def test_it_uses_the_library_and_nothing_below() -> None:
     text = NOTEBOOK.read_text(encoding="utf-8")
     assert set(re.findall(r"biogrip\.(\w+)\(", text)) <= set(library.__all__)
     assert "from biogrip" not in text
+
+
+def _notebook() -> NotebookNode:
+    return reads(NOTEBOOK.read_text(encoding="utf-8"), as_version=4)  # type: ignore[no-untyped-call]
