@@ -7,8 +7,11 @@ READY := .venv/.installed
 # The libraries that benchmarks compare with stay out of the study's environment.
 BENCH_BIN := .venv-bench/bin
 BENCH_READY := .venv-bench/.installed
+# So does what builds the site, which reads the code and does not run it.
+SITE_BIN := .venv-site/bin
+SITE_READY := .venv-site/.installed
 
-LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --python-version 3.11 \
+LOCK := uv pip compile --universal --fork-strategy fewest --python-version 3.11 \
   --generate-hashes --no-header --no-annotate --quiet
 
 # What runs in minutes: all but the tests that start Snakemake again and again. test_results.py runs
@@ -16,7 +19,7 @@ LOCK := uv pip compile pyproject.toml --universal --fork-strategy fewest --pytho
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench report docs pinned lock clean
+.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench report docs site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -84,22 +87,27 @@ report: $(READY)
 docs: $(READY)
 	$(BIN)/python -m tests.generated_docs
 
+# A link or an anchor that leads nowhere is an error; not with --quiet, which counts no warnings.
+site: $(SITE_READY)
+	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
+
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(READY)
 	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
 
 # Needs uv. The other locks hold only what running on Slurm, and benchmarks, add to the first.
 lock:
-	$(LOCK) --extra dev --output-file requirements.lock
+	$(LOCK) pyproject.toml --extra dev --output-file requirements.lock
 	for extra in slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
-	  $(LOCK) --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
+	  $(LOCK) pyproject.toml --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
 	    $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock) || exit 1; \
 	done
+	$(LOCK) --group docs --output-file docs/requirements.lock
 
 # Of the results only what the study wrote.
 clean:
 	test ! -x $(BIN)/biogrip || $(BIN)/biogrip clean
-	rm -rf .venv .venv-bench .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html
+	rm -rf .venv .venv-bench .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
 
 $(READY): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -112,3 +120,8 @@ $(BENCH_READY): requirements.lock benchmarks/requirements.lock pyproject.toml
 	$(BENCH_BIN)/python -m pip install --quiet --require-hashes -r requirements.lock -r benchmarks/requirements.lock
 	$(BENCH_BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(BENCH_READY)
+
+$(SITE_READY): docs/requirements.lock
+	test -x $(SITE_BIN)/python || $(PYTHON) -m venv .venv-site
+	$(SITE_BIN)/python -m pip install --quiet --require-hashes -r docs/requirements.lock
+	touch $(SITE_READY)

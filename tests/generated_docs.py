@@ -1,12 +1,23 @@
 """Parts of the documentation that are written from code and results; `make docs` renews them."""
 
+import csv
+import importlib
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stdout, suppress
 from functools import partial
+from io import StringIO
 from pathlib import Path
+from pkgutil import iter_modules
+from unittest import mock
 
 import pandas as pd
 
+import biogrip.products.files
+from biogrip.cli import main
+from biogrip.products.catalogue import products
+from biogrip.products.files import identifications, traces
+from biogrip.products.files.rows import RowFile
 from biogrip.study.reference import file_schema, reference
 from tests.published_numbers import renewed_numbers
 
@@ -60,9 +71,81 @@ def published_table(name: str) -> str:
     return file.read_text(encoding="utf-8").strip()
 
 
+def command_help() -> str:
+    """What the command and each of its subcommands say of themselves."""
+    overview = _help()
+    names = re.findall(r"^    (\w+) ", overview, re.MULTILINE)
+    parts = [f"```text\n{overview}```"]
+    parts += [f"## biogrip {name}\n\n```text\n{_help(name)}```" for name in names]
+    return "\n\n".join(parts)
+
+
+def _help(*command: str) -> str:
+    said = StringIO()
+    # As wide on every terminal.
+    with mock.patch.dict("os.environ", COLUMNS="100"), redirect_stdout(said), suppress(SystemExit):
+        main([*command, "--help"])
+    return said.getvalue()
+
+
+def file_columns() -> str:
+    """The columns of every file of rows, as its kind declares them, and of the published tables."""
+    leading, trailing = identifications.LEADING, identifications.TRAILING
+    files: dict[str, tuple[str, ...]] = {
+        traces.TARGETS: traces.TARGET_COLUMNS,
+        identifications.PATH: (*leading, "parameters ...", *trailing),
+    }
+    files |= {kind.path: kind.columns for kind in _kinds()}
+    for product in products().values():
+        file = product.writes.get("csv", "")
+        published = sorted(PUBLISHED.rglob(re.sub(r"{\w+}", "*", Path(file).name))) if file else []
+        for table in published[:1]:
+            with table.open(encoding="utf-8", newline="") as stream:
+                files[file] = tuple(next(csv.reader(stream)))
+    return _table(
+        {"file": f"`{path}`", "columns": ", ".join(f"`{name}`" for name in columns)}
+        for path, columns in files.items()
+    )
+
+
+def _kinds() -> Iterator[RowFile]:
+    package = biogrip.products.files
+    modules = [module.name for module in iter_modules(package.__path__, f"{package.__name__}.")]
+    modules += [product.module for product in products().values()]
+    for module in dict.fromkeys(modules):
+        values = vars(importlib.import_module(module)).values()
+        yield from (value for value in values if isinstance(value, RowFile))
+
+
+def product_files() -> str:
+    """Every product, its files, and what it is."""
+    return _table(
+        {
+            "product": f"`{product.name}`",
+            "files": _together(list(product.writes.values())),
+            "what": (product.caption or product.message).split(". ")[0].rstrip("."),
+        }
+        for product in products().values()
+    )
+
+
+def _together(files: list[str]) -> str:
+    stems = {file.rpartition(".")[0] for file in files}
+    if len(stems) < len(files):
+        endings = ", ".join(f"`.{file.rpartition('.')[2]}`" for file in files)
+        return f"`{stems.pop()}` {endings}"
+    return ", ".join(f"`{file}`" for file in files)
+
+
+def _table(rows: Iterator[dict[str, str]]) -> str:
+    return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
+
+
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
     ROOT / "README.md": {"results": paper_against_study},
+    ROOT / "docs" / "reference" / "command.md": {"help": command_help},
+    ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
     ROOT / "docs" / "model.md": {
         name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
     },
@@ -74,7 +157,7 @@ GENERATED = (
     SCHEMA,
     ROOT / "config" / "README.md",
     ROOT / "README.md",
-    *sorted((ROOT / "docs").glob("*.md")),
+    *sorted((ROOT / "docs").rglob("*.md")),
 )
 
 

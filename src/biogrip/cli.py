@@ -114,6 +114,13 @@ def _parser() -> argparse.ArgumentParser:
             "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
         )
 
+    text = "pack a finished study, with what it was run on, as a Workflow Run RO-Crate"
+    crate = commands.add_parser("crate", help=text, description=text)
+    crate.set_defaults(command=_crate, recorded=True)
+    crate.add_argument(
+        "--output", type=Path, default=RESULTS / "crate.zip", help="ZIP file [%(default)s]"
+    )
+
     publish = commands.add_parser("publish", help="renew published tables and figures")
     publish.set_defaults(command=_publish)
     publish.add_argument("results", type=Path, help="results of a finished study")
@@ -205,6 +212,12 @@ def _clean(options: argparse.Namespace) -> None:
     from biogrip.running.manifest import clean
 
     print(clean(options.results))
+
+
+def _crate(options: argparse.Namespace) -> None:
+    from biogrip.running.crate import write_crate
+
+    print(write_crate(RESULTS, options.output))
 
 
 def _publish(options: argparse.Namespace) -> None:

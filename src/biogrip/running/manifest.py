@@ -79,6 +79,10 @@ class Manifest:
         """Whether the study wrote a file of this path."""
         return path in self._records
 
+    def last(self, path: str) -> Record:
+        """Return how a file of this path, one of `paths`, was written last."""
+        return self._records[path][-1]
+
     def is_whole(self, path: str, *, thoroughly: bool = False) -> bool:
         """Whether a file is what was written last.
 

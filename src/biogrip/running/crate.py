@@ -1,0 +1,215 @@
+"""A finished study as a Workflow Run RO-Crate: what was run on what, when, and what came out.
+
+The profile is https://w3id.org/ro/wfrun/workflow/0.5. What the record knows of a file, its
+size and hash, goes with it.
+"""
+
+import platform
+import re
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from biogrip import __version__
+from biogrip.errors import BiogripError
+from biogrip.files import written_whole
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.journal import Record
+from biogrip.running.manifest import Manifest
+from biogrip.running.resolved import NAME as STUDY
+from biogrip.running.resolved import read_study
+from biogrip.running.sheet import sheets_of
+from biogrip.study.defaults import default_config, snakefile
+
+if TYPE_CHECKING:
+    from rocrate.model.entity import Entity
+    from rocrate.rocrate import ROCrate
+
+_PROFILES = {
+    "https://w3id.org/ro/wfrun/process/0.5": ("Process Run Crate", "0.5"),
+    "https://w3id.org/ro/wfrun/workflow/0.5": ("Workflow Run Crate", "0.5"),
+    "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
+}
+_TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
+"""Terms of the profile that the context of RO-Crate 1.1 lacks."""
+
+_FORMATS = {
+    ".csv": "text/csv",
+    ".html": "text/html",
+    ".json": "application/json",
+    ".md": "text/markdown",
+    ".parquet": "application/vnd.apache.parquet",
+    ".pdf": "application/pdf",
+    ".png": "image/png",
+    ".rst": "text/x-rst",
+    ".tex": "application/x-tex",
+    ".yaml": "application/yaml",
+}
+
+
+def write_crate(results: Path, output: Path) -> str:
+    """Pack a finished study.
+
+    Parameters
+    ----------
+    results
+        Its results folder.
+    output
+        The crate, a ZIP file.
+
+    Returns
+    -------
+    str
+        What was done.
+
+    Raises
+    ------
+    BiogripError
+        If the study is not finished, or a result is not what was written.
+    """
+    from rocrate.rocrate import ROCrate
+
+    study = read_study(results)
+    manifest = Manifest(results)
+    wanted = [STUDY, *_finished(Plan(study, results))]
+    records = {name: _whole(manifest, results, name) for name in wanted}
+    times = [_time(records[name]) for name in wanted]
+    begun, ended = min(times), max(times)
+
+    crate = ROCrate(version="1.1")
+    crate.metadata.extra_terms.update(_TERMS)
+    crate.name = f"biogrip: {', '.join(study.cases)}"
+    crate.description = (
+        "How well a MEMS microgripper identifies the viscoelastic parameters of a cell: "
+        "the workflow, the study that it was run on, and what came out."
+    )
+    # Of the workflow; whose the traces of a study are, only its owner knows.
+    crate.license = "https://spdx.org/licenses/MIT"
+    crate.datePublished = ended
+    workflow = _workflow(crate)
+    for uri, (name, version) in _PROFILES.items():
+        profile = _described(crate, uri, "CreativeWork", name=name, version=version)
+        crate.root_dataset.append_to("conformsTo", profile)
+
+    given = _added(crate, results / STUDY, f"results/{STUDY}", records[STUDY])
+    slot = crate.add_formal_parameter("study", "File", "#study", valueRequired=True)
+    slot["workExample"] = given
+    given["exampleOfWork"] = slot
+    workflow["input"] = slot
+    traces = [
+        _added(crate, Path(study.case(name).file), f"traces/{name}.csv") for name in study.recorded
+    ]
+    made = [_added(crate, results / n, f"results/{n}", records[n]) for n in wanted[1:]]
+    action = crate.add_action(
+        workflow,
+        "#run",
+        object=[given, *traces],
+        result=made,
+        properties={
+            "name": "Run of the study",
+            "description": "From the first file that is on record to the last, pauses included.",
+            "startTime": begun,
+            "endTime": ended,
+            "actionStatus": {"@id": "http://schema.org/CompletedActionStatus"},
+        },
+    )
+    crate.root_dataset.append_to("mentions", action)
+    with written_whole(output) as scratch:
+        crate.write_zip(scratch)
+    return f"{len(made)} results of {results} packed in {output}."
+
+
+def _finished(plan: Plan) -> list[str]:
+    """What a study has made, from the results folder on, but for batches, which are put together.
+
+    Raises
+    ------
+    BiogripError
+        If something is missing.
+    """
+    found = [
+        Path(file).relative_to("results").as_posix()
+        for sheet in sheets_of(products().values(), plan)
+        for product in sheet.products
+        for job in sheet.jobs
+        if "batch" not in job
+        for file in product.outputs(job).values()
+    ]
+    missing = [name for name in found if not (plan.results / name).is_file()]
+    if missing:
+        raise BiogripError(
+            f"{plan.results}: found a study that is not finished ({missing[0]} is missing); "
+            "allowed is one that is. To go on: biogrip run."
+        )
+    return list(dict.fromkeys(found))
+
+
+def _whole(manifest: Manifest, results: Path, name: str) -> Record:
+    if not manifest.knows(name) or not manifest.is_whole(name, thoroughly=True):
+        raise BiogripError(
+            f"{results / name}: is not what was written (edited, or damaged). "
+            "The next run makes it again."
+        )
+    return manifest.last(name)
+
+
+def _time(record: Record) -> str:
+    """When a file was recorded, ISO 8601."""
+    return datetime.fromtimestamp(record.recorded_ns / 1e9, UTC).isoformat(timespec="seconds")
+
+
+def _workflow(crate: "ROCrate") -> "Entity":
+    """Add the Snakefile, what it includes and reads, and what runs it."""
+    top = snakefile().parent
+    workflow = crate.add_workflow(
+        snakefile(),
+        "Snakefile",
+        main=True,
+        lang="snakemake",
+        lang_version=metadata.version("snakemake"),
+        properties={"name": "biogrip", "version": __version__},
+        record_size=True,
+    )
+    parts = [default_config(), *sorted((top / "workflow").rglob("*.*"))]
+    workflow["hasPart"] = [
+        _added(crate, part, part.relative_to(top).as_posix()) for part in parts if part.is_file()
+    ]
+    workflow["softwareRequirements"] = [
+        _described(crate, uri, "SoftwareApplication", name=name, softwareVersion=version)
+        for uri, name, version in _software()
+    ]
+    return workflow
+
+
+def _software() -> Iterator[tuple[str, str, str]]:
+    """Identifier, name and version of what the study runs on, in this environment."""
+    yield "https://www.python.org/", "Python", platform.python_version()
+    yield f"pkg:pypi/biogrip@{__version__}", "biogrip", __version__
+    for needed in metadata.requires("biogrip") or []:
+        if "extra ==" not in needed:
+            name = re.split(r"[^\w.-]", needed)[0]
+            version = metadata.version(name)
+            yield f"pkg:pypi/{name}@{version}", name, version
+
+
+def _added(crate: "ROCrate", file: Path, name: str, record: Record | None = None) -> "Entity":
+    """Add a file, with what is on record of it."""
+    described: dict[str, Any] = {"name": name}
+    if file.suffix in _FORMATS:
+        described["encodingFormat"] = _FORMATS[file.suffix]
+    if record is not None:
+        described |= {
+            "contentSize": str(record.size),
+            "sha256": record.sha256,
+            "dateModified": _time(record),
+        }
+    return crate.add_file(file, name, properties=described, record_size=record is None)
+
+
+def _described(crate: "ROCrate", uri: str, kind: str, **properties: str) -> "Entity":
+    from rocrate.model.contextentity import ContextEntity
+
+    return crate.add(ContextEntity(crate, uri, properties={"@type": kind, **properties}))

@@ -1,0 +1,90 @@
+"""What the tutorial and the how-tos tell to write and to type, written and typed as they say.
+
+A fenced block with a title is a file, one in sh is commands and one in python runs. Runs of the
+workflow are made small by a config beneath theirs, which the documents do not show.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.helpers.places import ROOT
+from tests.helpers.runs import TINY, Tree, copied_tree
+
+BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+# Of each document, what there is when the reader is through.
+LEFT = {
+    "tutorial.md": [
+        *("first.json", "second.json", "results/summaries/mine.html"),
+        "results/tables/verdicts_longer.md",
+    ],
+    "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
+    "howto/trace.md": ["found.json", "drifting.json", "maxwell.json"],
+    "howto/noise.md": [
+        *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
+        "results/tables/robustness_levels.md",
+    ],
+    "howto/crate.md": ["study.zip"],
+    "howto/figure.md": ["results/figures/heights.png"],
+}
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Tree:
+    """A copy of the repository, in which a reader works."""
+    tree = copied_tree(tmp_path_factory.mktemp("reader"))
+    shutil.copytree(ROOT / "data", tree.root / "data")
+    return tree
+
+
+def test_every_howto_is_followed() -> None:
+    howtos = {f"howto/{file.name}" for file in (ROOT / "docs" / "howto").glob("*.md")}
+    assert howtos | {"tutorial.md"} == set(LEFT)
+
+
+@pytest.mark.parametrize("document", LEFT)
+def test_what_is_said_can_be_done(
+    document: str, place: Tree, request: pytest.FixtureRequest
+) -> None:
+    shutil.rmtree(place.root / "results", ignore_errors=True)
+    sweeps = document == "howto/noise.md"
+    (place.root / "tiny.yaml").write_text(TINY if sweeps else f"{TINY}  liquid_drop_2: null\n")
+    if document == "howto/crate.md":
+        finished: Path = request.getfixturevalue("tiny")
+        shutil.copytree(finished / "results", place.root / "results")
+    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
+    for language, title, content in BLOCK.findall(text):
+        if title:
+            (place.root / title).write_text(content)
+        elif language == "sh":
+            for line in content.splitlines():
+                _typed(shlex.split(line, comments=True), place)
+        elif language == "python":
+            _run(["-c", content], place)
+    assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
+
+
+def _typed(words: list[str], place: Tree) -> None:
+    assert words[0] == "biogrip"
+    if words[1] == "run":
+        words[2:2] = ["tiny.yaml"]
+    _run(["-m", *words], place)
+
+
+def _run(arguments: list[str], place: Tree) -> None:
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=place.root,
+        env={**os.environ, **place.environment},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stdout
