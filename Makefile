@@ -81,7 +81,7 @@ bench: $(BENCH_READY)
 	$(BENCH_BIN)/python -m benchmarks
 
 report: $(READY)
-	$(BIN)/snakemake -j$(JOBS) --report report.html
+	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
 
 # Config keys described from their classes, and a JSON Schema for editors; the tests fail if this is forgotten.
 docs: $(READY)

@@ -90,7 +90,7 @@ def test_a_setting_reruns_what_depends_on_it(
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: Path) -> None:
     run = snakemake(tiny_copy, "-n", config=TINY + NEW_CASE)
     assert run.status == 0, run.output
-    together = {"tables", "model_difference", "study_figures", "contact_loss"}
+    together = {"tables", "model_difference", "study_figures", "contact_loss", "report"}
     jobs = run.all_jobs()
     assert together <= set(jobs)
     assert {rule: jobs.pop(rule) for rule in together} == dict.fromkeys(together, 1)
@@ -122,8 +122,8 @@ def tree(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
 @pytest.mark.parametrize(
     ("file", "jobs"),
     [
-        ("src/biogrip/products/figures/fit.py", {"case_figures": 1}),
-        ("src/biogrip/products/tables/models.py", {"tables": 1}),
+        ("src/biogrip/products/figures/fit.py", {"case_figures": 1, "report": 1}),
+        ("src/biogrip/products/tables/models.py", {"tables": 1, "report": 1}),
     ],
 )
 def test_an_edit_reruns_exactly_what_it_is_used_in(

@@ -16,6 +16,7 @@ from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import plan_of, study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
+from tests.helpers.places import ROOT
 from tests.helpers.runs import SMALL, TINY, replaced, results_of, snakemake, tables
 
 COLUMNS = (
@@ -141,9 +142,15 @@ def test_report_shows_every_table_and_figure_with_its_labels(
     tiny_copy: Path, tmp_path: Path
 ) -> None:
     report = tmp_path / "report.html"
-    run = snakemake(tiny_copy, "--report", str(report), config=TINY)
+    opening = ("--report-metadata", str(ROOT / "workflow" / "report" / "results.yaml"))
+    run = snakemake(tiny_copy, "--report", str(report), *opening, config=TINY)
     assert run.status == 0, run.output
     page = report.read_text()
+    # It opens on what is described, with the errors, only if there are such data beside it.
+    assert '{"Traces identified of each sample": 2}' in page
+    errors = (tiny_copy / "results" / "tables" / "errors.csv").read_text().splitlines()
+    described = page[page.index("workflow_desc") :]
+    assert all(f"<td>{cell}</td>" in described for cell in errors[1].split(",")[:5] if cell)
     plan = plan_of(TINY)
     shown = [product for product in products().values() if product.category and product.jobs(plan)]
     assert len(shown) > 25

@@ -166,7 +166,7 @@ def test_a_change_of_drawing_is_seen(name: str, figure: Figure, tmp_path: Path) 
         return
     axes, line = lines[-1]
     colour = line.get_color()
-    line.set_color("#CC79A7")
+    line.set_color("#8B4513")
     assert difference(name, figure, tmp_path) is not None
     line.set_color(colour)
     assert difference(name, figure, tmp_path) is None

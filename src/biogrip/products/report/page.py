@@ -119,7 +119,7 @@ def settings(study: Study, _: Wildcards) -> Settings:
         (study.shown, *(method for method in study.methods if method != study.shown)),
         tuple(_entries(plan, "Figures", "png")),
         tuple(_entries(plan, "Tables", "html")),
-        yaml.safe_dump(plain(study.config), sort_keys=False, allow_unicode=True),
+        yaml.safe_dump(plain(study.config), allow_unicode=True),
         {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
     )
 

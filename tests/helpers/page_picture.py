@@ -1,0 +1,25 @@
+"""The picture of the page in the README: ``python -m tests.helpers.page_picture PAGE PICTURE``."""
+
+import shutil
+import sys
+from pathlib import Path
+
+from playwright.sync_api import sync_playwright
+
+# From the title to the first figure.
+SIZE = {"width": 1060, "height": 1290}
+
+
+def main(page: Path, picture: Path) -> None:
+    """Open a page as wide as a reader's, and keep what is seen of it."""
+    with sync_playwright() as driver:
+        executable = shutil.which("chromium")
+        browser = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+        opened = browser.new_page(viewport=SIZE)
+        opened.goto(page.resolve().as_uri())
+        opened.screenshot(path=picture)
+        browser.close()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
