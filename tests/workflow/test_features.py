@@ -15,6 +15,7 @@ from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.places import ROOT
+from tests.helpers.runs import built_once
 
 CASES = """
 seeds: 2
@@ -66,9 +67,13 @@ WANTED = [
 
 
 @pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("features")
-    make_in_process(folder, study_of(CASES), WANTED)
+def study(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    folder = built_once(
+        "features",
+        lambda folder: make_in_process(folder, study_of(CASES), WANTED),
+        tmp_path_factory,
+        worker_id,
+    )
     return folder / "results"
 
 
