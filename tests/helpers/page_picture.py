@@ -7,7 +7,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 # From the title to the first figure.
-SIZE = {"width": 1060, "height": 1290}
+WIDTH, HEIGHT = 1060, 1290
 
 
 def main(page: Path, picture: Path) -> None:
@@ -15,7 +15,7 @@ def main(page: Path, picture: Path) -> None:
     with sync_playwright() as driver:
         executable = shutil.which("chromium")
         browser = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
-        opened = browser.new_page(viewport=SIZE)
+        opened = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         opened.goto(page.resolve().as_uri())
         opened.screenshot(path=picture)
         browser.close()

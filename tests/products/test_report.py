@@ -52,7 +52,14 @@ def report(finished: Path) -> Path:
 class Opened:
     """The page, and what went wrong in it."""
 
-    def __init__(self, browser: Any, report: Path, viewport: dict[str, int] | None = None) -> None:
+    def __init__(
+        self,
+        browser: Any,
+        report: Path,
+        viewport: dict[str, int] | None = None,
+        *,
+        explored: bool = True,
+    ) -> None:
         self.problems: list[str] = []
         self.asked: list[str] = []
         self.page = browser.new_page(**({"viewport": viewport} if viewport else {}))
@@ -60,7 +67,8 @@ class Opened:
         self.page.on("console", self._said)
         self.page.on("request", lambda request: self.asked.append(request.url))
         self.page.goto(report.as_uri())
-        self.ready()
+        if explored:
+            self.ready()
 
     def _said(self, message: Any) -> None:
         if message.type == "error":
@@ -91,6 +99,19 @@ def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:
         .map(e => parseFloat(getComputedStyle(e).fontSize)))"""
     assert opened.page.evaluate(smallest) >= 12
     opened.page.close()
+
+
+def test_summaries_are_whole_and_legible(browser: Any, finished: Path) -> None:
+    summaries = sorted((finished / "results" / "summaries").glob("*.html"))
+    assert summaries
+    for summary in summaries:
+        opened = Opened(browser, summary, PHONE, explored=False)
+        assert opened.page.evaluate("document.images.length") >= 2
+        assert opened.page.evaluate("[...document.images].every(i => i.naturalWidth > 0)")
+        assert opened.page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
+        assert opened.problems == []
+        assert all(url.startswith("data:") for url in opened.asked[1:])
+        opened.page.close()
 
 
 def phases() -> tuple[Phase, ...]:
