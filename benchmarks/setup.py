@@ -25,7 +25,7 @@ from biogrip.study.method_blocks import MethodBlocks
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 CASE = "endothelial_cell"
 POPULATION = 500
-NOISE_FLOOR = 0.02
+NEAR_NOISE = 0.02
 """Misfits up to this share above the noise count as at its floor, as in the study."""
 
 
