@@ -36,7 +36,7 @@ A run has reached it if its own misfit m is as good a fit as noise can tell: chi
 reach it, repeating runs until one has done so with a probability of 99 % takes t_99 = t_run max(1,
 ln 0.01/ln(1 - p)). A chromosome has two digits a parameter; where the trace determines a parameter
 better than that, as for the cell, the genetic algorithm cannot reach the optimum however long it
-runs. So the same is given for a weaker aim, to come near the noise: a misfit at most 2 % above the noise.
+runs. So the same is given for a weaker aim, a misfit at most 2 % above the noise.
 The first {len(OURS)} methods are the study's own, with its settings. The others search the
 logarithms of the parameters within the same range, with their own defaults, and see the misfit as
 a share of the trace's RMS. A share of {_RUNS} runs is good to 8 % or better."""
