@@ -1,10 +1,9 @@
 """The picture of the page in the README: ``python -m tests.helpers.page_picture PAGE PICTURE``."""
 
-import shutil
 import sys
 from pathlib import Path
 
-from playwright.sync_api import sync_playwright
+from tests.helpers.browser import chromium
 
 # From the title to the first figure.
 WIDTH, HEIGHT = 1060, 1290
@@ -12,13 +11,10 @@ WIDTH, HEIGHT = 1060, 1290
 
 def main(page: Path, picture: Path) -> None:
     """Open a page as wide as a reader's, and keep what is seen of it."""
-    with sync_playwright() as driver:
-        executable = shutil.which("chromium")
-        browser = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
+    with chromium() as browser:
         opened = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         opened.goto(page.resolve().as_uri())
         opened.screenshot(path=picture)
-        browser.close()
 
 
 if __name__ == "__main__":

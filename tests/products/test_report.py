@@ -1,13 +1,12 @@
 """The page of a study in a real browser: whole, legible, and its explorer right."""
 
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, torque_history
@@ -17,8 +16,8 @@ from biogrip.products.files.traces import read_measurements
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
-
-playwright = pytest.importorskip("playwright.sync_api")
+from tests.helpers.browser import chromium, executable
+from tests.helpers.required import cannot_run
 
 MOST_BYTES = 15_000_000
 PHONE = {"width": 400, "height": 800}
@@ -27,21 +26,11 @@ CASE = "endothelial_cell"
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    executable = shutil.which("chromium") or shutil.which("chromium-browser")
-    if executable is None:
-        _cannot_run("Chromium is not installed: apt-get install chromium")
-    with playwright.sync_playwright() as driver:
-        # A sandbox of its own is not to be had in every container; the page is ours.
-        chromium = driver.chromium.launch(executable_path=executable, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
-
-
-def _cannot_run(reason: str) -> NoReturn:
-    if os.environ.get("BIOGRIP_REQUIRE_CHROMIUM"):
-        pytest.fail(reason)
-    pytest.skip(reason)
+def browser() -> Iterator[Browser]:
+    if executable() is None:
+        cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")
+    with chromium() as started:
+        yield started
 
 
 @pytest.fixture(scope="module")

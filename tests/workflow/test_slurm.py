@@ -9,17 +9,18 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import NoReturn
 
 import pytest
 
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.places import ROOT
+from tests.helpers.required import cannot_run
 from tests.helpers.runs import snakemake, tables
 from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
 
 PLUGIN = "snakemake_executor_plugin_slurm"
+REQUIRED = "BIOGRIP_REQUIRE_SLURM"
 # Of the site, not of the study: no accounting to ask, and nobody else who would mind the asking.
 SITE = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "6")
 
@@ -28,21 +29,14 @@ SITE = ("--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-
 def slurm(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
     """Environment in which Snakemake reaches a Slurm; skips where there can be none."""
     if packages := missing_packages():
-        _cannot_run(f"Slurm is not installed: apt-get install {' '.join(packages)}")
+        cannot_run(REQUIRED, f"Slurm is not installed: apt-get install {' '.join(packages)}")
     plugin = _installed_plugin(tmp_path_factory.mktemp("plugin"))
     with ExitStack() as cluster:
         try:
             environment = cluster.enter_context(one_node_slurm())
         except SlurmError as error:
-            _cannot_run(f"Slurm does not start: {error}")
+            cannot_run(REQUIRED, f"Slurm does not start: {error}")
         yield {**environment, "PYTHONPATH": plugin}
-
-
-def _cannot_run(reason: str) -> NoReturn:
-    """Skip, unless this machine is one where the test has to run."""
-    if os.environ.get("BIOGRIP_REQUIRE_SLURM"):
-        pytest.fail(reason)
-    pytest.skip(reason)
 
 
 def _installed_plugin(folder: Path) -> str:
@@ -54,7 +48,7 @@ def _installed_plugin(folder: Path) -> str:
     install += ["--target", str(folder), "-r", str(ROOT / "requirements-slurm.lock")]
     done = subprocess.run(install, capture_output=True, text=True)
     if done.returncode:
-        _cannot_run(f"requirements-slurm.lock cannot be installed: {done.stderr.strip()}")
+        cannot_run(REQUIRED, f"requirements-slurm.lock cannot be installed: {done.stderr.strip()}")
     return os.pathsep.join([str(folder), *filter(None, [path])])
 
 

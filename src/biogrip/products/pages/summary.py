@@ -74,12 +74,19 @@ def write(settings: Settings, verdicts: Path, figures: list[Path], page: Path) -
         model=settings.model,
         trace=settings.trace,
         found=read_verdicts(verdicts),
-        figures=[(path.stem, _embedded(path)) for path in figures],
+        figures=[(path.stem, embedded(path)) for path in figures],
     )
     write_text(page, text)
 
 
-def _embedded(path: Path) -> str:
+def embedded(path: Path) -> str:
+    """Return a PNG as an address that holds it.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be read.
+    """
     try:
         return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
     except OSError as error:

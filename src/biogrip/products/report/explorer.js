@@ -48,6 +48,8 @@
     }).join(", ");
   }
 
+  const sumOf = (item, members) => members.map((i) => item.elements[i].name).join(" + ");
+
   // One trace.
 
   function chooseCase() {
@@ -55,8 +57,8 @@
     options("method", item.methods.map((m, i) => [i, m.title]));
     options("seed", item.seeds.map((seed) => [seed, seed]));
     const names = item.elements.map((e, i) => [i, e.name]);
-    const dampers = item.elements.filter((e) => e.at[0] !== "k" && e.at[0] !== "k_p").map((e) => e.name);
-    options("quantity", dampers.length === 2 ? [["sum", dampers.join(" + ")], ...names] : names);
+    const dampers = inference.dampers(item.layout);
+    options("quantity", dampers.length === 2 ? [["sum", sumOf(item, dampers)], ...names] : names);
     showTrace();
   }
 
@@ -99,12 +101,12 @@
 
   function showProfile(item, trace, fit) {
     const chosen = element("quantity").value, quantity = chosen === "sum" ? "sum" : Number(chosen);
-    const dampers = item.elements.map((e, i) => [e, i]).filter(([e]) => e.at[0] === "c" || e.at[0] === "c_p").map(([, i]) => i);
+    const dampers = inference.dampers(item.layout);
     const members = quantity === "sum" ? dampers : [quantity];
     const low = Math.max(...members.map((i) => item.layout.low[i])), high = Math.min(...members.map((i) => item.layout.high[i]));
     const start = inference.logsOf(item.layout, fit.sample);
     const middle = Math.log(members.reduce((sum, i) => sum + Math.exp(start[i]), 0));
-    const threshold = item.verdicts.threshold;
+    const threshold = item.threshold;
     // A coarse look at the whole range first, then where the rise is small.
     const coarse = Array.from({ length: 15 }, (_, i) => low + (high - low) * (i + 0.5) / 15).concat([middle]).sort((a, b) => a - b);
     const seen = profileOf(item, trace, fit.sample, quantity, coarse);
@@ -194,9 +196,9 @@
     const found = inference.deviations(item.layout, tried.logs, (logs) => Array.from(respond(logs)), tried.noise);
     const names = item.elements.map((e) => e.name), units = item.elements.map((e) => e.unit);
     const values = tried.logs.map(Math.exp);
-    const dampers = item.elements.map((e, i) => [e, i]).filter(([e]) => e.at[0] === "c" || e.at[0] === "c_p").map(([, i]) => i);
+    const dampers = inference.dampers(item.layout);
     if (found.length > names.length) {
-      names.push(dampers.map((i) => names[i]).join(" + "));
+      names.push(sumOf(item, dampers));
       units.push("N s/m");
       values.push(dampers.reduce((sum, i) => sum + values[i], 0));
     }

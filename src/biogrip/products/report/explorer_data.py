@@ -134,7 +134,7 @@ def _case(
         "seeds": seeds,
         "traces_rad": [_packed(traces[seed][::stride]) for seed in seeds],
         "methods": [_method(name, model, files, seeds) for name in methods],
-        "verdicts": _verdicts(files.verdicts),
+        "threshold": read_verdicts(files.verdicts)["threshold"],
     }
 
 
@@ -196,17 +196,6 @@ def _history(rows: "pd.DataFrame | None") -> list[list[Any]]:
         return []
     best = [rounded(float(misfit)) for misfit in rows["best_misfit_rad"]]
     return [[int(generation) for generation in rows["generation"]], best]
-
-
-def _verdicts(path: Path) -> dict[str, Any]:
-    found = read_verdicts(path)
-    return {
-        "threshold": found["threshold"],
-        "quantities": [
-            {"quantity": q["quantity"], "in_words": q["in_words"], "profile": q["profile"]}
-            for q in found["quantities"]
-        ],
-    }
 
 
 def _packed(values: Array, kind: str = "<f4") -> str:

@@ -197,5 +197,5 @@ const inference = (() => {
     return columns.map((column, i) => column.map((value, j) => value * scale[i] * scale[j]));
   }
 
-  return { sampleOf, logsOf, deviations, fitted, profile, projection };
+  return { sampleOf, logsOf, dampers, deviations, profile, projection };
 })();

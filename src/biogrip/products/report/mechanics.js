@@ -140,22 +140,6 @@ const mechanics = (() => {
     return found;
   }
 
-  function torqueAt(torque, times) {
-    const found = new Float64Array(times.length);
-    for (const [start, order, height] of torque.jumps) {
-      for (let i = firstAfter(times, start); i < times.length; i += 1) {
-        found[i] += height * (times[i] - start) ** order / (order === 2 ? 2 : 1);
-      }
-    }
-    for (const [start, omega, re, im] of torque.swings) {
-      for (let i = firstAfter(times, start); i < times.length; i += 1) {
-        const t = times[i] - start;
-        found[i] += re * Math.cos(omega * t) - im * Math.sin(omega * t);
-      }
-    }
-    return found;
-  }
-
   function scaled(torque, factor) {
     return {
       jumps: torque.jumps.map(([t, order, height]) => [t, order, factor * height]),
@@ -172,5 +156,5 @@ const mechanics = (() => {
     return low;
   }
 
-  return { modes, rotation, jawForce, torqueAt, scaled };
+  return { rotation, jawForce, scaled };
 })();

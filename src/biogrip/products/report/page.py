@@ -1,12 +1,10 @@
 """The page of the study: one file that needs nothing else, to read, print and explore."""
 
-import base64
 import json
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,11 +15,13 @@ from markupsafe import Markup
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.files.verdicts import PATH as VERDICTS
 from biogrip.products.files.verdicts import read_verdicts
+from biogrip.products.pages.summary import embedded
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.report.explorer_data import CaseFiles, ExploredCase, explorer_data
@@ -31,11 +31,13 @@ from biogrip.study.typed import plain
 
 PAGE = "results/report.html"
 
-# What a page of at most 15 MB has left for pictures, of which base64 makes a third more.
-_MOST_PICTURE_BYTES = 5_000_000
+# What a page of at most 15 MB has left for pictures.
+_MOST_PICTURE_LETTERS = 6_600_000
 _SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 _FOLDERS = ("results/figures/", "results/tables/")
+# Category, and which of a product's files is shown.
+_FIGURES, _TABLES = ("Figures", "png"), ("Tables", "html")
 _STORY = "moduli"
 _FIRST = ("all_errors", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
@@ -78,8 +80,6 @@ class Settings:
     ----------
     cases
         What the explorer shows.
-    recorded
-        Which of them were recorded.
     methods
         By which traces were identified; the one that is shown comes first.
     figures, tables
@@ -91,7 +91,6 @@ class Settings:
     """
 
     cases: tuple[ExploredCase, ...]
-    recorded: tuple[str, ...]
     methods: tuple[str, ...]
     figures: tuple[Entry, ...]
     tables: tuple[Entry, ...]
@@ -102,7 +101,6 @@ class Settings:
 def settings(study: Study, _: Wildcards) -> Settings:
     """Choose what the page shows."""
     plan = Plan(study, Path("results"))
-    cases = [study.cases[name] for name in study.cases]
     return Settings(
         tuple(
             ExploredCase(
@@ -113,12 +111,11 @@ def settings(study: Study, _: Wildcards) -> Settings:
                 None if case.recorded else case.noise,
                 case.problem.nonlinear or (not case.recorded and case.nonlinear_target),
             )
-            for case in cases
+            for case in study.cases.values()
         ),
-        tuple(case.name for case in cases if case.recorded),
         (study.shown, *(method for method in study.methods if method != study.shown)),
-        tuple(_entries(plan, "Figures", "png")),
-        tuple(_entries(plan, "Tables", "html")),
+        tuple(_entries(plan, _FIGURES)),
+        tuple(_entries(plan, _TABLES)),
         yaml.safe_dump(plain(study.config), allow_unicode=True),
         {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
     )
@@ -186,7 +183,7 @@ def write(
         # Within a script, no text of a case may end it.
         data=json.dumps(data).replace("<", "\\u003c"),
         cases=[
-            {"title": case.title, "recorded": case.name in settings.recorded, **read_verdicts(v)}
+            {"title": case.title, "recorded": case.noise is None, **read_verdicts(v)}
             for case, v in zip(settings.cases, verdicts, strict=True)
         ],
         story=[item for item in shown_figures if _is_named(item, _STORY)],
@@ -205,53 +202,48 @@ def write(
     write_text(page, text)
 
 
-def _entries(plan: Plan, category: str, kind: str) -> Iterable[Entry]:
-    for product in _declared():
-        if product.category != category:
-            continue
-        for job in product.jobs(plan):
+def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildcards, str]]:
+    """Products of a category, their jobs, and the file of some kind of each."""
+    category, kind = kinds
+    for product in products().values():
+        for job in product.jobs(plan) if product.category == category else []:
             file = product.outputs(job)[kind]
             # Times differ from run to run, and the page is not to.
-            if not file.startswith(_FOLDERS):
-                continue
-            whose = job.get("case") or job.get("sweep") or ""
-            options = "".join(f" --{name} {value}" for name, value in job.items())
-            chosen = product.settings(plan.study, job)
-            uses = (
-                tuple(field.name for field in fields(chosen))
-                if is_dataclass(chosen) and not isinstance(chosen, type)
-                else ()
-            )
-            yield Entry(
-                product.name,
-                whose,
-                product.caption,
-                file,
-                product.sheet or product.name,
-                f"biogrip make {product.name}{options}",
-                uses,
-            )
+            if file.startswith(_FOLDERS):
+                yield product, job, file
 
 
-@cache
-def _declared() -> tuple[Product, ...]:
-    # Every other product's module: known once all are declared.
-    from biogrip.products.catalogue import products
+def _entries(plan: Plan, kinds: tuple[str, str]) -> Iterable[Entry]:
+    for product, job, file in _files(plan, kinds):
+        options = "".join(f" --{name} {value}" for name, value in job.items())
+        yield Entry(
+            product.name,
+            job.get("case") or job.get("sweep") or "",
+            product.caption,
+            file,
+            product.sheet or product.name,
+            f"biogrip make {product.name}{options}",
+            _uses(product.settings(plan.study, job)),
+        )
 
-    return tuple(products().values())
+
+def _uses(chosen: object) -> tuple[str, ...]:
+    if is_dataclass(chosen) and not isinstance(chosen, type):
+        return tuple(field.name for field in fields(chosen))
+    return ()
+
+
+def _reads(kinds: tuple[str, str]) -> Reads:
+    return Reads(lambda plan, _: [file for _, _, file in _files(plan, kinds)])
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:
     """Pictures within the page, as far as there is room."""
-    room = _MOST_PICTURE_BYTES
+    room = _MOST_PICTURE_LETTERS
     for path in paths:
-        try:
-            content = path.read_bytes()
-        except OSError as error:
-            raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
-        room -= len(content)
-        data = base64.b64encode(content).decode()
-        yield f"data:image/png;base64,{data}" if room >= 0 else None
+        image = embedded(path)
+        room -= len(image)
+        yield image if room >= 0 else None
 
 
 def _table(path: Path) -> Markup:
@@ -302,8 +294,8 @@ REPORT = Product(
     lambda plan: [{}],
     message="Writing the page of the study",
     reads={
-        "figures": Reads(lambda plan, _: [e.file for e in _entries(plan, "Figures", "png")]),
-        "tables": Reads(lambda plan, _: [e.file for e in _entries(plan, "Tables", "html")]),
+        "figures": _reads(_FIGURES),
+        "tables": _reads(_TABLES),
         "identifications": _of_every_case(IDENTIFICATIONS),
         "histories": _of_every_case(HISTORIES),
         "verdicts": _of_every_case(VERDICTS),
