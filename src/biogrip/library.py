@@ -79,10 +79,9 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
     (n_samples,)
         In rad.
     """
-    values = np.array([[parameters[name] for name in experiment.model.names]])
     rotation: Array = simulated_rotation(
         experiment.gripper,
-        experiment.model.network(values),
+        experiment.model.sample(parameters),
         experiment.torque,
         time_s,
         nonlinear=experiment.nonlinear,

@@ -29,6 +29,9 @@ cases:
   endothelial_cell: null
   liquid_drop_1: null
   liquid_drop_2: null
+  silent:
+    sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0}
+    measurement: {noise: {level: 0, reference: signal}}
   kelvin_voigt: {sample: {model: kelvin_voigt, k_p: 0.05, c_p: 5.0}}
   maxwell: {sample: {model: maxwell, k: 2.0, c: 50.0}}
   zener: {sample: {model: zener_kelvin, k_s: 3.0, k_v: 2.0, c_v: 40.0}}
@@ -56,13 +59,16 @@ cases:
     assumed_gripper: calibrated
 """
 NAMES = [name for name, case in yaml.safe_load(CASES)["cases"].items() if case]
+NOISY = [name for name in NAMES if name != "silent"]
 FIGURES = ("fit", "evolution")
 # One of each kind; a trace of the nonlinear model would take minutes.
-JUDGED = ("kelvin_voigt", "burgers", "branches", "swinging", "uneven", "calibrated")
+JUDGED = ("silent", "kelvin_voigt", "burgers", "branches", "swinging", "uneven", "calibrated")
 WANTED = [
     *(f"results/figures/{figure}_{name}.png" for figure in FIGURES for name in NAMES),
     *(f"results/tables/errors_{name}.csv" for name in NAMES),
     *(f"results/tables/verdicts_{name}.csv" for name in JUDGED),
+    *(f"results/figures/{figure}_silent.png" for figure in ("profiles", "scatter")),
+    "results/figures/moduli.png",
 ]
 
 
@@ -85,8 +91,17 @@ def test_a_case_has_its_results(study: Path, name: str) -> None:
     assert errors["typical_identified"].notna().all()
     found = pd.read_csv(study / "identifications" / f"{name}.csv")
     assert len(found) == 2
-    # Misfits end near the 1 % noise, not near the signal, a hundred times that.
-    assert np.all(found["misfit_rad"] < 8 * found["noise_rms_rad"])
+    if name in NOISY:
+        # Misfits end near the 1 % noise, not near the signal, a hundred times that.
+        assert np.all(found["misfit_rad"] < 8 * found["noise_rms_rad"])
+
+
+def test_without_noise_all_is_determined_and_drawn(study: Path) -> None:
+    found = pd.read_csv(study / "tables" / "verdicts_silent.csv")
+    assert set(found["expected_verdict"]) == {"determined"}
+    assert (study / "figures" / "profiles_silent.png").exists()
+    for figure in ("scatter_silent", "moduli"):
+        assert_drawn(study / "figures" / f"{figure}.png")
 
 
 def test_what_is_fixed_stays(study: Path) -> None:

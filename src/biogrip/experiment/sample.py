@@ -119,6 +119,10 @@ class SampleModel:
         together = [p for p in self.parameters if p.name in self.exchangeable]
         return [[p] for p in self.parameters] + ([together] if together else [])
 
+    def sample(self, parameters: Mapping[str, float]) -> Network:
+        """Return the elements of the one sample that has these parameters, by name."""
+        return self.network([[parameters[name] for name in self.names]])
+
 
 K = Parameter("k", "stiffness", "Maxwell spring", "k")
 K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring", "k_p", may_vanish=True)

@@ -19,8 +19,6 @@ from biogrip.identify.local_fit import FAIR
 
 _MOST_FITS = 40
 _CLOSEST = 1e-7
-# Fits on the way that are tried from elsewhere, too: what is found is followed by the others.
-_FROM_ELSEWHERE = 1
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,8 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         # The fits of the two ends may lie in different basins: what counts is the deeper one.
         between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
         starts = np.concatenate((between[None], x[:, left]))
-        if tries < _FROM_ELSEWHERE and len(brackets.elsewhere):
+        # What the first fit finds from elsewhere is followed by the others.
+        if not tries and len(brackets.elsewhere):
             elsewhere = brackets.elsewhere[:, left]
             rises, fitted = _fitted_from(fits, brackets, left, tried, elsewhere, FAIR)
             deepest = fitted[np.argmin(rises, axis=0), range(len(left))]
@@ -114,8 +113,8 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         rises, fitted = all_rises[deepest, range(len(left))], all_fitted[deepest, range(len(left))]
         over = np.sqrt(np.maximum(rises, 0.0)) - wanted[left]
         # What is deeper than the basin of the outer end may be so at the outer end, too.
-        apart = np.sqrt(np.maximum(all_rises[2], 0.0)) - wanted[left] > over + accuracy
-        _lower(fits, brackets, outermost, left[apart], fitted[apart], tolerance)
+        deeper = np.sqrt(np.maximum(all_rises[2], 0.0)) - wanted[left] > over + accuracy
+        _lower(fits, brackets, outermost, left[deeper], fitted[deeper], tolerance)
         void = outermost[0][left] < fits.threshold[trace[left]]
         found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)

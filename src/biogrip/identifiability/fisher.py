@@ -41,10 +41,12 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     Returns
     -------
     (n_parameters, n_parameters)
-        Infinite on the diagonal for parameters without information.
+        Infinite on the diagonal for parameters without information; zeros without noise.
     """
     sigma = np.broadcast_to(noise_rad, sensitivity.shape[1])
     scale = float(np.sqrt(np.mean(sigma**2)))
+    if not scale:
+        return np.zeros((len(sensitivity), len(sensitivity)))
     relative = sensitivity / scale
     told = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
     found = np.diag(np.full(len(sensitivity), np.inf))

@@ -57,8 +57,8 @@ class Identifiability:
     coverage_seeds: Annotated[
         int,
         Key(
-            "Over how many seeds intervals and spread are held against truth and bound; 0 leaves "
-            "that out.",
+            "Over how many seeds intervals and spread are held against truth and bound, if there "
+            "is noise; 0 leaves that out.",
             low=0,
             high=1_000_000,
         ),

@@ -205,8 +205,9 @@ class Case:
 
     @property
     def coverage_seeds(self) -> int:
-        """Over how many seeds intervals are held against the truth."""
-        return 0 if self.recorded else self.block.identifiability.coverage_seeds
+        """Over how many seeds intervals are held against the truth: none without noise."""
+        tried = not self.recorded and not self.noise.absent
+        return self.block.identifiability.coverage_seeds if tried else 0
 
     @property
     def has_valley(self) -> bool:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.experiment.truth import Truth
@@ -57,7 +58,8 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
             axes.axhline(truth.parameters[parameter.name], color=TARGET, linestyle="--")
         if parameter.name in identified:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
-        axes.set_yscale("log")
+        if np.any(history[parameter.column] > 0):
+            axes.set_yscale("log")
         axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
         if truth.parameters.get(parameter.name, 0) > 0:
             last = history.loc[history["seed"] == shown, parameter.column].iloc[-1]

@@ -66,8 +66,8 @@ def draw(settings: Settings, target: Path) -> Figure:
         Its target, CSV.
     """
     time_s, _, rotation = read_target(target)
-    torque, model = torque_history(settings.phases), settings.sample.model
-    network = model.network(np.array([[settings.parameters[name] for name in model.names]]))
+    torque = torque_history(settings.phases)
+    network = settings.sample.model.sample(settings.parameters)
     # At a step: what follows it; the jaws jump within less than the first sample.
     held = jaw_force(
         settings.gripper, network, torque, time_s, nonlinear=settings.nonlinear, inertia=False

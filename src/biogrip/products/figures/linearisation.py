@@ -73,8 +73,7 @@ def draw(settings: Settings, differences: Path) -> Figure:
 
 def _difference(axes: Axes, truth: Truth, gripper: Gripper, phases: tuple[Phase, ...]) -> None:
     """Draw nonlinear minus linear rotation, for the traces themselves cannot be told apart."""
-    values = [truth.parameters[name] for name in truth.model.names]
-    network = truth.model.network(np.array([values]))
+    network = truth.model.sample(truth.parameters)
     torque = scaled(torque_history(phases), _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)

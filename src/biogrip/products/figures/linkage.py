@@ -105,7 +105,7 @@ def _largest_rotation_rad(settings: Settings) -> float:
     peaks = [0.0]
     for truth, problem in settings.truths:
         time_s = np.linspace(0.0, problem.torque.end_s, 401)
-        network = truth.model.network(np.array([[truth.parameters[n] for n in truth.model.names]]))
+        network = truth.model.sample(truth.parameters)
         rotation = simulated_rotation(
             problem.gripper, network, problem.torque, time_s, nonlinear=False
         )

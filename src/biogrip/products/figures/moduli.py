@@ -19,9 +19,15 @@ from biogrip.products.figures.overview import shown_cases
 from biogrip.products.figures.results import first_seeds
 from biogrip.products.figures.style import (
     BLACK,
+    BLUE,
+    GREEN,
+    GREY,
     METHOD_STYLES,
+    ORANGE,
     PAGE_IN,
+    PURPLE,
     SHADE,
+    SKY,
     figure,
     panel,
 )
@@ -35,7 +41,7 @@ SEEN = 0.1
 
 _POINTS = 121
 _TITLE_LETTERS = 28
-_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#999999")
+_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, GREY)
 
 
 @dataclass(frozen=True)
@@ -84,7 +90,9 @@ def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -
         time_s, _, rotation = read_target(target)
         logs = case.problem.logs(case.truth.parameters)
         _, sensitivity = case.problem.of(time_s, rotation).residuals(logs)
-        relative = sensitivity / standard_deviation(rotation, case.noise)
+        sigma = standard_deviation(rotation, case.noise)
+        # Where there is no noise there is nothing to compare with.
+        relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _moduli(axes[0, column], settings, case, identified, time_s)
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
         panel(axes[0, column], "abc"[column], case.truth.title, _TITLE_LETTERS)
@@ -126,7 +134,7 @@ def _moduli(
             omega[run[0]], omega[run[-1]], color=SHADE, linewidth=0, zorder=0,
             label="seen by the experiment" if run[0] == seen[0] else None,
         )  # fmt: skip
-    truth = _modulus(_network(model, case.truth), omega)[0]
+    truth = _modulus(model.sample(case.truth.parameters), omega)[0]
     axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
     axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, $G''$")
     axes.set_xscale("log")
@@ -143,11 +151,9 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
     axes.axhspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
     axes.set_xlim(time_s[0], time_s[-1])
     axes.set_xlabel("time (s)")
+    if not np.any(np.isfinite(relative)):
+        axes.text(0.5, 0.5, "no noise", ha="center", transform=axes.transAxes)
     axes.legend(ncols=2, columnspacing=0.8, handlelength=1)
-
-
-def _network(model: SampleModel, truth: Truth) -> Network:
-    return model.network(np.array([[truth.parameters[name] for name in model.names]]))
 
 
 def _modulus(network: Network, omega: Array) -> Array:

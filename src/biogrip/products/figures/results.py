@@ -94,8 +94,7 @@ def fit_of(
         Which of them.
     """
     recorded = read_measurements(measurements, [seed])
-    model = problem.model
-    network = model.network(np.array([[parameters[name] for name in model.names]]))
+    network = problem.model.sample(parameters)
     simulated = simulated_rotation(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
     )[0]

@@ -99,8 +99,9 @@ def draw(
         ratios = found[[p.column for p in names]].sum(axis=1) / value
         limit = bound(sensitivity, noise_rad, log_truth, quantity)
         verdict = verdicts[quantity.label]
-        # Where the truth is not determined the tangent at it says nothing of where fits end.
-        known = limit if verdict == DETERMINED else np.inf
+        # Where the truth is not determined the tangent at it says nothing of where fits end,
+        # and a bound of no width is none.
+        known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, found["method"], ratios.to_numpy(float), known, settings.confidence)
         _paper(axes, truth.published.identified, [p.name for p in names], value)
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)

@@ -18,6 +18,7 @@ SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
 _DIGITS = 9
+_WRITTEN = f"{{:.{_DIGITS - 1}e}}"
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,15 @@ def write_target(
     force = np.round(jaw_force_N / digit) + 0.0
     samples = zip(time_s, torque_Nm, rotation_rad, force * digit, strict=True)
     rows = (
-        (f"{t:.10g}", f"{torque:.10g}", f"{phi:.8e}", f"{f:.8e}") for t, torque, phi, f in samples
+        (f"{t:.10g}", f"{torque:.10g}", _WRITTEN.format(phi), _WRITTEN.format(f))
+        for t, torque, phi, f in samples
     )
     write_rows(path, TARGET_COLUMNS, rows)
+
+
+def as_written(rotation_rad: Array) -> Array:
+    """Return a rotation to the digits of a target, as if it had been written and read."""
+    return np.array([float(_WRITTEN.format(value)) for value in rotation_rad])
 
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:

@@ -167,7 +167,7 @@
     const sample = item.truth || item.methods[0].fits[0].sample;
     tried.logs = inference.logsOf(item.layout, sample);
     tried.torque = 1;
-    tried.noise = item.noise_rad || item.methods[0].fits[0].misfit_rad;
+    tried.noise = Math.max(item.noise_rad || item.methods[0].fits[0].misfit_rad, 1e-9);
     sliders();
     showTried();
   }

@@ -159,7 +159,7 @@ def _elements(problem: CaseProblem) -> list[dict[str, Any]]:
 def _network(model: SampleModel, parameters: Mapping[str, Any]) -> dict[str, Any] | None:
     if not set(model.names) <= set(parameters):
         return None
-    network = model.network(np.array([[float(parameters[name]) for name in model.names]]))
+    network = model.sample(parameters)
     return {
         "k_p": rounded(float(network.k_p[0])),
         "c_p": rounded(float(network.c_p[0])),

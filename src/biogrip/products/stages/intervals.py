@@ -137,9 +137,10 @@ def _rows(
         for group in groups(some):
             traces = _traces(settings, group, rotation)
             likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
-            simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
             known = np.tile(truth, (len(group), 1))
-            known[:, told] = fitted_from(simpler, truth[told])
+            if len(told):
+                simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
+                known[:, told] = fitted_from(simpler, truth[told])
             for index, seed in enumerate(group):
                 best = likelihoods[index].best
                 lines[seed] = _lines(chosen, best, limits[index], known[index])

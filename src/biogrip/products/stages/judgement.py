@@ -138,7 +138,8 @@ def expect(
 ) -> None:
     """Judge the trace without noise as if it had the noise of the measurement.
 
-    What such a trace determines, any trace of the case does but for its luck.
+    What such a trace determines, any trace of the case does but for its luck. A
+    measurement without noise has that of the digits in which a target is written.
 
     Parameters
     ----------
@@ -153,7 +154,7 @@ def expect(
     """
     posed = settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    noise_rad = rms(standard_deviation(rotation, settings.noise))
+    noise_rad = rms(standard_deviation(rotation, settings.noise)) or None
     problem = posed.of(time_s, rotation, noise_rad=noise_rad)
     found = fitted_from(problem, posed.logs(settings.parameters))
     told = diagnose(

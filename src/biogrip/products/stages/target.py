@@ -76,8 +76,8 @@ def simulate(settings: Settings, target: Path) -> None:
     BiogripError
         If the rotation is not finite, or the arms turn further than the comb drives can.
     """
-    torque, model = torque_history(settings.phases), settings.sample.model
-    network = model.network(np.array([[settings.parameters[name] for name in model.names]]))
+    torque = torque_history(settings.phases)
+    network = settings.sample.model.sample(settings.parameters)
     time_s = settings.sampling.over(torque.end_s)
     rotation, force = _response(settings, network, torque, time_s)
     _check(settings, time_s, rotation)

@@ -15,6 +15,7 @@ from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.gripper import Gripper
+from biogrip.products.files.traces import as_written
 from biogrip.products.product import Weight
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
@@ -116,15 +117,13 @@ def contact_loss(settings: Settings) -> Table:
 
 def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
     torque, model = torque_history(case.phases), case.truth.model
-    network = model.network(np.array([[case.truth.parameters[p] for p in model.names]]))
+    network = model.sample(case.truth.parameters)
     if grip_of(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
         return []
     time_s = case.sampling.over(torque.end_s)
-    held = _as_written(
-        simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
-    )
+    held = as_written(simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0])
     free = unilateral_response(case.gripper, network, torque, time_s)
-    let_go = _as_written(free.rotation_rad[0])
+    let_go = as_written(free.rotation_rad[0])
     if not free.parted_s:
         return []
     noise = [
@@ -153,11 +152,6 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     ]
     rows.append((name, lost, "misfit", "noise", 1.0, *misfits[:2], None, misfits[2], None))
     return rows
-
-
-def _as_written(rotation_rad: Array) -> Array:
-    """Rotation to the digits of a target: fewer than those in which two processors differ."""
-    return np.array([float(f"{value:.8e}") for value in rotation_rad])
 
 
 def _medians(

@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from biogrip.experiment.protocol import Phase, largest_torque, torque_history
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.contact import LARGEST_M
@@ -56,8 +54,7 @@ def settings(study: Study) -> Settings:
 
 
 def _damping(case: Case) -> float:
-    model = case.sample.model
-    network = model.network(np.array([[case.parameters[name] for name in model.names]]))
+    network = case.sample.model.sample(case.parameters)
     return float(network.c_p[0] + network.c[0].sum())
 
 

@@ -90,8 +90,8 @@ def mechanics(settings: list[CaseSettings]) -> Table:
 
 
 def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
-    torque, model = torque_history(case.phases), case.sample.model
-    network = model.network(np.array([[case.parameters[name] for name in model.names]]))
+    torque = torque_history(case.phases)
+    network = case.sample.model.sample(case.parameters)
     # Just before the torque changes.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     given = case.gripper, network, torque
