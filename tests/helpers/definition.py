@@ -86,13 +86,14 @@ class Held:
             x = self.log_parameters(point)
             residual, sensitivity = self._likelihood.problem.residuals(x)
             late = self._late(x)
-            hinge = np.zeros((len(late), len(x)))
-            for row, (k, c), beyond in zip(hinge, self._quantity.branches, late, strict=True):
+            slopes_of = np.zeros((len(late), len(x)))
+            branches = [hinge.branch for hinge in self._quantity.hinges]
+            for row, (k, c), beyond in zip(slopes_of, branches, late, strict=True):
                 if beyond > 0:
                     row[c], row[k] = HINGE, -HINGE
             noise = self._likelihood.noise_rad
             rows = np.append(residual / noise, [HINGE * max(beyond, 0.0) for beyond in late])
-            slopes = np.vstack((sensitivity.T / noise, hinge))
+            slopes = np.vstack((sensitivity.T / noise, slopes_of))
             turned = slopes[:, self._rest]
             if len(self._quantity.members) == 2:
                 first, second = slopes[:, self._quantity.members].T
@@ -103,7 +104,10 @@ class Held:
 
     def _late(self, x: Array) -> list[float]:
         longest = np.log(self._likelihood.problem.residuals.duration_s)
-        return [float(x[c] - x[k] - longest) for k, c in self._quantity.branches]
+        return [
+            float(x[c] - x[k] - longest)
+            for k, c in (hinge.branch for hinge in self._quantity.hinges)
+        ]
 
     def fitted(self, x: Array, tolerance: float = TIGHT) -> tuple[float, Array]:
         """Rise of chi^2 of a fit from log-parameters, and where it ends."""

@@ -12,6 +12,7 @@ from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
 from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
 from biogrip.identifiability.quantities import (
+    Hinge,
     Quantity,
     combinations_of,
     parameters_and_sum,
@@ -276,4 +277,4 @@ def test_one_quantity_in_text() -> None:
     x: Array = np.log([1.0, 1.0, 3.0, 4.0])
     assert (q.label, q.unit) == ("c + c_p", "N s/m")
     assert math.exp(q.log(x)) == pytest.approx(7.0)
-    assert q.branches == ((0, 2),)
+    assert q.hinges == (Hinge((0, 2)),)

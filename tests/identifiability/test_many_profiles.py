@@ -102,7 +102,7 @@ def test_a_sum_is_held_as_by_leaving_it_out() -> None:
     """SciPy's fit over what is left free, which is the definition of a held sum."""
     (likelihood,) = likelihoods("liquid_drop_2", 1)
     (total,) = labelled("c + c_p")
-    plain = replace(total, branches=())
+    plain = replace(total, hinges=())
     fits = HeldFits([likelihood], [plain])
     for shift in (-0.05, 0.02):
         target = total.log(likelihood.best) + shift

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m"}
 _SUFFIXES = {"stiffness": "_N_per_m", "damping": "_Ns_per_m"}
@@ -98,7 +98,7 @@ class SampleModel:
         Parameters whose sum deserves a row of its own in tables, because stiff
         branches make them trade against each other.
     branches
-        Spring and damper of each Maxwell branch, by name.
+        Spring and damper of each Maxwell branch, by name; with several, the fastest first.
     """
 
     name: str
@@ -118,6 +118,46 @@ class SampleModel:
         """What tables have a row for: every parameter, and the sum of the exchangeable ones."""
         together = [p for p in self.parameters if p.name in self.exchangeable]
         return [[p] for p in self.parameters] + ([together] if together else [])
+
+    @property
+    def free_branches(self) -> tuple[tuple[int, int], ...]:
+        """Indices of spring and damper of each branch of which both are to be identified."""
+        places = {name: index for index, name in enumerate(self.names)}
+        return tuple(
+            (places[spring], places[damper])
+            for spring, damper in self.branches
+            if spring in places and damper in places
+        )
+
+    def in_order(self, parameters: Array) -> IntArray:
+        """Order in which branches relax one after the other, the fastest first.
+
+        A trace is the same whichever branch is called which; so that samples and fits
+        can be compared, branches are counted by their relaxation times c/k.
+
+        Parameters
+        ----------
+        parameters : (n, n_parameters)
+            Of n samples.
+
+        Returns
+        -------
+        (n, n_parameters)
+            For every column the one that belongs there, as of `numpy.take_along_axis`.
+        """
+        order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
+        if len(self.free_branches) > 1:
+            springs, dampers = np.array(self.free_branches).T
+            times = parameters[:, dampers] / parameters[:, springs]
+            ranks = np.argsort(times, axis=1, kind="stable")
+            order[:, springs], order[:, dampers] = springs[ranks], dampers[ranks]
+        return order
+
+    def named_in_order(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Return a sample's parameters, by name, with its branches in their order."""
+        values = np.array([[parameters[name] for name in self.names]])
+        order = self.in_order(values)[0]
+        return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
 
     def sample(self, parameters: Mapping[str, float]) -> Network:
         """Return the elements of the one sample that has these parameters, by name."""
@@ -321,6 +361,7 @@ def model_named(name: str, branches: int = 1) -> SampleModel:
     )
     return replace(
         model,
+        title=f"{model.title}, {branches} branches",
         parameters=(*springs, K_P, *dampers, C_P),
         exchangeable=(*(damper.name for damper in dampers), "c_p"),
         branches=tuple((k.name, c.name) for k, c in zip(springs, dampers, strict=True)),
@@ -363,3 +404,18 @@ class Sample:
     def model(self) -> SampleModel:
         """The model itself."""
         return model_named(self.name, self.branches)
+
+    @property
+    def candidate(self) -> str:
+        """Its name among `CANDIDATES`."""
+        return self.name if self.branches == 1 else f"{self.name}_{self.branches}"
+
+
+CANDIDATES: dict[str, Sample] = {
+    sample.candidate: sample
+    for sample in (
+        *(Sample(name) for name in MODELS),
+        *(Sample("generalized_maxwell", n) for n in range(2, MOST_BRANCHES + 1)),
+    )
+}
+"""What a trace may be fitted with, by a name that tells the number of branches, too."""

@@ -22,9 +22,6 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.levenberg_marquardt import Normal
 
-HINGE = 10.0
-"""A branch may relax within twice the experiment at the price of chi^2 rising by some 50."""
-
 # E-folds from a bound at which a member counts as free, and by which rounding may take it over.
 _FREE, _ROUNDING = 1e-9, 1e-7
 # Of members at a bound, for the choice of the one that is eliminated.
@@ -60,14 +57,16 @@ class HeldQuantities:
     ) -> None:
         self._which, self._targets = which, targets
         self._low, self._high = low, high
-        self._longest = float(np.log(longest_s))
         self._powers = np.zeros((len(quantities), len(low)))
-        most = max(len(quantity.branches) for quantity in quantities)
-        self._relaxing = np.zeros((len(quantities), most, len(low)))
+        most = max(len(quantity.hinges) for quantity in quantities)
+        self._forms = np.zeros((len(quantities), most, len(low)))
+        self._allowed, self._stiffness = np.zeros((2, len(quantities), most))
         for index, quantity in enumerate(quantities):
             self._powers[index, list(quantity.members)] = quantity.sign
-            for branch, (spring, damper) in enumerate(quantity.branches):
-                self._relaxing[index, branch, [damper, spring]] = 1.0, -1.0
+            for row, hinge in enumerate(quantity.hinges):
+                self._forms[index, row] = hinge.form(len(low))
+                self._allowed[index, row] = hinge.allowed(longest_s)
+                self._stiffness[index, row] = hinge.stiffness
         senses = {"product": 0.0, "sum": 1.0, "series": -1.0}
         self._senses = np.array([senses[quantity.form] for quantity in quantities])
         self._most_members = max(len(quantity.members) for quantity in quantities)
@@ -86,7 +85,7 @@ class HeldQuantities:
         return restored
 
     def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
-        """Normal equations with residuals for branches that do not relax in time."""
+        """Normal equations with residuals for branches that relax too late."""
         beyond, slopes = self._late(x, fit)
         if not slopes.size:
             return normal
@@ -98,7 +97,7 @@ class HeldQuantities:
         )
 
     def price(self, x: Array) -> Array:
-        """What branches that do not relax in time add to the sums of squares, (n,)."""
+        """What branches that relax too late add to the sums of squares, (n,)."""
         beyond: Array = self._late(x, np.arange(len(x)))[0]
         return np.sum(beyond**2, axis=1)
 
@@ -149,11 +148,13 @@ class HeldQuantities:
         return marked
 
     def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
-        """Residuals of branches, (n, n_branches), and their slopes by the log-parameters."""
-        relaxing = self._relaxing[self._which[fit]]
-        beyond = np.sum(relaxing * x[:, None], axis=2) - self._longest
-        late = (beyond > 0) & np.any(relaxing != 0, axis=2)
-        return np.where(late, HINGE * beyond, 0.0), HINGE * relaxing * late[:, :, None]
+        """Residuals of hinges, (n, n_hinges), and their slopes by the log-parameters."""
+        which = self._which[fit]
+        forms, stiffness = self._forms[which], self._stiffness[which]
+        beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
+        late = (beyond > 0) & (stiffness > 0)
+        slopes = stiffness[:, :, None] * forms * late[:, :, None]
+        return np.where(late, stiffness * beyond, 0.0), slopes
 
     def _slopes(self, x: Array, fit: IntArray) -> Array:
         """Derivatives of the quantities' logarithms by the log-parameters, where they hold."""

@@ -38,8 +38,6 @@ MISSED = 0.05
 
 What is deeper than an optimum by more says that it was not the global one.
 """
-# A branch may relax within twice the experiment at the price of chi^2 rising by some 50.
-_HINGE = 10.0
 _MOST_DOUBLINGS = 12
 _MOST_HALVINGS = 60
 # A guess in a bracket keeps away from its ends, so that a jump is soon enclosed.
@@ -272,8 +270,8 @@ class _Held:
         self._accuracy = accuracy
         self._likelihood = likelihood
         self._quantity = quantity
-        self._longest = float(np.log(likelihood.problem.residuals.duration_s))
-        further = self._unrelaxed if quantity.branches else None
+        self._longest_s = likelihood.problem.residuals.duration_s
+        further = self._late if quantity.hinges else None
         self._objective = Objective(likelihood.problem, further)
         best = likelihood.best
         self.best = _Point(quantity.log(best), 0.0, best, np.zeros((len(best), len(best))))
@@ -355,17 +353,15 @@ class _Held:
             was_inside = is_inside
         return inside.target, outside
 
-    def _unrelaxed(self, x: Array) -> tuple[Array, Array]:
-        """Rows, and slopes, that are zero as long as branches relax within the experiment.
+    def _late(self, x: Array) -> tuple[Array, Array]:
+        """Rows, and slopes, that are zero as long as branches relax early enough.
 
         Their squares are a price in chi^2, and part of the rise.
         """
         values, slopes = [], []
-        for spring, damper in self._quantity.branches:
-            beyond = x[damper] - x[spring] - self._longest
-            slope = np.zeros_like(x)
-            if beyond > 0:
-                slope[damper], slope[spring] = _HINGE, -_HINGE
-            values.append(_HINGE * max(beyond, 0.0))
-            slopes.append(slope)
+        for hinge in self._quantity.hinges:
+            form = hinge.form(len(x))
+            beyond = float(form @ x) - hinge.allowed(self._longest_s)
+            values.append(hinge.stiffness * max(beyond, 0.0))
+            slopes.append(hinge.stiffness * form * (beyond > 0))
         return np.array(values), np.array(slopes)

@@ -5,12 +5,51 @@ logarithms of the parameters.
 """
 
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import Parameter, SampleModel
+
+# A branch may relax within twice the experiment at the price of chi^2 rising by some 50, and
+# after one that comes later, by a hundredth, at that of rising by 1.
+_WITHIN, _IN_ORDER = 10.0, 100.0
+
+
+@dataclass(frozen=True)
+class Hinge:
+    """A residual that is zero while a branch relaxes early enough.
+
+    Parameters
+    ----------
+    branch
+        Spring and damper, by index.
+    before
+        Those of the branch that has to relax later; None if it is the experiment
+        within which this one has to relax.
+    """
+
+    branch: tuple[int, int]
+    before: tuple[int, int] | None = None
+
+    @property
+    def stiffness(self) -> float:
+        """How fast the residual grows, in standard deviations an e-fold."""
+        return _WITHIN if self.before is None else _IN_ORDER
+
+    def form(self, n_parameters: int) -> Array:
+        """Coefficients of the log-parameters, (n_parameters,), in how much too late it is."""
+        found = np.zeros(n_parameters)
+        for branch, sign in ((self.branch, 1.0), (self.before, -1.0)):
+            if branch is not None:
+                spring, damper = branch
+                found[damper], found[spring] = sign, -sign
+        return found
+
+    def allowed(self, longest_s: float) -> float:
+        """What of it is not too late; the experiment lasts so long."""
+        return float(np.log(longest_s)) if self.before is None else 0.0
 
 
 @dataclass(frozen=True)
@@ -28,10 +67,11 @@ class Quantity:
     form
         ``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of
         reciprocals.
-    branches
-        Spring and damper, by index, of branches that have to relax within the
-        experiment for the quantity to mean anything: the damper of a branch too
-        weak and slow to be seen could be of any size.
+    hinges
+        What has to hold for the quantity to mean anything. Of a sum, that branches relax
+        within the experiment: the damper of a branch too weak and slow to be seen could
+        be of any size. Of one branch among several, that they relax in their order: any
+        could take the name of another.
     """
 
     label: str
@@ -40,7 +80,7 @@ class Quantity:
     members: tuple[int, ...]
     form: str = "product"
     sign: tuple[int, ...] = (1,)
-    branches: tuple[tuple[int, int], ...] = ()
+    hinges: tuple[Hinge, ...] = ()
 
     def log(self, log_parameters: Array) -> float:
         """Logarithm of the quantity, from log-parameters of shape (n_parameters,)."""
@@ -87,21 +127,18 @@ class Quantity:
 
 def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     """Every parameter, and the sum of those that the model calls exchangeable."""
+    ordered = _ordered(model)
     single = [
-        Quantity(p.name, p.symbol, p.unit, (index,)) for index, p in enumerate(model.parameters)
+        Quantity(p.name, p.symbol, p.unit, (index,), hinges=ordered)
+        for index, p in enumerate(model.parameters)
     ]
     together = tuple(
         index for index, p in enumerate(model.parameters) if p.name in model.exchangeable
     )
     if len(together) < 2:
         return single
-    places = {p.name: index for index, p in enumerate(model.parameters)}
-    branches = tuple(
-        (places[spring], places[damper])
-        for spring, damper in model.branches
-        if spring in places and damper in places
-    )
-    return [*single, replace(_sum(model, together), branches=branches)]
+    within = tuple(Hinge(branch) for branch in model.free_branches)
+    return [*single, replace(_sum(model, together), hinges=within)]
 
 
 def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
@@ -111,6 +148,7 @@ def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
     combination; of a damper and a spring their time c/k.
     """
     found = []
+    ordered = _ordered(model)
     for a, b in combinations(members, 2):
         first, second = model.parameters[a], model.parameters[b]
         if first.kind == second.kind:
@@ -118,7 +156,11 @@ def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
         else:
             damper, spring = (a, b) if first.kind == "damping" else (b, a)
             found.append(_time(model, damper, spring))
-    return found
+    return [replace(quantity, hinges=ordered) for quantity in found]
+
+
+def _ordered(model: SampleModel) -> tuple[Hinge, ...]:
+    return tuple(Hinge(branch, later) for branch, later in pairwise(model.free_branches))
 
 
 def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:

@@ -1,9 +1,12 @@
 """What every identifier returns."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.experiment.sample import SampleModel
 
 Progress = Callable[[int, float], None]
 """Is told, now and then, how many responses were simulated and the lowest misfit in rad."""
@@ -60,3 +63,12 @@ class Identification:
     evaluations: int
     stop_reason: str
     history: History
+
+    def in_order(self, model: SampleModel) -> "Identification":
+        """Name branches, all the way, in the order in which they relax."""
+        way = self.history.best_parameters
+        ordered = np.take_along_axis(way, model.in_order(way), axis=1)
+        found = self.parameters[model.in_order(self.parameters[None])[0]]
+        return replace(
+            self, parameters=found, history=replace(self.history, best_parameters=ordered)
+        )

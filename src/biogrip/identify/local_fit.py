@@ -10,7 +10,7 @@ References
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -168,9 +168,10 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
 
     A trust region compares sums of squares, and so finds an optimum to half the
     digits; where the gradient vanishes can be found to all of them, from all the
-    samples. Parameters that push against a bound stay on it. The curvature is the
-    full one: along a valley, where parameters trade against each other, that of
-    Gauss and Newton leaves out most of it, and its steps go to and fro for ever.
+    samples. Parameters that push against a bound stay on it, and branches are named
+    in the order in which they relax. The curvature is the full one: along a valley,
+    where parameters trade against each other, that of Gauss and Newton leaves out
+    most of it, and its steps go to and fro for ever.
     """
     objective, nearby = Objective(problem, condensed=False), Objective(problem)
     x, left = found.log_parameters, _MOST_STEPS
@@ -194,8 +195,9 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
     misfit = objective.misfit_rad(x)
     evaluations = objective.evaluations + nearby.evaluations
     if not misfit <= found.misfit_rad * (1 + FINE):
-        return replace(found, evaluations=evaluations)
-    return LocalFit(x, misfit, evaluations)
+        x, misfit = found.log_parameters, found.misfit_rad
+    order = problem.residuals.model.in_order(np.exp(x)[None])[0]
+    return LocalFit(x[order], misfit, evaluations)
 
 
 def _newton(curvature: Array, downhill: Array) -> Array:

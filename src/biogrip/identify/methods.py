@@ -109,9 +109,13 @@ def identifier(name: str, settings: object) -> Identify:
         problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
     ) -> list[Identification]:
         if hasattr(module, "identify_many"):
-            answers: list[Identification] = module.identify_many(problems, settings, rngs, progress)
-            return answers
-        pairs = zip(problems, rngs, strict=True)
-        return [module.identify(problem, settings, rng, progress) for problem, rng in pairs]
+            answers = module.identify_many(problems, settings, rngs, progress)
+        else:
+            pairs = zip(problems, rngs, strict=True)
+            answers = [module.identify(problem, settings, rng, progress) for problem, rng in pairs]
+        return [
+            answer.in_order(problem.residuals.model)
+            for problem, answer in zip(problems, answers, strict=True)
+        ]
 
     return identify

@@ -49,7 +49,8 @@ def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
     Returns
     -------
     Minima
-        Optima with the misfits of all samples, and evaluations since they were found.
+        Optima with the misfits of all samples, and evaluations since they were found;
+        branches named in the order in which they relax.
     """
     low, high = (np.broadcast_to(bound, found.x.shape) for bound in (fits.low, fits.high))
     closer = minimized(
@@ -86,7 +87,8 @@ def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
             if np.max(np.abs(step)) < _NEARLY_SETTLED:
                 break
         evaluations[fit] += objective.evaluations
-    return Minima(x, misfit_rad, evaluations)
+    order = fits.problems[0].residuals.model.in_order(np.exp(x))
+    return Minima(np.take_along_axis(x, order, axis=1), misfit_rad, evaluations)
 
 
 def _newton_step(fits: ManyFits, curved: Normal, x: Array) -> Array:

@@ -54,7 +54,7 @@ class Residuals:
         noise_rad: float | None = None,
     ) -> None:
         self._gripper = gripper
-        self._model = model
+        self.model = model
         self._torque = torque
         self._time_s = time_s
         self.nonlinear = nonlinear
@@ -74,13 +74,13 @@ class Residuals:
 
     def grip(self, log_parameters: Array) -> Grip:
         """Force of the jaws on a sample, with which they press it or would have to pull."""
-        network = self._model.network(np.exp(log_parameters))
+        network = self.model.network(np.exp(log_parameters))
         return grip_of(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
     def of_model(self, model: SampleModel) -> "Residuals":
         """Return the same trace for another model."""
         other = copy(self)
-        other._model = model
+        other.model = model
         return other
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
@@ -158,7 +158,7 @@ class Residuals:
 
     def condensed_linear(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
-        modes = modes_of(self._gripper, self._model, self._torque, np.exp(log_parameters))
+        modes = modes_of(self._gripper, self.model, self._torque, np.exp(log_parameters))
         return self._condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array) -> Array:
@@ -169,7 +169,7 @@ class Residuals:
         )
 
     def _corrections(self, log_parameters: Array) -> Array:
-        found = corrections(self._gripper, self._model, self._torque, np.exp(log_parameters))
+        found = corrections(self._gripper, self.model, self._torque, np.exp(log_parameters))
         values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
         # One product a sample: the order of its sums does not depend on how many there are.
         shape = len(log_parameters), -1, len(self._condensed.of_corrections)
@@ -201,12 +201,12 @@ class Residuals:
         return self._assumed() == other._assumed() and self._condensed is other._condensed
 
     def _assumed(self) -> tuple[object, ...]:
-        return self._gripper, self._model, self.nonlinear
+        return self._gripper, self.model, self.nonlinear
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
         return rotation_and_sensitivity(
             self._gripper,
-            self._model,
+            self.model,
             self._torque,
             time_s,
             np.exp(log_parameters),

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Key, Problem
@@ -28,9 +28,10 @@ class ModelSelection:
     """The choice of the simplest adequate sample model by AIC and BIC."""
 
     models: Annotated[
-        tuple[Annotated[str, Key(choices=tuple(MODELS))], ...],
+        tuple[Annotated[str, Key(choices=tuple(CANDIDATES))], ...],
         Key(
-            "Sample models that every trace is fitted with; an empty list leaves that out.",
+            "Sample models that every trace is fitted with, beside that of its case; an empty list "
+            "leaves that out. A number counts Maxwell branches.",
             most=100,
             unique=True,
         ),

@@ -7,7 +7,7 @@ from functools import cached_property
 
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import Sample
+from biogrip.experiment.sample import Sample, with_fixed
 from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import Published, Truth
 from biogrip.identify.case_problem import CaseProblem
@@ -68,9 +68,12 @@ class Case:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """True values by name, SI units; nobody knows them of a recorded trace."""
+        """True values by name, SI units, branches as they relax; none of a recorded trace."""
         given = self.block.sample.parameters
-        return {name: float(given[name]) for name in self.sample.model.names if name in given}
+        known = {name: float(given[name]) for name in self.sample.model.names if name in given}
+        searched = with_fixed(self.sample.model, self.fixed)
+        whole = len(known) == len(self.sample.model.names)
+        return searched.named_in_order(known) if whole else known
 
     @property
     def size_m(self) -> float | None:
@@ -277,9 +280,13 @@ class Study:
         return self.methods[0]
 
     @property
-    def models(self) -> tuple[str, ...]:
-        """Sample models that every trace is fitted with."""
-        return self.config.model_selection.models
+    def selects_models(self) -> bool:
+        """Whether every trace is fitted with several sample models."""
+        return bool(self.config.model_selection.models)
+
+    def models_of(self, case: Case) -> tuple[str, ...]:
+        """Name the sample models that a case's traces are fitted with, see `CANDIDATES`."""
+        return tuple(dict.fromkeys((*self.config.model_selection.models, case.sample.candidate)))
 
     @property
     def batch_size(self) -> int | None:

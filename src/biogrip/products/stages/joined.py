@@ -64,7 +64,7 @@ JOINED = (
     joined(
         "all_model_fits",
         MODEL_FITS,
-        lambda plan: plan.study.cases if plan.study.models else (),
+        lambda plan: plan.study.cases if plan.study.selects_models else (),
         lambda case: case.seeds,
     ),
 )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, identifier
@@ -30,7 +30,7 @@ class Settings:
     problem, least_squares
         What is identified, but for the model, and by how many fits.
     models
-        Names of the models.
+        Names of the models, see `CANDIDATES`.
     """
 
     study_seed: int
@@ -44,7 +44,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the fits of a case depend on."""
     case = study.case(job["case"])
     fits = case.method("least_squares")
-    return Settings(study.study_seed, case.name, case.problem, fits, study.models)
+    return Settings(study.study_seed, case.name, case.problem, fits, study.models_of(case))
 
 
 def fit(
@@ -81,7 +81,7 @@ def _rows(
     identify = identifier("least_squares", settings.least_squares)
     progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
     for name in settings.models:
-        model = MODELS[name]
+        model = CANDIDATES[name].model
         for group in groups(seeds):
             traces = [recorded.rotation_rad[seed] for seed in group]
             problems = [posed.of(recorded.time_s, trace, model) for trace in traces]
@@ -93,7 +93,7 @@ def _rows(
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:
-    return plan.batch_jobs("selection", plan.study.cases) if plan.study.models else []
+    return plan.batch_jobs("selection", plan.study.cases) if plan.study.selects_models else []
 
 
 MODEL_FIT = Product(

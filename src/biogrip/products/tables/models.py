@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.sample import CANDIDATES
 from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -34,7 +34,9 @@ _COLUMNS = (
 
 def settings(study: Study) -> dict[str, str | None]:
     """Name the sample models that made the traces, by case; None of a recorded one."""
-    return {name: None if case.recorded else case.sample.name for name, case in study.cases.items()}
+    return {
+        name: None if case.recorded else case.sample.candidate for name, case in study.cases.items()
+    }
 
 
 def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
@@ -66,10 +68,9 @@ def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
         for name in of_case["model"].unique():
             medians = [float(table[name].median()) for table in delta.values()]
             chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
-            title = MODELS[name].title + (" (made the traces)" if name == maker else "")
-            rows.append(
-                (case, title, len(MODELS[name].names), *medians, *chosen, len(delta["aic"]))
-            )
+            model = CANDIDATES[name].model
+            title = model.title + (" (made the traces)" if name == maker else "")
+            rows.append((case, title, len(model.names), *medians, *chosen, len(delta["aic"])))
     caption = (
         "Simplest adequate model: by how much each model's AIC and BIC exceed the lowest, and in "
         "how many seeds it has the lowest."
@@ -86,5 +87,5 @@ MODELS_COMPARED = table(
     sheet="tables",
     settings=settings,
     reads={"fits": of_cases(MODEL_FITS.path, lambda study: study.cases)},
-    when=lambda study: bool(study.models),
+    when=lambda study: study.selects_models,
 )
