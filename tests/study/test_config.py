@@ -102,7 +102,19 @@ def test_a_case_set_to_nothing_is_dropped(tmp_path: Path) -> None:
     assert list(study.cases) == ["endothelial_cell", "liquid_drop_2", "drop"]
 
 
+def test_a_study_has_only_the_cases_that_it_names(tmp_path: Path) -> None:
+    study = load(tmp_path, f"only: [drop]\ncases: {{drop: {{{DROP}}}}}")
+    assert list(study.cases) == ["drop"]
+    two = load(tmp_path, f"only: [drop, liquid_drop_1]\ncases: {{drop: {{{DROP}}}}}")
+    assert list(two.cases) == ["drop", "liquid_drop_1"]
+
+
 BAD = {
+    "only: [liquid_drop_3]": r"my.yaml, line 1: only\[0\]: found 'liquid_drop_3', allowed are "
+    r"endothelial_cell, liquid_drop_1, liquid_drop_2. Did you mean 'liquid_drop_",
+    "only: []": r"my.yaml, line 1: only: found a list of 0, allowed are at least 1",
+    "cases: {x: {sample: {model: liquid_drop, k: 1e11, k_p: 0.1, c: 1}}}": r"x.sample.k: found "
+    r"1e\+11, which is not searched for; allowed is .* N/m, or another search_range",
     "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
     "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",
     "seeds: 0": r"my.yaml, line 1: seeds: found 0, allowed is at least 1",

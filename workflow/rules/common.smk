@@ -9,6 +9,7 @@ from snakemake.settings.types import ExecMode
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
+from biogrip.products.stages.recording import check_traces
 from biogrip.running.locks import sign_locks
 from biogrip.running.manifest import Manifest
 from biogrip.running.wholeness import claim, held_against_record
@@ -39,6 +40,8 @@ try:
         files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
         command_line=workflow.config_settings.config,
     )
+    if workflow.exec_mode == ExecMode.DEFAULT:
+        check_traces(STUDY)
 except BiogripError as error:
     sys.exit(f"biogrip: {error}")
 

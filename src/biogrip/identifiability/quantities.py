@@ -82,6 +82,14 @@ class Quantity:
     sign: tuple[int, ...] = (1,)
     hinges: tuple[Hinge, ...] = ()
 
+    @property
+    def provided(self) -> str | None:
+        """What is taken for granted of the sample, if anything is."""
+        count = sum(hinge.before is None for hinge in self.hinges)
+        if not count:
+            return None
+        return f"the {'branch relaxes' if count == 1 else 'branches relax'} within the experiment"
+
     def log(self, log_parameters: Array) -> float:
         """Logarithm of the quantity, from log-parameters of shape (n_parameters,)."""
         x = log_parameters[list(self.members)]

@@ -71,10 +71,17 @@ class Finding:
         """Values in SI units that are excluded although others on both sides are not."""
         return [(math.exp(start), math.exp(end)) for start, end in self.profile.gaps]
 
+    @property
+    def told(self) -> bool:
+        """Whether the trace says anything of it."""
+        return self.verdict != NOT_DETERMINED
+
     def words(self) -> str:
         """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
-        return self._limits_in_words() + (f", except {but} {self.quantity.unit}" if but else "")
+        words = self._limits_in_words() + (f", except {but} {self.quantity.unit}" if but else "")
+        provided = self.quantity.provided
+        return f"{words}, provided {provided}" if provided and self.told else words
 
     def _limits_in_words(self) -> str:
         unit = self.quantity.unit

@@ -95,12 +95,13 @@ def _check_folder(folder: Path) -> None:
 
 def _check(configs: list[Path], folder: Path) -> None:
     """Check the study as Snakemake will see it, from the folder that it will run in."""
+    from biogrip.products.stages.recording import check_traces
     from biogrip.study.load import load_study, read_configs
 
     merged = read_configs(configs)
     # Traces are named from there; before the first run it need not exist.
     with chdir(folder if folder.is_dir() else "."):
-        load_study(merged, configs)
+        check_traces(load_study(merged, configs))
 
 
 def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:

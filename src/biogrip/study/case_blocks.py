@@ -1,5 +1,6 @@
 """The blocks of a case, and of the study for all cases."""
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from itertools import pairwise
@@ -150,6 +151,7 @@ class CaseBlock(Shared):
         else:
             for path, text in self.sample.missing():
                 yield ("sample", *path), text
+            yield from self._unreachable_problems()
         yield from self._fixed_problems()
         yield from self._contact_problems()
         yield from self.of_methods.problems_of(self._genes)
@@ -188,6 +190,19 @@ class CaseBlock(Shared):
             yield ("fixed", *path), text
         if set(model.names) <= set(self.known):
             yield ("fixed",), "leaves nothing to identify; allowed are fewer parameters."
+
+    def _unreachable_problems(self) -> Iterator[Problem]:
+        """Find true values in decades that no identification looks into."""
+        for parameter in self._searched:
+            value = self.sample.parameters.get(parameter.name)
+            genes: GeneRange = getattr(self.search_range, parameter.range_name)
+            low = 10.0 ** math.floor(math.log10(genes.low))
+            high = 10.0 ** math.ceil(math.log10(genes.high))
+            vanishes = value == 0 and parameter.may_vanish
+            if value is None or vanishes or low <= value <= high:
+                continue
+            text = f"found {value:g}, which is not searched for; allowed is {low:g} to {high:g} "
+            yield ("sample", parameter.name), f"{text}{parameter.unit}, or another search_range."
 
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s

@@ -1,9 +1,10 @@
 """The study's keys: those of all cases, and the cases and sweeps themselves."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
 
+from biogrip.errors import nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
@@ -14,6 +15,8 @@ from biogrip.study.sweeps import SweepBlock
 from biogrip.study.typed import parts
 
 _MOST_BATCHES = 10_000
+# Of the names in a message.
+_SHOWN = 6
 _CASE_NAME = Key(
     pattern="[A-Za-z][A-Za-z0-9_-]{0,63}",
     form="a letter, then up to 63 letters, digits, '_' or '-'",
@@ -125,6 +128,16 @@ class StudyConfig(Shared):
             most=2000,
         ),
     ]
+    only: Annotated[
+        tuple[str, ...],
+        Key(
+            "Names of the cases that the study has, the others being left out. If it is not "
+            "given, all that stand under `cases`.",
+            fewest=1,
+            most=2000,
+            unique=True,
+        ),
+    ] = ()
     sweeps: Annotated[
         Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
         Key(
@@ -156,6 +169,15 @@ class StudyConfig(Shared):
         for index, key in enumerate(self.reconstructed):
             if not _exists(self, key):
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
+        for index, name in enumerate(self.only):
+            if name not in self.cases:
+                text = f"found '{name}', allowed are {', '.join(list(self.cases)[:_SHOWN])}."
+                yield ("only", index), text + nearest(name, self.cases)
+
+    @property
+    def chosen(self) -> "StudyConfig":
+        """The study without the cases that are left out."""
+        return replace(self, cases={name: self.cases[name] for name in self.only or self.cases})
 
 
 def _exists(block: Any, key: str) -> bool:

@@ -46,6 +46,7 @@ def checked(
     _refuse(_plain_problems(config), files)
     study = built(StudyConfig, config)
     _refuse(block_problems((), study), files)
+    study = study.chosen
     _refuse(_assumed_problems(study.cases), files)
     _refuse(sweep_problems(study.sweeps, study.cases), files)
     _refuse(_point_problems(study), files)

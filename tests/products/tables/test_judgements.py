@@ -17,8 +17,10 @@ from biogrip.products.tables import verdicts as verdicts_table
 from biogrip.products.tables.layout import Table
 from biogrip.products.tables.methods import Settings, methods
 from biogrip.products.tables.models import models
+from biogrip.products.tables.models import settings as made_by
 from biogrip.products.tables.timings import timings
 from biogrip.products.tables.verdicts import verdicts
+from tests.helpers.default import study_of
 
 
 def rows(table: Table) -> list[dict[str, Any]]:
@@ -83,6 +85,25 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
     assert damper["median_delta_aic"] == pytest.approx(4.0 - 2.0)
     assert maxwell["median_delta_bic"] == pytest.approx(np.log(n) - 4.0)
     assert maxwell["model"] == "Maxwell liquid (made the traces)"
+
+
+def test_what_made_the_traces_is_tried_and_marked(tmp_path: Path) -> None:
+    study = study_of("""
+model_selection: {models: [damper, generalized_maxwell]}
+cases:
+  two: {sample: {model: generalized_maxwell, branches: 2,
+                 k_1: 30, k_2: 10, k_p: 12.3, c_1: 150, c_2: 600, c_p: 0}}
+""")
+    tried = study.models_of(study.cases["two"])
+    assert tried == ("damper", "generalized_maxwell", "generalized_maxwell_2")
+    path = tmp_path / "fits.csv"
+    fits = [["two", name, 0, 4, 1000, 1.0] for name in tried]
+    names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
+    pd.DataFrame(fits, columns=names).to_csv(path, index=False)
+    found = rows(models({"two": made_by(study)["two"]}, [path]))
+    marked = [row["model"] for row in found if "made the traces" in row["model"]]
+    assert marked == ["generalized Maxwell-Wiechert model, 2 branches (made the traces)"]
+    assert [row["parameters"] for row in found] == [1, 4, 6]
 
 
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:

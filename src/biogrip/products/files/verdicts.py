@@ -78,6 +78,7 @@ def _finding(finding: "Finding") -> dict[str, Any]:
         "high": rounded(finding.high),
         "excluded": [[rounded(start), rounded(end)] for start, end in finding.gaps],
         "deviation": rounded(finding.deviation),
+        "provided": finding.quantity.provided,
         "in_words": finding.words(),
         "profile": {
             "values": [rounded(float(value)) for value in np.exp(profile.log_values)],

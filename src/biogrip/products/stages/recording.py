@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
@@ -68,6 +69,25 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
         problem.noise_rad,
     )
     return Measurements(trace.time_s, None, {0: trace.rotation_rad})
+
+
+def check_traces(study: Study) -> None:
+    """Refuse recorded traces that cannot be used, before anything is made of any.
+
+    Raises
+    ------
+    BiogripError
+        One message with a line for each of them.
+    """
+    problems = []
+    for name in study.recorded:
+        case = study.case(name)
+        try:
+            read_checked(settings_of(case), Path(case.file))
+        except BiogripError as error:
+            problems.append(f"cases.{name}: {error}")
+    if problems:
+        raise BiogripError("\n".join(problems))
 
 
 RECORDING = Product(
