@@ -12,7 +12,7 @@ from typing import Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
-from biogrip.files import refuse_inputs, watched
+from biogrip.files import watched
 from biogrip.running.journal import recorded_in
 
 RESULTS = Path("results")
@@ -135,10 +135,12 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _identify_parser(stages: Any) -> None:
-    text = "identify the sample in a recorded trace, without a workflow"
+    text = "identify the sample in recorded traces, without a workflow"
     identify = stages.add_parser("identify", help=text, description=text)
     identify.set_defaults(command=_identify)
-    identify.add_argument("trace", type=Path, help="CSV file with a header")
+    identify.add_argument(
+        "traces", type=Path, nargs="+", metavar="TRACE", help="CSV file with a header"
+    )
     identify.add_argument("--time", default="time_s", help="column of times [%(default)s]")
     identify.add_argument(
         "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
@@ -154,7 +156,13 @@ def _identify_parser(stages: Any) -> None:
     identify.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
     identify.add_argument("--offset", action="store_true", help="fit an offset along")
     identify.add_argument("--drift", action="store_true", help="fit a linear drift along")
-    identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
+    identify.add_argument(
+        "--report", type=Path, metavar="PAGE", help="HTML file: all of it on a page, with figures"
+    )
+    identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file: a row a trace")
+    identify.add_argument(
+        "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
+    )
     identify.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
     )
@@ -169,18 +177,8 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.one_trace import (
-        Wanted,
-        check_output,
-        check_trace_file,
-        identify_trace,
-        in_words,
-    )
+    from biogrip.own_traces.identify import identify
 
-    check_trace_file(options.trace)
-    output = options.output or options.trace.with_suffix(".identified.json")
-    refuse_inputs([output], [options.trace, *([options.config] if options.config else [])])
-    check_output(output, force=options.force)
     measurement = {
         "time": options.time,
         "rotation": options.rotation,
@@ -190,10 +188,16 @@ def _identify(options: argparse.Namespace) -> None:
         "offset": options.offset,
         "drift": options.drift,
     }
-    given = {key: value for key, value in measurement.items() if value is not None}
-    found = identify_trace(Wanted(options.trace, options.model, given, options.config), output)
-    print(in_words(found))
-    print(f"Written to {output}.")
+    options.status = identify(
+        options.traces,
+        options.model,
+        {key: value for key, value in measurement.items() if value is not None},
+        options.config,
+        output=options.output,
+        report=options.report,
+        table=options.csv,
+        force=options.force,
+    )
 
 
 def _run(options: argparse.Namespace) -> None:

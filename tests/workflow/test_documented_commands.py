@@ -25,7 +25,7 @@ LEFT = {
         "results/tables/verdicts_longer.md",
     ],
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
-    "howto/trace.md": ["found.json", "drifting.json", "maxwell.json"],
+    "howto/trace.md": ["found.json", "drifting.json", "page.html", "traces.csv", "maxwell.json"],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",

@@ -1,7 +1,7 @@
 """Profile likelihoods: what chi-squared says against other values of a quantity."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -51,7 +51,14 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
     expected
         What its traces should tell, JSON, if the truth is known.
     """
-    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    others = [read_verdicts(path) for path in expected]
+    return draw_profiles(settings, read_verdicts(measured), others)
+
+
+def draw_profiles(
+    settings: Settings, found: Mapping[str, Any], others: Sequence[Mapping[str, Any]] = ()
+) -> Figure:
+    """Draw profiles of verdicts that are at hand; see `draw`."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
     drawn = figure(PAGE_IN, 2.5)
