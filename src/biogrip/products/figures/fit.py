@@ -49,7 +49,9 @@ def draw(
     problem = settings.problem.calibrated(calibrated)
     fit = typical_fit(problem, settings.method, identifications, measurements)
     step = METHODS[settings.method].step
-    label = f"typical fit (seed {fit.seed}, {step} {fit.generations})"
+    ended = f"{step} {fit.generations}"
+    recorded = fit.target_rad is None
+    label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
     return draw_fit(fit, label, settings.title, settings.axis_rad)
 
 

@@ -116,6 +116,11 @@ def seeds_in_words(count: int) -> str:
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
+def typical_in_words(found: pd.DataFrame) -> str:
+    """Say which of some identifications is the typical one."""
+    return f"seed {int(typical(found)['seed'])}, typical" if len(found) > 1 else "the only trace"
+
+
 def read_history(path: Path, method: str, shown: int) -> pd.DataFrame:
     """Read the histories, by one method, of the seeds that are drawn and of one more.
 
