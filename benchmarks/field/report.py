@@ -26,6 +26,8 @@ METHODS = (
 )
 PEERS = ("lmfit", "mcreep", "pyvisco", "rheojax", "nlsq", "jax")
 COUNT = 50
+STARTED_BY_EYE = ("lmfit", "mcreep, times fitted from a guess")
+PROFILED = (OURS, "lmfit")
 CONFIDENCE = 0.95
 
 # What is less is no difference: of errors by ratio, of coverage in shares.
@@ -34,9 +36,9 @@ _ERROR, _COVERAGE = 0.95, 0.02
 _INTRODUCTION = f"""\
 # Against what the field uses
 
-Written by `make bench-field`. Samples with one to {max(SAMPLES)} Maxwell branches beside a spring
-are held by arms so soft that the force on them is the given one, so a trace is the creep compliance
-({INTERVALS} samples in {DURATION_S:g} s, noise of {100 * NOISE.level:g} % of the peak;
+Written by `make bench-field`. Samples with {min(SAMPLES)} to {max(SAMPLES)} Maxwell branches beside
+a spring are held by arms so soft that the force on them is the given one, so a trace is the creep
+compliance ({INTERVALS} samples in {DURATION_S:g} s, noise of {100 * NOISE.level:g} % of the peak;
 `benchmarks/field/traces.py`). {COUNT} traces of each are identified by biogrip's least squares and
 by other libraries as their documentation shows: lmfit, mcreep, RheoJAX; the first lines of each
 `benchmarks/field/by_*.py` say what is called and where it is documented. lmfit, and mcreep in one
@@ -153,10 +155,15 @@ def _better(rows: Sequence[Row]) -> str:
 def _advantages(row: Row, ours: Row) -> dict[str, str]:
     """Return in what a row is better than ours on the same measurement, and its time."""
     found = {}
-    short = "" if row["reached"] >= ours["reached"] else " to fits that are not the best"
+    as_good = row["reached"] >= ours["reached"]
     if row["fit_times_ours"] < 1:
-        found[f"takes less time{short}"] = f"{number(row['fit_times_ours'], 2)} times ours"
-    if row["intervals"] and row["whole_times_ours"] < 1 and not short:
+        how = f"{number(row['fit_times_ours'], 2)} times ours"
+        if as_good:
+            found["takes less time"] = how
+        else:
+            shares = f"{row['reached']} of {row['traces']} against {ours['reached']}"
+            found["takes less time and reaches the best fit less often"] = f"{how}, {shares}"
+    if row["intervals"] and row["whole_times_ours"] < 1 and as_good:
         found["with limits, too"] = f"{number(row['whole_times_ours'], 2)} times ours"
     if row["measured"] != CREEP:
         return found
@@ -177,26 +184,56 @@ def _advantages(row: Row, ours: Row) -> dict[str, str]:
 
 def _lessons(rows: Sequence[Row]) -> list[str]:
     """Say what can be learnt from peers that are as good as ours in less time."""
-    reached = {row["branches"]: row["reached"] for row in rows if row["method"] == OURS}
+    by_method = {
+        method.name: [row for row in rows if row["method"] == method.name]
+        for method in METHODS
+        if method.measured == CREEP
+    }
+    ours = by_method.pop(OURS)
+    lessons = []
     quick = [
-        method.name
-        for method in METHODS[1:]
+        name
+        for name, own in by_method.items()
         if all(
-            row["fit_times_ours"] < 1 and row["reached"] >= reached[row["branches"]]
-            for row in rows
-            if row["method"] == method.name
+            row["fit_times_ours"] < 1 and row["reached"] >= us["reached"]
+            for row, us in zip(own, ours, strict=True)
         )
-        and method.measured == CREEP
     ]
-    if not quick:
-        return []
-    return [
-        "",
-        f"{' and '.join(quick)} reach the best fit as often as biogrip does, in less time, from a "
-        "single start: on a trace of creep the ends and times even on a logarithmic axis are "
-        "as good as many random starts over decades, which biogrip needs to know nothing of the "
-        "trace. To be learnt: such a start as the first of them.",
+    if quick:
+        missed = [
+            f"{name} misses it on {sum(row['traces'] - row['reached'] for row in own)}"
+            for name, own in by_method.items()
+            if name in STARTED_BY_EYE and any(row["reached"] < row["traces"] for row in own)
+        ]
+        from_same = f" From the same start {', '.join(missed)} traces." if missed else ""
+        more = any(method.more_general for method in METHODS if method.name in quick)
+        lessons.append(
+            f"From a single start {', '.join(quick)} reaches the best fit as often as biogrip does "
+            "from many: the ends of the trace, and times even on a logarithmic axis, are close to "
+            f"the answer.{' A model with a damper more has it easier.' if more else ''}"
+            f"{from_same} To be "
+            "learnt: try such a start first, and random ones over decades after it."
+        )
+    plain = [
+        name
+        for name, own in by_method.items()
+        if name not in PROFILED and all(map(_holds_as_well, own, ours))
     ]
+    if plain:
+        lessons.append(
+            "Limits of the covariance hold about as often as profile likelihoods do "
+            f"({', '.join(plain)}), and cost next to nothing. To be learnt: where the trace tells "
+            "as much as here they are a first answer."
+        )
+    return ["", *"\n\n".join(lessons).splitlines()] if lessons else []
+
+
+def _holds_as_well(row: Row, ours: Row) -> bool:
+    """Whether limits are about as near to what they promise as ours, of as many best fits."""
+    theirs, own = _limits_share(row), _limits_share(ours)
+    if theirs is None or own is None or row["reached"] < ours["reached"]:
+        return False
+    return abs(theirs - CONFIDENCE) <= abs(own - CONFIDENCE) + _COVERAGE
 
 
 def _failures(rows: Sequence[Row]) -> str:
