@@ -7,6 +7,10 @@ READY := .venv/.installed
 # The libraries that benchmarks compare with stay out of the study's environment.
 BENCH_BIN := .venv-bench/bin
 BENCH_READY := .venv-bench/.installed
+# So does what the field uses: RheoJAX asks for a newer Python and other libraries.
+FIELD_PYTHON ?= python3.12
+FIELD_BIN := .venv-field/bin
+FIELD_READY := .venv-field/.installed
 # So does what builds the site, which reads the code and does not run it.
 SITE_BIN := .venv-site/bin
 SITE_READY := .venv-site/.installed
@@ -19,7 +23,7 @@ LOCK := uv pip compile --universal --fork-strategy fewest --python-version 3.11 
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench report docs site pinned lock clean
+.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -80,6 +84,9 @@ bench: $(BENCH_READY)
 	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
 	$(BENCH_BIN)/python -m benchmarks
 
+bench-field: $(FIELD_READY)
+	PYTHONPATH=src $(FIELD_BIN)/python -m benchmarks.field
+
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
 
@@ -102,12 +109,14 @@ lock:
 	  $(LOCK) pyproject.toml --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
 	    $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock) || exit 1; \
 	done
+	$(subst 3.11,3.12,$(LOCK)) pyproject.toml benchmarks/field/requirements.in \
+	  --output-file benchmarks/field/requirements.lock
 	$(LOCK) --group docs --output-file docs/requirements.lock
 
 # Of the results only what the study wrote.
 clean:
 	test ! -x $(BIN)/biogrip || $(BIN)/biogrip clean
-	rm -rf .venv .venv-bench .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
+	rm -rf .venv .venv-bench .venv-field .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
 
 $(READY): requirements.lock pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -120,6 +129,11 @@ $(BENCH_READY): requirements.lock benchmarks/requirements.lock pyproject.toml
 	$(BENCH_BIN)/python -m pip install --quiet --require-hashes -r requirements.lock -r benchmarks/requirements.lock
 	$(BENCH_BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	touch $(BENCH_READY)
+
+$(FIELD_READY): benchmarks/field/requirements.lock
+	test -x $(FIELD_BIN)/python || $(FIELD_PYTHON) -m venv .venv-field
+	$(FIELD_BIN)/python -m pip install --quiet --require-hashes -r benchmarks/field/requirements.lock
+	touch $(FIELD_READY)
 
 $(SITE_READY): docs/requirements.lock
 	test -x $(SITE_BIN)/python || $(PYTHON) -m venv .venv-site

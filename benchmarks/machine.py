@@ -2,6 +2,7 @@
 
 import platform
 import re
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ import psutil
 PEERS = ("deap", "lmfit", "pygad", "pymoo", "pypesto")
 
 
-def machine() -> dict[str, str]:
+def machine(peers: Sequence[str] = PEERS) -> dict[str, str]:
     """Describe processor, memory and the libraries that decide the speed."""
     build: dict[str, Any] = np.show_config(mode="dicts")  # type: ignore[assignment]
     blas = build["Build Dependencies"]["blas"]
@@ -24,7 +25,7 @@ def machine() -> dict[str, str]:
         "Python": platform.python_version(),
         "numpy": np.__version__,
         "BLAS": f"{blas['name']} {blas['version']}, one thread",
-        **{name: version(name) for name in ("scipy", *PEERS)},
+        **{name: version(name) for name in ("scipy", *peers)},
     }
 
 

@@ -1,0 +1,1 @@
+"""Samples under force control, identified by what the field uses."""
