@@ -90,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     _identify_parser(commands)
+    _groups_parser(commands)
 
     text = "make something of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
@@ -139,23 +140,39 @@ def _identify_parser(stages: Any) -> None:
     identify = stages.add_parser("identify", help=text, description=text)
     identify.set_defaults(command=_identify)
     identify.add_argument("trace", type=Path, help="CSV file with a header")
-    identify.add_argument("--time", default="time_s", help="column of times [%(default)s]")
-    identify.add_argument(
+    _trace_options(identify)
+    identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
+
+
+def _groups_parser(stages: Any) -> None:
+    text = "identify the cells of several groups in recorded traces, and compare the groups"
+    groups = stages.add_parser("groups", help=text, description=text)
+    groups.set_defaults(command=_groups)
+    groups.add_argument(
+        "table", type=Path, help="CSV file with the columns file, cell and group, a line a trace"
+    )
+    _trace_options(groups)
+    groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
+
+
+def _trace_options(command: argparse.ArgumentParser) -> None:
+    """Add what tells how recorded traces are to be read and identified."""
+    command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
+    command.add_argument(
         "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
     )
-    identify.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
-    identify.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
-    identify.add_argument(
+    command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
+    command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
     )
-    identify.add_argument(
+    command.add_argument(
         "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
     )
-    identify.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
-    identify.add_argument("--offset", action="store_true", help="fit an offset along")
-    identify.add_argument("--drift", action="store_true", help="fit a linear drift along")
-    identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
-    identify.add_argument(
+    command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
+    command.add_argument("--offset", action="store_true", help="fit an offset along")
+    command.add_argument("--drift", action="store_true", help="fit a linear drift along")
+    command.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
     )
 
@@ -181,6 +198,32 @@ def _identify(options: argparse.Namespace) -> None:
     output = options.output or options.trace.with_suffix(".identified.json")
     refuse_inputs([output], [options.trace, *([options.config] if options.config else [])])
     check_output(output, force=options.force)
+    wanted = Wanted(options.trace, options.model, _measurement(options), options.config)
+    found = identify_trace(wanted, output)
+    print(in_words(found))
+    print(f"Written to {output}.")
+
+
+def _groups(options: argparse.Namespace) -> None:
+    from biogrip.groups.membership import read_cells
+    from biogrip.many_cells import compare_groups, in_words
+    from biogrip.one_trace import Wanted, check_output, check_trace_file
+
+    check_trace_file(options.table, "TABLE")
+    cells = read_cells(options.table)
+    output = options.output or options.table.with_suffix(".compared.json")
+    traces = [trace for cell in cells for trace in cell.traces]
+    refuse_inputs([output], [options.table, *traces, *([options.config] if options.config else [])])
+    check_output(output, force=options.force)
+    wanted = Wanted(options.table, options.model, _measurement(options), options.config)
+    found = compare_groups(wanted, cells, output)
+    print(in_words(found))
+    print(f"Written to {output}.")
+    options.status = int(bool(found["skipped"]))
+
+
+def _measurement(options: argparse.Namespace) -> dict[str, Any]:
+    """Keys of the config's ``measurement`` block that were given as options."""
     measurement = {
         "time": options.time,
         "rotation": options.rotation,
@@ -190,10 +233,7 @@ def _identify(options: argparse.Namespace) -> None:
         "offset": options.offset,
         "drift": options.drift,
     }
-    given = {key: value for key, value in measurement.items() if value is not None}
-    found = identify_trace(Wanted(options.trace, options.model, given, options.config), output)
-    print(in_words(found))
-    print(f"Written to {output}.")
+    return {key: value for key, value in measurement.items() if value is not None}
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -42,7 +42,7 @@ _OPTIONS = {
 }
 """By key of the ``measurement`` block, what gives it on the command line."""
 
-_WRITTEN_BY = "written_by_biogrip"
+WRITTEN_BY = "written_by_biogrip"
 """Tells our files from others, which are not replaced."""
 
 
@@ -104,7 +104,7 @@ def check_output(output: Path, *, force: bool) -> None:
 
 def _is_ours(output: Path) -> bool:
     try:
-        return not output.is_symlink() and _WRITTEN_BY in json.loads(output.read_bytes())
+        return not output.is_symlink() and WRITTEN_BY in json.loads(output.read_bytes())
     except (OSError, ValueError, TypeError, RecursionError):
         return False
 
@@ -124,7 +124,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     BiogripError
         With file, line and column or key, if trace or config cannot be used.
     """
-    study = _study(wanted)
+    study = study_of(wanted)
     (case,) = study.cases.values()
     progress = Progress(str(wanted.trace), 3)
     recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
@@ -142,7 +142,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
     )
     data = {
-        _WRITTEN_BY: __version__,
+        WRITTEN_BY: __version__,
         "trace": str(wanted.trace),
         "model": posed.model.name,
         "model_title": posed.model.title,
@@ -154,8 +154,15 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     return data
 
 
-def check_trace_file(trace: Path) -> None:
+def check_trace_file(trace: Path, name: str = "TRACE") -> None:
     """Refuse a path that leads to no file.
+
+    Parameters
+    ----------
+    trace
+        The path.
+    name
+        Of the argument that it was given as.
 
     Raises
     ------
@@ -163,7 +170,7 @@ def check_trace_file(trace: Path) -> None:
         With the file beside it that has the nearest name.
     """
     if problem := trace_file_problem(trace):
-        raise BiogripError(f"TRACE: {problem}")
+        raise BiogripError(f"{name}: {problem}")
 
 
 def in_words(found: dict[str, Any]) -> str:
@@ -187,7 +194,14 @@ def in_words(found: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _study(wanted: Wanted) -> Study:
+def study_of(wanted: Wanted) -> Study:
+    """Return a study whose only case is the recorded trace.
+
+    Raises
+    ------
+    BiogripError
+        If there is no such file, or an option or the config cannot be used.
+    """
     check_trace_file(wanted.trace)
     for key, value in wanted.measurement.items():
         if problem := value_problem(("measurement", key), value):

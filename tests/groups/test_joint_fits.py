@@ -156,17 +156,16 @@ def test_the_order_of_traces_does_not_matter(uneven: list[Problem], told: JointF
     assert other.agreement == pytest.approx(told.agreement, rel=1e-4)
 
 
-def test_a_noisy_trace_adds_little_and_takes_nothing(
-    uneven: list[Problem], told: JointFit
-) -> None:
+def test_a_noisy_trace_adds_little_and_takes_nothing(uneven: list[Problem], told: JointFit) -> None:
     best_alone = fitted(uneven[:1]).diagnosis.findings[1].deviation
     together = told.diagnosis.findings[1].deviation
     assert 0.9 * best_alone < together < best_alone
 
 
 def test_traces_of_different_samples_are_told() -> None:
-    same, other = fitted(traces([0.05, 0.05], [401, 401])), fitted(
-        traces([0.05, 0.05], [401, 401], [1.0, 1.1])
+    same, other = (
+        fitted(traces([0.05, 0.05], [401, 401])),
+        fitted(traces([0.05, 0.05], [401, 401], [1.0, 1.1])),
     )
     assert same.agreement is not None
     assert same.agreement > 1e-3

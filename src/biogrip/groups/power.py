@@ -10,7 +10,7 @@ References
    chapter 2.
 """
 
-from math import ceil, exp, hypot, log
+from math import exp, hypot, log
 
 
 def power(ratio: float, cells: int, spread: float, error: float, confidence: float = 0.95) -> float:
