@@ -123,6 +123,7 @@ def in_words(found: dict[str, Any]) -> str:
     parts = [f"{found['table']}: {found['model_title']}, {percent} limits"]
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
+    parts += _left_out_in_words(found["groups"])
     if found["differences"]:
         parts.append(_differences_in_words(found["differences"], percent))
     elif len({row["group"] for row in found["groups"]}) > 1:
@@ -264,6 +265,17 @@ def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
     return _table(table, header)
 
 
+def _left_out_in_words(rows: list[dict[str, Any]]) -> list[str]:
+    """Name the cells of which a group's median says nothing, where it says something of others."""
+    words = [
+        f"{row['quantity']} in {row['group']} is of the cells that determine it, without "
+        f"{', '.join(row['not_determined'])}."
+        for row in rows
+        if row["not_determined"] and "median" in row
+    ]
+    return ["\n".join(words)] if words else []
+
+
 def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
     table = []
     for row in rows:
@@ -285,7 +297,7 @@ def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
         )
     header = [
         *("quantity", "groups", "ratio of medians", f"{percent} interval", "p", "adjusted p"),
-        *("by ranks", f"seen with {100 * USUAL_POWER:g} %"),
+        *("by ranks", f"ratio found in {100 * USUAL_POWER:g} %"),
     ]
     return _table(table, header)
 

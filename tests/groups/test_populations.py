@@ -10,7 +10,6 @@ from biogrip.groups.population import Estimates, Population, population_of
 from biogrip.groups.power import cells_needed, power, ratio_seen
 from biogrip.groups.shift import shift
 
-# Twelve trials of a treatment, log odds ratios and variances, see `test_published_figures`.
 RNG = np.random.default_rng(20)
 
 
@@ -155,10 +154,12 @@ def test_power_is_the_noncentral_t() -> None:
     [(0.3, 0.01, 8), (0.3, 0.2, 8), (0.0, 0.2, 8), (0.1, 0.3, 5)],
 )
 def test_differences_and_spreads_hold_the_truth(spread: float, error: float, cells: int) -> None:
-    """Of 1000 pairs, with errors that differ from cell to cell about as those of traces do.
+    """Of 1000 pairs, with errors that differ from cell to cell by a factor of two.
 
-    Three standard deviations of a count are 2.1 %. Above that, intervals may be wider than they
-    need be: the limit of the spread at zero is one.
+    Three standard deviations of a count are 2.1 % of 95, and 4.7 % of any. Without a spread its
+    lower limit is zero for all but 2.5 %, and it is held more often. What a cell's own error is
+    of its difference from the others is estimated as well, which shrunk cells take no account of:
+    where both are of one size, their intervals hold the truth in some 92 %.
     """
     rng = np.random.default_rng([int(100 * spread), int(100 * error), cells])
     ratio, pairs = np.log(1.5), 1000
@@ -176,16 +177,7 @@ def test_differences_and_spreads_hold_the_truth(spread: float, error: float, cel
         away = np.abs(found[0].shrunk - truths[0])
         shrunk += int(np.sum(away <= found[0].reach * found[0].shrunk_deviations))
     expected = power(1.5, cells, spread, error * np.sqrt(np.mean(np.square([0.7, 1.0, 1.4]))))
-    print(
-        spread,
-        error,
-        cells,
-        held / pairs,
-        seen / pairs,
-        expected,
-        spreads / pairs,
-        shrunk / pairs / cells,
-    )
-    assert 0.929 <= held / pairs <= 0.98
+    assert 0.929 <= held / pairs <= 0.971
     assert spreads / pairs >= 0.929
+    assert shrunk / (pairs * cells) >= 0.9
     assert seen / pairs == pytest.approx(expected, abs=0.06)

@@ -1,6 +1,7 @@
 """Which trace is of which cell, and which cell of which group: a table of the user's, CSV."""
 
 import csv
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,6 +69,8 @@ def read_cells(table: Path) -> list[Cell]:
         raise BiogripError(f"{table}: found bytes that are no UTF-8, allowed is text.") from error
     except OSError as error:
         raise BiogripError(f"{table}: cannot be read: {error.strerror}.") from error
+    if "\0" in text:
+        raise BiogripError(f"{table}: found binary data, allowed is text.")
     rows = list(_rows(table, text))
     if not rows:
         raise BiogripError(f"{table}: found no traces, allowed is a row for each below the header.")
@@ -133,9 +136,10 @@ def _index(table: Path, line: int, names: list[str], column: str) -> int:
 
 def _refuse_repeated(table: Path, rows: list[_Row]) -> None:
     """A trace counted twice would pass for two that agree."""
-    first: dict[Path, int] = {}
+    first: dict[str, int] = {}
     for row in rows:
-        if (before := first.setdefault(row.file, row.line)) != row.line:
+        # Whatever way leads to it.
+        if (before := first.setdefault(os.path.realpath(row.file), row.line)) != row.line:
             raise BiogripError(
                 f"{place(table, row.line, 'file')}: found '{row.file}' again, as on line {before}; "
                 "allowed is each trace once."
