@@ -16,12 +16,14 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.groups.comparison import difference
+from biogrip.groups.dishes import log_deviation
 from biogrip.groups.population import FEWEST_CELLS, Estimates, population_of
 from biogrip.groups.power import power
 from biogrip.groups.shift import shift
 from biogrip.identifiability.many_profiles import profiles_of_many
 from biogrip.identifiability.profile import MISSED, Likelihood, Profile, likelihood_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.problem import condensed_of, problem_of
 from biogrip.products.stages.full_judgements import refitted
 from biogrip.response.linear import rotation, step_response
@@ -122,7 +124,7 @@ def _dish(
             truth.append(quantity.log(x))
             names.append(f"cell {cell}")
             values.append(profile.best)
-            deviations.append((profile.high - profile.low) / (2 * np.sqrt(likelihood.threshold)))
+            deviations.append(log_deviation(Finding(quantity, profile, 0.0), likelihood))
     return Dish(np.array(truth), Estimates(tuple(names), np.array(values), np.array(deviations)))
 
 
