@@ -37,7 +37,7 @@ class JointResiduals(Residuals):
         self._parts = tuple(parts)
         self.samples = sum(part.samples for part in parts)
         self.duration_s = max(part.duration_s for part in parts)
-        self.nonlinear = parts[0].nonlinear
+        self.model, self.nonlinear = parts[0].model, parts[0].nonlinear
         counted = zip(parts, noise_rad, strict=True)
         whole = sqrt(self.samples / fsum(part.samples / own**2 for part, own in counted))
         self.weights = np.array([whole / own for own in noise_rad])
