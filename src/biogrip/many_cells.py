@@ -101,7 +101,9 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         raise BiogripError(
             f"{wanted.trace}: none of its traces can be used; the first: {skipped[0]['reason']}"
         )
-    findings = findings_of_groups(judged, confidence)
+    # The first in the table is compared with, whichever of its traces can be used.
+    groups = list(dict.fromkeys(cell.group for cell in cells))
+    findings = findings_of_groups(judged, groups, confidence)
     found = {
         WRITTEN_BY: __version__,
         "table": str(wanted.trace),

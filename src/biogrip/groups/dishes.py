@@ -12,6 +12,7 @@ from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, popul
 from biogrip.groups.power import ratio_seen
 from biogrip.groups.shift import Shift, shift
 from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import DETERMINED, Finding
 
 USUAL_POWER = 0.8
@@ -78,22 +79,25 @@ class GroupDifference:
     ratio_seen: float
 
 
-def findings_of_groups(cells: Sequence[JudgedCell], confidence: float) -> list[GroupFinding]:
-    """Judge every quantity in every group, groups in the order in which they first appear.
+def findings_of_groups(
+    cells: Sequence[JudgedCell], groups: Sequence[str], confidence: float
+) -> list[GroupFinding]:
+    """Judge every quantity in every group.
 
     Parameters
     ----------
     cells
-        Of the same model.
+        Of the same model, at least one.
+    groups
+        Names, in the order of what is returned; a group may have no cells.
     confidence
         Of the intervals, e.g. 0.95.
     """
-    groups = dict.fromkeys(cell.group for cell in cells)
-    places = range(len(cells[0].fit.diagnosis.findings)) if cells else ()
+    quantities = [finding.quantity for finding in cells[0].fit.diagnosis.findings]
     return [
-        _finding([cell for cell in cells if cell.group == group], index, confidence)
+        _finding(group, quantity, index, [c for c in cells if c.group == group], confidence)
         for group in groups
-        for index in places
+        for index, quantity in enumerate(quantities)
     ]
 
 
@@ -135,7 +139,9 @@ def log_deviation(finding: Finding, likelihood: Likelihood) -> float:
     return (high - low) / (2 * sqrt(likelihood.threshold))
 
 
-def _finding(cells: Sequence[JudgedCell], index: int, confidence: float) -> GroupFinding:
+def _finding(
+    group: str, quantity: Quantity, index: int, cells: Sequence[JudgedCell], confidence: float
+) -> GroupFinding:
     told = [(cell.name, cell.fit.diagnosis) for cell in cells]
     known = [
         (
@@ -152,9 +158,8 @@ def _finding(cells: Sequence[JudgedCell], index: int, confidence: float) -> Grou
         np.array([value for _, value, _ in known]),
         np.array([error for _, _, error in known]),
     )
-    quantity = told[0][1].findings[index].quantity
     return GroupFinding(
-        cells[0].group,
+        group,
         quantity.label,
         quantity.unit,
         estimates,
