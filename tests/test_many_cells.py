@@ -129,7 +129,12 @@ def test_bad_traces_are_left_out_and_told(
     shutil.copytree(dishes, tmp_path / "d")
     header, *rows = table_of(dishes)
     (tmp_path / "d" / "bad.csv").write_text("time_s,rotation_rad\n0,0\n1,high\n")
-    extra = [["bad.csv", "control 0", "control"], ["treated_0_O.csv", "lost", "treated"]]
+    shutil.copy(tmp_path / "d" / rows[0][0], tmp_path / "d" / "copy.csv")
+    extra = [
+        ["bad.csv", "control 0", "control"],
+        ["treated_0_O.csv", "lost", "treated"],
+        ["copy.csv", "new", "treated"],
+    ]
     write_table(tmp_path / "d" / "groups.csv", [header, *rows[:2], *extra])
     assert groups(tmp_path / "d" / "groups.csv") == 1
     said = capsys.readouterr().out
@@ -137,7 +142,9 @@ def test_bad_traces_are_left_out_and_told(
     assert "treated_0_O.csv', allowed is a file that exists. Did you mean" in said
     found = json.loads((tmp_path / "d" / "groups.compared.json").read_text())
     assert [cell["cell"] for cell in found["cells"]] == ["control 0"]
-    assert [Path(each["trace"]).name for each in found["skipped"]] == ["bad.csv", "treated_0_O.csv"]
+    assert "copy.csv: found the very rotations of " in said
+    left_out = [Path(each["trace"]).name for each in found["skipped"]]
+    assert left_out == ["bad.csv", "treated_0_O.csv", "copy.csv"]
     assert found["differences"] == []
 
 

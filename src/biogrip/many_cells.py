@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 from math import exp
 from pathlib import Path
 from typing import Any
@@ -71,10 +72,10 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
     progress = Progress(str(wanted.trace), len(cells))
     judged: list[JudgedCell] = []
     data: list[dict[str, Any]] = []
-    skipped: list[dict[str, str]] = []
+    traces = _Traces(wanted)
     for cell in cells:
         progress.doing(f"cell {cell.name}")
-        usable = _posed(wanted, cell, skipped)
+        usable = traces.of(cell)
         if usable:
             fit = fitted_jointly(
                 [each.problem for each in usable],
@@ -99,7 +100,8 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         progress.done()
     if not judged:
         raise BiogripError(
-            f"{wanted.trace}: none of its traces can be used; the first: {skipped[0]['reason']}"
+            f"{wanted.trace}: none of its traces can be used; the first: "
+            f"{traces.skipped[0]['reason']}"
         )
     # The first in the table is compared with, whichever of its traces can be used.
     groups = list(dict.fromkeys(cell.group for cell in cells))
@@ -113,7 +115,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
-        "skipped": skipped,
+        "skipped": traces.skipped,
     }
     write_text(output, json.dumps(found, indent=1) + "\n")
     return found
@@ -137,22 +139,38 @@ def in_words(found: dict[str, Any]) -> str:
     return "\n\n".join(parts)
 
 
-def _posed(wanted: Wanted, cell: Cell, skipped: list[dict[str, str]]) -> list[_Posed]:
-    """Read the traces of a cell, and note those that cannot be used."""
-    posed = []
-    for trace in cell.traces:
-        try:
-            study = study_of(replace(wanted, trace=trace))
-            (case,) = study.cases.values()
-            recorded = recording.read_checked(recording.settings_of(case), trace)
-        except BiogripError as error:
-            # Of a file that is not there, the message names the config's key.
-            reason = str(error) if str(trace) in str(error) else f"{trace}: {error}"
-            skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
-            continue
-        problem = case.problem.of(recorded.time_s, recorded.rotation_rad[0])
-        posed.append(_Posed(trace, problem, judgement.settings_of(study, case)))
-    return posed
+class _Traces:
+    """Reads traces, and notes those that cannot be used."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.skipped: list[dict[str, str]] = []
+        self._wanted = wanted
+        self._read: dict[bytes, Path] = {}
+
+    def of(self, cell: Cell) -> list[_Posed]:
+        """Pose the problems of a cell's traces."""
+        posed = []
+        for trace in cell.traces:
+            try:
+                posed.append(self._posed(trace))
+            except BiogripError as error:
+                reason = str(error) if str(trace) in str(error) else f"{trace}: {error}"
+                self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
+        return posed
+
+    def _posed(self, trace: Path) -> _Posed:
+        study = study_of(replace(self._wanted, trace=trace))
+        (case,) = study.cases.values()
+        recorded = recording.read_checked(recording.settings_of(case), trace)
+        rotation_rad = recorded.rotation_rad[0]
+        # Noise is never the same twice; copies would pass for cells that agree to the last digit.
+        same = sha256(rotation_rad.tobytes()).digest()
+        if (before := self._read.setdefault(same, trace)) != trace:
+            raise BiogripError(
+                f"{trace}: found the very rotations of {before}, allowed is each trace once."
+            )
+        problem = case.problem.of(recorded.time_s, rotation_rad)
+        return _Posed(trace, problem, judgement.settings_of(study, case))
 
 
 def _identify(
