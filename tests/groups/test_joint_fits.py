@@ -13,9 +13,9 @@ from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.profile import limits_near
 from biogrip.identify.answer import Identification
 from biogrip.identify.many_fits import ManyFits
-from biogrip.identify.problem import Problem
+from biogrip.identify.problem import Problem, problem_of
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, posed_for, run
+from tests.helpers.problems import GRIPPER, MODEL, RANGES, SAMPLES, TORQUE, posed_for, run
 
 CELL = "endothelial_cell"
 
@@ -185,3 +185,31 @@ def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> N
     assert joint.residuals.condensed_misfit(np.exp(x))[0] == pytest.approx(misfit, rel=1e-9)
     normal = ManyFits([joint]).normal(x, np.array([0]))
     assert normal.misfit_rad[0] == pytest.approx(misfit, rel=1e-9)
+
+
+def test_what_each_instrument_added_is_its_own() -> None:
+    """Offsets that differ from trace to trace, fitted along, change neither fit nor limits.
+
+    And the nonlinear model's rows stand for its samples as the linear ones do.
+    """
+    (plain,) = traces([0.1], [201])
+    times = np.linspace(0, 400, 201)
+    truth = np.log([[SAMPLES[CELL][name] for name in MODEL.names]])
+    clean = rotation(step_response(GRIPPER, MODEL.network(np.exp(truth))), TORQUE, times)[0]
+    measured = [clean + added for added in (1e-5, -3e-5)]
+    shifted = [
+        problem_of(GRIPPER, MODEL, TORQUE, times, trace, RANGES, offset=True, nonlinear=True)
+        for trace in measured
+    ]
+    joint = joint_problem(shifted, [1e-6, 3e-6])
+    residual, slopes = joint.residuals(truth[0])
+    rows, condensed = joint.residuals.condensed(truth[0])
+    assert joint.residuals.free == 2 * (plain.residuals.free - 1)
+    assert rows @ rows == pytest.approx(residual @ residual, rel=1e-5)
+    assert condensed @ condensed.T == pytest.approx(slopes @ slopes.T, rel=1e-4)
+    # What is left is what the linear model leaves out, the same for both.
+    halves = (
+        residual[:201] / joint.residuals.weights[0],
+        residual[201:] / joint.residuals.weights[1],
+    )
+    assert halves[0] == pytest.approx(halves[1], abs=1e-15)
