@@ -48,8 +48,15 @@ def test_published_differences_hold_the_truth(published: pd.DataFrame) -> None:
 
 
 def test_published_power_is_that_designed(published: pd.DataFrame) -> None:
-    """Three standard deviations of a share of 500, and what Welch's t differs from a pooled one."""
+    """Three standard deviations of a share of 500, and what Welch's t differs from a pooled one.
+
+    Where errors come near the spread they differ from cell to cell, and the design, which takes
+    them as all the same, must not promise too much.
+    """
     share = published["designed_power_percent"] / 100
     allowed = 3 * 100 * np.sqrt(share * (1 - share) / published["pairs"]) + 1
     apart = published["power_percent"] - published["designed_power_percent"]
-    assert (apart.abs() <= allowed).all()
+    assert (apart >= -allowed).all()
+    small = published["error"] < published["spread"] / 2
+    assert small.sum() == 5
+    assert (apart[small] <= allowed[small]).all()

@@ -8,7 +8,7 @@ from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
 from biogrip.groups.joint_fit import JointFit, fitted_jointly
-from biogrip.groups.replicates import joint_problem
+from biogrip.groups.replicates import JointResiduals, joint_problem
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.profile import limits_near
 from biogrip.identify.answer import Identification
@@ -202,6 +202,7 @@ def test_what_each_instrument_added_is_its_own() -> None:
         for trace in measured
     ]
     joint = joint_problem(shifted, [1e-6, 3e-6])
+    assert isinstance(joint.residuals, JointResiduals)
     residual, slopes = joint.residuals(truth[0])
     rows, condensed = joint.residuals.condensed(truth[0])
     assert joint.residuals.free == 2 * (plain.residuals.free - 1)

@@ -144,7 +144,7 @@ def test_power_is_the_noncentral_t() -> None:
         assert power(1 / 1.4, cells, 0.3, 0.1) == pytest.approx(expected, rel=1e-6)
     enough = cells_needed(1.4, 0.8, 0.3, 0.1)
     assert power(1.4, enough - 1, 0.3, 0.1) < 0.8 <= power(1.4, enough, 0.3, 0.1)
-    assert cells_needed(100.0, 0.8, 0.1, 0.0) == 2
+    assert cells_needed(100.0, 0.8, 0.1, 0.0) == 3
     seen = ratio_seen(12, 0.8, 0.3, 0.1)
     assert power(seen, 12, 0.3, 0.1) == pytest.approx(0.8, abs=1e-6)
 

@@ -169,8 +169,7 @@ def _finding(
 
 
 def _ratio_seen(one: Population, other: Population) -> float:
-    spread = sqrt((one.spread**2 + other.spread**2) / 2)
-    errors = np.concatenate((one.estimates.deviations, other.estimates.deviations))
     fewer = 1 + min(one.freedom, other.freedom)
-    error = float(np.sqrt(np.mean(errors**2)))
-    return ratio_seen(fewer, USUAL_POWER, spread, error, one.confidence)
+    # Spread and errors together; of these, a cell that is badly known counts less.
+    variances = [(1 + each.freedom) * each.deviation**2 for each in (one, other)]
+    return ratio_seen(fewer, USUAL_POWER, sqrt(sum(variances) / 2), 0.0, one.confidence)

@@ -2,7 +2,9 @@
 
 Of n cells a dish that scatter by the spread tau, each estimated with the error s, the logarithm
 of the ratio of medians has the variance 2 (tau^2 + s^2)/n, and t is distributed with 2 (n - 1)
-degrees of freedom about ln(ratio) in units of its root: the noncentral t.
+degrees of freedom about ln(ratio) in units of its root: the noncentral t. Where errors differ
+from cell to cell, badly known cells count less, and the power is more than with their root mean
+square.
 
 References
 ----------
@@ -11,6 +13,8 @@ References
 """
 
 from math import exp, hypot, log
+
+from biogrip.groups.population import FEWEST_CELLS
 
 
 def power(ratio: float, cells: int, spread: float, error: float, confidence: float = 0.95) -> float:
@@ -40,6 +44,8 @@ def cells_needed(
 ) -> int:
     """Cells that each dish must have for a difference to be found with a probability.
 
+    Fewer than are compared at all it never is.
+
     Parameters
     ----------
     ratio, spread, error, confidence
@@ -47,12 +53,12 @@ def cells_needed(
     wanted
         The probability, e.g. 0.8.
     """
-    most = 2
+    most = FEWEST_CELLS
     while power(ratio, most, spread, error, confidence) < wanted:
         most *= 2
     return next(
         cells
-        for cells in range(max(2, most // 2), most + 1)
+        for cells in range(max(FEWEST_CELLS, most // 2), most + 1)
         if power(ratio, cells, spread, error, confidence) >= wanted
     )
 
