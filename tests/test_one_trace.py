@@ -2,17 +2,21 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.own_traces.words import side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
@@ -293,3 +297,109 @@ def test_nobody_reading_on_is_no_error(tmp_path: Path) -> None:
     os.close(writer)
     assert done.returncode == 128 + signal.SIGPIPE
     assert done.stderr == ""
+
+
+def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path) -> None:
+    """The bad are skipped, listed with their reasons, and make the status 1."""
+    good = [shutil.copy(EXAMPLE, tmp_path / name) for name in ("a.csv", "b.csv")]
+    bad = tmp_path / "bad.csv"
+    bad.write_text(EXAMPLE.read_text().replace(",", ";", 5))
+    page, table = tmp_path / "out.html", tmp_path / "out.csv"
+    missing = tmp_path / "c.csv"
+    done = identify(*good, bad, missing, "--report", page, "--csv", table)
+    assert done.returncode == 1, done.stderr
+    assert "Traceback" not in done.stderr
+    rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
+    assert list(rows.index) == [*map(str, good), str(bad), str(missing)]
+    assert list(rows["problem"] != "") == [False, False, True, True]
+    told = json.loads((tmp_path / "a.identified.json").read_text())
+    assert rows.loc[str(good[0]), "k value"] == str(told["quantities"][0]["value"])
+    # The same trace under another name is the same trace.
+    assert list(rows.loc[str(good[0])])[4:-4] == list(rows.loc[str(good[1])])[4:-4]
+    for text in (done.stdout, page.read_text()):
+        assert "Not identified" in text
+        assert "bad.csv, line" in text
+        assert "found &#39;" in text or "found '" in text
+    assert page.read_text().count("<img") == 6
+    assert "http" not in page.read_text()
+    again = identify(*good, "--report", page, "--csv", table)
+    assert again.returncode == 0, again.stderr
+
+
+def test_what_is_said_is_enough_to_repeat_it(tmp_path: Path) -> None:
+    """The assumed blocks, laid over the default study as a config, change nothing."""
+    first, second = tmp_path / "first.json", tmp_path / "second.json"
+    assert main(["identify", str(EXAMPLE), "--output", str(first)]) == 0
+    told = json.loads(first.read_text())
+    assert set(told["versions"]) == {"biogrip", "numpy", "scipy"}
+    kept = {name: told["assumed"][name] for name in ("gripper", "protocol", "search_range")}
+    config = tmp_path / "again.yaml"
+    config.write_text(yaml.safe_dump(kept))
+    arguments = ["identify", str(EXAMPLE), "--config", str(config), "--output", str(second)]
+    assert main(arguments) == 0
+    again = json.loads(second.read_text())
+    assert (told["by_default"], again["by_default"]) == (["gripper", "protocol"], [])
+    assert again["quantities"] == told["quantities"]
+
+
+def test_the_chosen_model_is_held_against_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The example is of a drop with a membrane; its parallel damper does not show."""
+    assert main(["identify", str(EXAMPLE), "--output", str(tmp_path / "a.json")]) == 0
+    assert "model is richer than the trace asks for: Maxwell liquid drop" in capsys.readouterr().out
+    for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
+        output = tmp_path / f"{model}.json"
+        assert main(["identify", str(EXAMPLE), "--model", model, "--output", str(output)]) == 0
+        assert said in capsys.readouterr().out
+        assert "generalized_maxwell_3" in [
+            row["model"] for row in json.loads(output.read_text())["models"]
+        ]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (["--output", "x.json"], "--output: is of one trace"),
+        (["--report", "no/such/out.html"], "cannot be written"),
+        (["--report", "theirs.html"], "biogrip did not write it"),
+        (["--report", "x.html", "--csv", "x.html"], "to be written twice"),
+        (["--config", "bad.yaml"], "bad.yaml, line 1: seedz: unknown key"),
+        (["--model", "generalized_maxwell_99"], "--model: found 'generalized_maxwell_99'"),
+    ],
+)
+def test_what_is_wrong_with_all_traces_is_said_once_and_at_once(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    given: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("a.csv", "b.csv"):
+        shutil.copy(EXAMPLE, name)
+    Path("theirs.html").write_text("<p>mine</p>")
+    Path("bad.yaml").write_text("seedz: 3")
+    assert main(["identify", "a.csv", "b.csv", *given]) == 1
+    told = capsys.readouterr().err
+    assert said in told
+    assert told.count("biogrip:") == 1
+    assert not Path("a.identified.json").exists()
+
+
+def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
+    quantity: dict[str, Any] = {
+        "quantity": "k",
+        "unit": "N/m",
+        "verdict": "determined",
+        "provided": None,
+    }
+    quantity |= {"value": 2.0, "low": 1.0, "high": 3.0, "in_words": "determined: 2"}
+    found: dict[str, Any] = {"trace": "a", "quantities": [quantity], "confidence": 0.9}
+    found |= {"by_default": [], "notes": []}
+    assert "\x1b" not in side_by_side([found], {})
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    monkeypatch.delenv("NO_COLOR", raising=False)
+    assert "\x1b[32m2 (1 to 3)\x1b[0m" in side_by_side([found], {})
+    monkeypatch.setenv("NO_COLOR", "1")
+    assert "\x1b" not in side_by_side([found], {})

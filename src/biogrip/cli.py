@@ -12,7 +12,7 @@ from typing import Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
-from biogrip.files import refuse_inputs, watched
+from biogrip.files import watched
 from biogrip.running.journal import recorded_in
 
 RESULTS = Path("results")
@@ -136,12 +136,23 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _identify_parser(stages: Any) -> None:
-    text = "identify the sample in a recorded trace, without a workflow"
+    text = "identify the sample in recorded traces, without a workflow"
     identify = stages.add_parser("identify", help=text, description=text)
     identify.set_defaults(command=_identify)
-    identify.add_argument("trace", type=Path, help="CSV file with a header")
+    identify.add_argument(
+        "traces", type=Path, nargs="+", metavar="TRACE", help="CSV file with a header"
+    )
     _trace_options(identify)
-    identify.add_argument("--output", type=Path, help="JSON file [TRACE.identified.json]")
+    identify.add_argument(
+        "--report", type=Path, metavar="PAGE", help="HTML file: all of it on a page, with figures"
+    )
+    identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file: a row a trace")
+    identify.add_argument(
+        "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
+    )
+    identify.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
 
 
 def _groups_parser(stages: Any) -> None:
@@ -153,6 +164,9 @@ def _groups_parser(stages: Any) -> None:
     )
     _trace_options(groups)
     groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
+    groups.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:
@@ -172,9 +186,6 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
     command.add_argument("--offset", action="store_true", help="fit an offset along")
     command.add_argument("--drift", action="store_true", help="fit a linear drift along")
-    command.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
 
 
 def _make(options: argparse.Namespace) -> None:
@@ -186,40 +197,31 @@ def _make(options: argparse.Namespace) -> None:
 
 
 def _identify(options: argparse.Namespace) -> None:
-    from biogrip.one_trace import (
-        Wanted,
-        check_output,
-        check_trace_file,
-        identify_trace,
-        in_words,
-    )
+    from biogrip.own_traces.identify import identify
 
-    check_trace_file(options.trace)
-    output = options.output or options.trace.with_suffix(".identified.json")
-    refuse_inputs([output], [options.trace, *([options.config] if options.config else [])])
-    check_output(output, force=options.force)
-    wanted = Wanted(options.trace, options.model, _measurement(options), options.config)
-    found = identify_trace(wanted, output)
-    print(in_words(found))
-    print(f"Written to {output}.")
+    options.status = identify(
+        options.traces,
+        options.model,
+        _measurement(options),
+        options.config,
+        output=options.output,
+        report=options.report,
+        table=options.csv,
+        force=options.force,
+    )
 
 
 def _groups(options: argparse.Namespace) -> None:
-    from biogrip.groups.membership import read_cells
-    from biogrip.many_cells import compare_groups, in_words
-    from biogrip.one_trace import Wanted, check_output, check_trace_file
+    from biogrip.own_traces.many_cells import groups
 
-    check_trace_file(options.table, "TABLE")
-    cells = read_cells(options.table)
-    output = options.output or options.table.with_suffix(".compared.json")
-    traces = [trace for cell in cells for trace in cell.traces]
-    refuse_inputs([output], [options.table, *traces, *([options.config] if options.config else [])])
-    check_output(output, force=options.force)
-    wanted = Wanted(options.table, options.model, _measurement(options), options.config)
-    found = compare_groups(wanted, cells, output)
-    print(in_words(found))
-    print(f"Written to {output}.")
-    options.status = int(bool(found["skipped"]))
+    options.status = groups(
+        options.table,
+        options.model,
+        _measurement(options),
+        options.config,
+        output=options.output,
+        force=options.force,
+    )
 
 
 def _measurement(options: argparse.Namespace) -> dict[str, Any]:

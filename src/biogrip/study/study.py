@@ -320,8 +320,9 @@ class Study:
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """The protocol of cases without one of their own."""
-        return self.config.protocol.torques(self.config.actuator)
+        """The protocol of all cases if it is the same, else of those without one of their own."""
+        own = {case.phases for case in self.cases.values()}
+        return own.pop() if len(own) == 1 else self.config.protocol.torques(self.config.actuator)
 
     @property
     def ranges(self) -> dict[str, GeneRange]:

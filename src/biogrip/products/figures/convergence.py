@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import read_history, seeds_in_words
+from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.products.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
@@ -71,8 +71,9 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
         if seed == shown:
             style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}
         axes.plot(rows["generation"], excess, **style)
-    axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
-    axes.plot([], [], color=FITTED, label=f"seed {shown}, typical")
+    if len(found) > 1:
+        axes.plot([], [], color=ALL_SEEDS, linewidth=0.8, label=seeds_in_words(len(found)))
+    axes.plot([], [], color=FITTED, label=typical_in_words(found))
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     if settings.mutation_start is not None:

@@ -10,7 +10,7 @@ from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import typical
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import read_history, seeds_in_words
+from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
@@ -73,11 +73,12 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
         lowest = below if below.get_visible() and below.axison else axes
         lowest.set_xlabel(step)
         lowest.tick_params(labelbottom=True)
-    lines = [
-        grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0],
-        grid[0].plot([], [], color=FITTED)[0],
-    ]
-    labels = [seeds_in_words(len(found)), f"seed {shown}, typical"]
+    lines, labels = [], []
+    if len(found) > 1:
+        lines.append(grid[0].plot([], [], color=ALL_SEEDS, linewidth=0.8)[0])
+        labels.append(seeds_in_words(len(found)))
+    lines.append(grid[0].plot([], [], color=FITTED)[0])
+    labels.append(typical_in_words(found))
     if truth.parameters:
         lines.append(grid[0].plot([], [], color=TARGET, linestyle="--")[0])
         labels.append("target")

@@ -49,7 +49,9 @@ def draw(
     problem = settings.problem.calibrated(calibrated)
     fit = typical_fit(problem, settings.method, identifications, measurements)
     step = METHODS[settings.method].step
-    label = f"typical fit (seed {fit.seed}, {step} {fit.generations})"
+    ended = f"{step} {fit.generations}"
+    recorded = fit.target_rad is None
+    label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
     return draw_fit(fit, label, settings.title, settings.axis_rad)
 
 
@@ -60,7 +62,8 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
     style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
     traces.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **style)
-    traces.plot([], [], ".", color=MEASURED, markersize=4, label="noisy measurement")
+    kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
+    traces.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
     if fit.target_rad is not None:
         traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)

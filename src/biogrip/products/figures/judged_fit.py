@@ -9,7 +9,7 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.fit import draw_fit
 from biogrip.products.figures.results import fit_of
-from biogrip.products.files.traces import MEASUREMENTS
+from biogrip.products.files.traces import MEASUREMENTS, read_measurements
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, Reads, the
 from biogrip.products.stages.calibrated import calibration_of
@@ -46,7 +46,8 @@ def draw(settings: Settings, verdicts: Path, measurements: Path, calibrated: lis
     problem = settings.problem.calibrated(calibrated)
     found = {item["quantity"]: item["value"] for item in read_verdicts(verdicts)["quantities"]}
     values = {name: found[name] for name in problem.searched.names}
-    fit = fit_of(problem, {**problem.fixed, **values}, measurements, TRACE)
+    recorded = read_measurements(measurements, [TRACE])
+    fit = fit_of(problem, {**problem.fixed, **values}, recorded, TRACE)
     return draw_fit(fit, f"best fit ({settings.trace})", settings.title, settings.axis_rad)
 
 

@@ -1,7 +1,7 @@
 """Profile likelihoods: what chi-squared says against other values of a quantity."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import BLUE, FITTED, GREY, PAGE_IN, SHADE, TARGET, figure, panel
+from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.stages.expected import verdicts_expected
@@ -51,11 +51,17 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
     expected
         What its traces should tell, JSON, if the truth is known.
     """
-    found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
+    others = [read_verdicts(path) for path in expected]
+    return draw_profiles(settings, read_verdicts(measured), others)
+
+
+def draw_profiles(
+    settings: Settings, found: Mapping[str, Any], others: Sequence[Mapping[str, Any]] = ()
+) -> Figure:
+    """Draw profiles of verdicts that are at hand; see `draw`."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
-    drawn = figure(PAGE_IN, 2.5)
-    grid = drawn.subplots(1, len(quantities), sharey=True, squeeze=False)[0]
+    drawn, grid = row_of_panels(len(quantities), 2.5, sharey=True)
     for index, (axes, item) in enumerate(zip(grid, quantities, strict=True)):
         if item["quantity"] in foreseen:
             curve = _curve(foreseen[item["quantity"]]["profile"])

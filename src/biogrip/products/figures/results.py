@@ -13,7 +13,7 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.success import typical
 from biogrip.products.batches import parse_batch
 from biogrip.products.files.identifications import read_identifications
-from biogrip.products.files.traces import read_measurements
+from biogrip.products.files.traces import Measurements, read_measurements
 from biogrip.response.nuisance import nuisance_basis, within
 from biogrip.response.simulation import simulated_rotation
 
@@ -73,12 +73,13 @@ def typical_fit(
     shown = typical(found)
     seed = int(shown["seed"])
     values = {p.name: float(shown[p.column]) for p in problem.model.parameters}
-    fit = fit_of(problem, values, _holding(seed, measurements), seed)
+    recorded = read_measurements(_holding(seed, measurements), [seed])
+    fit = fit_of(problem, values, recorded, seed)
     return TypicalFit(**vars(fit), seed=seed, generations=int(shown["generations"]))
 
 
 def fit_of(
-    problem: CaseProblem, parameters: Mapping[str, float], measurements: Path, seed: int
+    problem: CaseProblem, parameters: Mapping[str, float], recorded: Measurements, seed: int
 ) -> Fit:
     """Simulate a sample beside a trace that it is to fit.
 
@@ -88,12 +89,11 @@ def fit_of(
         What the identification assumes.
     parameters
         Values by name, SI units.
-    measurements
-        Noisy traces, Parquet.
+    recorded
+        Noisy traces.
     seed
         Which of them.
     """
-    recorded = read_measurements(measurements, [seed])
     network = problem.model.sample(parameters)
     simulated = simulated_rotation(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
@@ -111,7 +111,14 @@ def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
 
 def seeds_in_words(count: int) -> str:
     """Say how many of a number of seeds are drawn one by one."""
+    if count == 1:
+        return "the only trace"
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
+
+
+def typical_in_words(found: pd.DataFrame) -> str:
+    """Say which of some identifications is the typical one."""
+    return f"seed {int(typical(found)['seed'])}, typical" if len(found) > 1 else "the only trace"
 
 
 def read_history(path: Path, method: str, shown: int) -> pd.DataFrame:

@@ -24,12 +24,11 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.products.figures.style import (
     METHOD_STYLES,
-    PAGE_IN,
     PAPER,
     SHADE,
     TARGET,
-    figure,
     panel,
+    row_of_panels,
 )
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
@@ -88,8 +87,7 @@ def draw(
     _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
     noise_rad = standard_deviation(rotation, settings.noise)
     quantities = parameters_and_sum(posed.searched)
-    drawn = figure(PAGE_IN, 3.1)
-    grid = drawn.subplots(1, len(quantities), squeeze=False)[0]
+    drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
         names = [posed.searched.parameters[i] for i in quantity.members]
         value = sum(truth.parameters[p.name] for p in names)

@@ -30,6 +30,9 @@ METHOD_STYLES: dict[str, dict[str, Any]] = {
     "differential_evolution": {"color": PURPLE, "linestyle": "-."},
 }
 
+# Five quantities of a sample with one branch are legible in a row.
+_MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4
+
 _STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8,
@@ -60,6 +63,21 @@ def styled() -> Iterator[None]:
 def figure(width_in: float, height_in: float) -> Figure:
     """Return an empty figure of a size in inches."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
+
+
+def row_of_panels(
+    count: int, height_in: float, *, sharey: bool = False
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure as wide as a page with panels side by side, in rows where they are many."""
+    rows = -(-count // _MOST_SIDE_BY_SIDE)
+    columns = -(-count // rows)
+    drawn = figure(
+        PAGE_IN, height_in if rows == 1 else rows * (height_in - _LEGEND_IN) + _LEGEND_IN
+    )
+    grid = list(drawn.subplots(rows, columns, sharey=sharey, squeeze=False).ravel())
+    for axes in grid[count:]:
+        axes.set_axis_off()
+    return drawn, grid[:count]
 
 
 def save(drawn: Figure, output: Path) -> None:

@@ -52,7 +52,10 @@ class Table:
 
 
 def write(table: Table, output: Path) -> None:
-    """Write a table as CSV with six significant digits, and beside it .md, .tex and .html."""
+    """Write a table as CSV with six significant digits, and beside it .md, .tex and .html.
+
+    To read, it has no columns in which there is nothing.
+    """
     names = [column.name for column in table.columns]
     raw = pd.DataFrame([[inert(_text(c, 6)) for c in row] for row in table.rows], columns=names)
     shown = pd.DataFrame(
@@ -62,6 +65,8 @@ def write(table: Table, output: Path) -> None:
         ],
         columns=[column.heading for column in table.columns],
     )
+    if len(shown):
+        shown = shown.loc[:, (shown != "").any()]
     barless = shown.map(_without_bars).rename(columns=_without_bars)
     markdown = barless.to_markdown(index=False, disable_numparse=True)
     latex = shown.to_latex(
@@ -69,7 +74,7 @@ def write(table: Table, output: Path) -> None:
         escape=True,
         caption=table.caption.replace("%", r"\%").replace("_", r"\_"),
         label=f"tab:{output.stem}",
-        column_format="l" * len(names),
+        column_format="l" * shown.shape[1],
     )
     write_text(output, raw.to_csv(index=False, lineterminator="\n"))
     write_text(output.with_suffix(".md"), f"{table.caption}\n\n{markdown}\n")

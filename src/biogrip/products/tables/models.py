@@ -1,19 +1,12 @@
-"""Which sample model is the simplest that a trace asks for.
-
-References
-----------
-.. [1] H. Akaike, A new look at the statistical model identification, IEEE Transactions on
-   Automatic Control 19 (1974), 716-723.
-.. [2] G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978), 461-464.
-"""
+"""Which sample model is the simplest that a case's traces ask for."""
 
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 
 from biogrip.experiment.sample import CANDIDATES
+from biogrip.identify.model_choice import aic_and_bic
 from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -40,10 +33,7 @@ def settings(study: Study) -> dict[str, str | None]:
 
 
 def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
-    """Count over seeds which model has the lowest AIC and BIC.
-
-    With Gaussian noise of unknown level AIC = n ln(misfit^2) + 2 (p + 1) and
-    BIC = n ln(misfit^2) + (p + 1) ln n, the noise being one parameter more.
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`.
 
     Parameters
     ----------
@@ -53,9 +43,9 @@ def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
         Fits of all models, CSV.
     """
     found = pd.concat([MODEL_FITS.read(path) for path in fits])
-    square = found["samples"] * 2 * np.log(found["misfit_rad"])
-    found["aic"] = square + 2 * (found["parameters"] + 1)
-    found["bic"] = square + (found["parameters"] + 1) * np.log(found["samples"])
+    found["aic"], found["bic"] = aic_and_bic(
+        found["misfit_rad"], found["samples"], found["parameters"]
+    )
     rows: list[tuple[Cell, ...]] = []
     for case, maker in made_by.items():
         of_case = found[found["case"] == case]

@@ -1,7 +1,6 @@
 """One recorded trace from file to verdicts, without a workflow."""
 
 import json
-import os
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +13,14 @@ from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import MODELS
-from biogrip.files import scratch_of, write_text
+from biogrip.experiment.sample import CANDIDATES
+from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import identifier
+from biogrip.own_traces.assumed import assumed, by_default, versions
+from biogrip.own_traces.models_tried import models_tried
+from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
@@ -41,9 +43,6 @@ _OPTIONS = {
     "drift": "--drift",
 }
 """By key of the ``measurement`` block, what gives it on the command line."""
-
-WRITTEN_BY = "written_by_biogrip"
-"""Tells our files from others, which are not replaced."""
 
 
 @dataclass(frozen=True)
@@ -68,48 +67,26 @@ class Wanted:
     config: Path | None
 
 
-def check_output(output: Path, *, force: bool) -> None:
-    """Make sure that a file can be written, and is none of somebody else's.
+@dataclass(frozen=True)
+class Identified:
+    """A trace that was identified.
 
     Parameters
     ----------
-    output
-        The file.
-    force
-        Whether to replace what `identify_trace` did not write.
-
-    Raises
-    ------
-    BiogripError
-        If it cannot be written or must not be replaced.
+    data
+        What is said of it, see `identify_trace`.
+    problem
+        What was assumed.
+    recorded
+        The trace.
     """
-    folder = output.parent
-    if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
-        raise BiogripError(
-            f"{output}: cannot be written; allowed is a file in a folder that you may write to."
-        )
-    for place in (output, scratch_of(output)):
-        try:
-            os.lstat(place)
-        except FileNotFoundError:
-            continue
-        except OSError as error:
-            raise BiogripError(f"{output}: cannot be written: {error.strerror}.") from error
-    if os.path.lexists(output) and not force and not _is_ours(output):
-        raise BiogripError(
-            f"{output}: is there, and biogrip did not write it; allowed is another name, "
-            "or --force to replace it."
-        )
+
+    data: dict[str, Any]
+    problem: CaseProblem
+    recorded: Measurements
 
 
-def _is_ours(output: Path) -> bool:
-    try:
-        return not output.is_symlink() and WRITTEN_BY in json.loads(output.read_bytes())
-    except (OSError, ValueError, TypeError, RecursionError):
-        return False
-
-
-def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
+def identify_trace(wanted: Wanted, output: Path) -> Identified:
     """Identify the sample in a recorded trace by least squares, and judge what is identified.
 
     Parameters
@@ -117,7 +94,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     wanted
         What to identify.
     output
-        Is written with what is returned, JSON.
+        Is written with what is said of it, JSON.
 
     Raises
     ------
@@ -126,7 +103,7 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     """
     study = study_of(wanted)
     (case,) = study.cases.values()
-    progress = Progress(str(wanted.trace), 3)
+    progress = Progress(str(wanted.trace), 4)
     recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
     progress.done()
     progress.doing(f"fitting {len(recorded.time_s)} samples")
@@ -141,6 +118,8 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
     told = diagnose(
         problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
     )
+    progress.done()
+    progress.doing("trying other sample models")
     data = {
         WRITTEN_BY: __version__,
         "trace": str(wanted.trace),
@@ -149,20 +128,17 @@ def identify_trace(wanted: Wanted, output: Path) -> dict[str, Any]:
         "confidence": confidence,
         **_instrument(posed, recorded, np.exp(told.likelihood.best)),
         **diagnosis_data(told),
+        **models_tried(study, case, recorded, progress.within),
+        "assumed": assumed(case),
+        "by_default": by_default(wanted.config),
+        "versions": versions(),
     }
     write_text(output, json.dumps(data, indent=1) + "\n")
-    return data
+    return Identified(data, posed, recorded)
 
 
-def check_trace_file(trace: Path, name: str = "TRACE") -> None:
+def check_trace_file(trace: Path) -> None:
     """Refuse a path that leads to no file.
-
-    Parameters
-    ----------
-    trace
-        The path.
-    name
-        Of the argument that it was given as.
 
     Raises
     ------
@@ -170,51 +146,38 @@ def check_trace_file(trace: Path, name: str = "TRACE") -> None:
         With the file beside it that has the nearest name.
     """
     if problem := trace_file_problem(trace):
-        raise BiogripError(f"{name}: {problem}")
-
-
-def in_words(found: dict[str, Any]) -> str:
-    """Return what `identify_trace` found as text to read."""
-    width = max(len(item["quantity"]) for item in found["quantities"])
-    lines = [
-        f"{found['trace']}: {found['samples']} samples, noise {found['noise_rad']:.3g} rad, "
-        f"misfit {found['misfit_rad']:.3g} rad",
-        f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
-        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in found["quantities"]),
-    ]
-    if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
-        alone = f"{50 * (1 + found['confidence']):g} %"
-        lines.append(f"A limit that stands alone is an end of an interval with two: {alone}")
-    lines += [trade["words"] for trade in found["trades"]]
-    if "offset_rad" in found:
-        lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
-    if "drift_rad_per_s" in found:
-        lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
-    lines += [f"Note: {note}" for note in found["notes"]]
-    return "\n".join(lines)
+        raise BiogripError(f"TRACE: {problem}")
 
 
 def study_of(wanted: Wanted) -> Study:
-    """Return a study whose only case is the recorded trace.
+    """Return the study of which the trace is the only case.
 
     Raises
     ------
     BiogripError
-        If there is no such file, or an option or the config cannot be used.
+        With the option, or with file, line and key, of what no trace could be identified with.
     """
     check_trace_file(wanted.trace)
     for key, value in wanted.measurement.items():
         if problem := value_problem(("measurement", key), value):
             raise BiogripError(f"{_OPTIONS[key]}: {problem}")
-    if wanted.model not in MODELS:
-        hint = nearest(wanted.model, MODELS)
-        raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {', '.join(MODELS)}.")
+    if wanted.model not in CANDIDATES:
+        hint, names = nearest(wanted.model, CANDIDATES), ", ".join(CANDIDATES)
+        raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {names}.")
+    sample = CANDIDATES[wanted.model]
     files = [default_config(), *([wanted.config] if wanted.config else [])]
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.measurement, "file": str(wanted.trace)}
-    merged["cases"] = {case: {"sample": {"model": wanted.model}, "measurement": measurement}}
+    # A config may name cases of its own, for the workflow.
+    merged.pop("only", None)
+    merged["cases"] = {
+        case: {
+            "sample": {"model": sample.name, "branches": sample.branches},
+            "measurement": measurement,
+        }
+    }
     return load_study(merged, files, command_line=["cases"], for_workflow=False)
 
 

@@ -16,7 +16,7 @@ from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
-from biogrip.files import write_text
+from biogrip.files import refuse_inputs, write_text
 from biogrip.groups.dishes import (
     USUAL_POWER,
     GroupDifference,
@@ -26,15 +26,17 @@ from biogrip.groups.dishes import (
     findings_of_groups,
 )
 from biogrip.groups.joint_fit import fitted_jointly
-from biogrip.groups.membership import Cell
+from biogrip.groups.membership import Cell, read_cells
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identify.answer import Identification
 from biogrip.identify.methods import identifier
 from biogrip.identify.problem import Problem
-from biogrip.one_trace import WRITTEN_BY, Wanted, study_of
+from biogrip.own_traces.one_trace import Wanted, study_of
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
+from biogrip.study.trace_file import trace_file_problem
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,51 @@ class _Posed:
     trace: Path
     problem: Problem
     settings: judgement.Settings
+
+
+def groups(
+    table: Path,
+    model: str,
+    measurement: dict[str, Any],
+    config: Path | None,
+    *,
+    output: Path | None,
+    force: bool,
+) -> int:
+    """Compare the groups of a table, write what is found, and print it.
+
+    Parameters
+    ----------
+    table
+        CSV file, see `read_cells`.
+    model, measurement, config
+        As of `Wanted`.
+    output
+        JSON file; by default beside the table.
+    force
+        Whether to replace a file that this program did not write.
+
+    Returns
+    -------
+    int
+        1 if any trace could not be used.
+
+    Raises
+    ------
+    BiogripError
+        If nothing can be compared as asked.
+    """
+    if problem := trace_file_problem(table):
+        raise BiogripError(f"TABLE: {problem}")
+    cells = read_cells(table)
+    written = output or table.with_suffix(".compared.json")
+    traces = [trace for cell in cells for trace in cell.traces]
+    refuse_inputs([written], [table, *traces, *filter(None, [config])])
+    check_output(written, force=force)
+    found = compare_groups(Wanted(table, model, measurement, config), cells, written)
+    print(in_words(found))
+    print(f"Written to {written}.")
+    return 1 if found["skipped"] else 0
 
 
 def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
@@ -104,8 +151,8 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
             f"{traces.skipped[0]['reason']}"
         )
     # The first in the table is compared with, whichever of its traces can be used.
-    groups = list(dict.fromkeys(cell.group for cell in cells))
-    findings = findings_of_groups(judged, groups, confidence)
+    names = list(dict.fromkeys(cell.group for cell in cells))
+    findings = findings_of_groups(judged, names, confidence)
     found = {
         WRITTEN_BY: __version__,
         "table": str(wanted.trace),

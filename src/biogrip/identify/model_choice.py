@@ -1,0 +1,104 @@
+"""Which sample model is the simplest that a trace asks for.
+
+References
+----------
+.. [1] H. Akaike, A new look at the statistical model identification, IEEE Transactions on
+   Automatic Control 19 (1974), 716-723.
+.. [2] G. Schwarz, Estimating the dimension of a model, Annals of Statistics 6 (1978), 461-464.
+.. [3] R. E. Kass and A. E. Raftery, Bayes factors, Journal of the American Statistical
+   Association 90 (1995), 773-795: which differences are worth a mention.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import CANDIDATES, SampleModel
+
+WORTH_A_MENTION = 2.0
+"""A difference of BIC below this says nothing for one of two models."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A sample model fitted to a trace.
+
+    Parameters
+    ----------
+    candidate
+        Which one, see `CANDIDATES`.
+    misfit_rad
+        Of its best fit.
+    delta_aic, delta_bic
+        By how much it exceeds the lowest of those tried.
+    """
+
+    candidate: str
+    misfit_rad: float
+    delta_aic: float
+    delta_bic: float
+
+    @property
+    def model(self) -> SampleModel:
+        """The model itself."""
+        return CANDIDATES[self.candidate].model
+
+
+def aic_and_bic(
+    misfit_rad: ArrayLike, samples: ArrayLike, parameters: ArrayLike
+) -> tuple[Array, Array]:
+    """Akaike's and Schwarz's criteria, with Gaussian noise of unknown level.
+
+    AIC = n ln(misfit^2) + 2 (p + 1) and BIC = n ln(misfit^2) + (p + 1) ln n, the
+    noise being one parameter more.
+
+    Parameters
+    ----------
+    misfit_rad, samples, parameters
+        RMS misfit of the best fit, n and p; of any one shape.
+    """
+    counted = np.asarray(parameters) + 1
+    square = np.asarray(samples) * 2 * np.log(misfit_rad)
+    return square + 2 * counted, square + counted * np.log(samples)
+
+
+def ranked(candidates: Sequence[str], misfits_rad: Sequence[float], samples: int) -> list[Tried]:
+    """Compare the best fits of some models to one trace, in their order."""
+    counts = [len(CANDIDATES[name].model.names) for name in candidates]
+    criteria = aic_and_bic(misfits_rad, samples, counts)
+    aic, bic = (values - values.min() for values in criteria)
+    return [
+        Tried(name, misfit, float(a), float(b))
+        for name, misfit, a, b in zip(candidates, misfits_rad, aic, bic, strict=True)
+    ]
+
+
+def advice(tried: Sequence[Tried], chosen: str) -> str:
+    """Say in a sentence whether a model is what the trace asks for.
+
+    Parameters
+    ----------
+    tried
+        It, and the others.
+    chosen
+        Which one it is.
+    """
+    own = next(each for each in tried if each.candidate == chosen)
+    best = min(tried, key=lambda each: each.delta_bic)
+    title = _capital(own.model.title)
+    if own.delta_bic < WORTH_A_MENTION:
+        return f"{title}: none of the {len(tried)} models tried suits the trace better."
+    more, fewer = len(best.model.names), len(own.model.names)
+    lead = f"{best.model.title} is preferred, with a BIC lower by {own.delta_bic:.3g}."
+    if more > fewer:
+        return f"{title} is not adequate: {lead}"
+    if more < fewer:
+        return f"{title} is richer than the trace asks for: {lead}"
+    return f"{title} suits the trace less well: {lead}"
+
+
+def _capital(title: str) -> str:
+    return title[0].upper() + title[1:]

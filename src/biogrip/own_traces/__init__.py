@@ -1,0 +1,1 @@
+"""Recorded traces of one's own, from files to verdicts, without a workflow."""

@@ -1,0 +1,31 @@
+"""What an identification relies on: enough to repeat it."""
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from biogrip.study.load import read_configs
+from biogrip.study.study import Case
+from biogrip.study.typed import plain
+
+
+def assumed(case: Case) -> dict[str, Any]:
+    """Return the blocks of the config that an identification relies on, as plain data."""
+    blocks = ("gripper", "protocol", "search_range", "measurement", "models", "least_squares")
+    return {name: plain(_block(case, name)) for name in blocks} | {"fixed": case.fixed}
+
+
+def _block(case: Case, name: str) -> Any:
+    own = case.block
+    return own.of_methods.block(name) if name == "least_squares" else getattr(own, name)
+
+
+def by_default(config: Path | None) -> list[str]:
+    """Which of gripper and protocol nobody has given, so that they are the default study's."""
+    given = read_configs([config]) if config else {}
+    return [name for name in ("gripper", "protocol") if name not in given]
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what the numbers come from."""
+    return {name: version(name) for name in ("biogrip", "numpy", "scipy")}

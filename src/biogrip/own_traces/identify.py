@@ -1,0 +1,87 @@
+"""The command that identifies recorded traces: what it writes, and what it says."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from biogrip.errors import BiogripError
+from biogrip.files import refuse_inputs
+from biogrip.own_traces.many_traces import Told, identify_traces, write_table
+from biogrip.own_traces.one_trace import Wanted, study_of
+from biogrip.own_traces.outputs import check_output
+from biogrip.own_traces.words import in_words, side_by_side
+from biogrip.study.trace_file import trace_file_problem
+
+
+def identify(
+    traces: Sequence[Path],
+    model: str,
+    measurement: dict[str, Any],
+    config: Path | None,
+    *,
+    output: Path | None,
+    report: Path | None,
+    table: Path | None,
+    force: bool,
+) -> int:
+    """Identify traces, write what is found, and print it.
+
+    Parameters
+    ----------
+    traces
+        CSV files.
+    model, measurement, config
+        As of `Wanted`.
+    output
+        JSON file, of a single trace; else each has one beside it.
+    report, table
+        HTML and CSV file, if they are wanted.
+    force
+        Whether to replace files that this program did not write.
+
+    Returns
+    -------
+    int
+        1 if any of several traces could not be used.
+
+    Raises
+    ------
+    BiogripError
+        If nothing can be identified as asked, or the only trace cannot be used.
+    """
+    if output is not None and len(traces) > 1:
+        raise BiogripError("--output: is of one trace; of several, each has its own beside it.")
+    # What is wrong with all of them is said once, of the first that is there.
+    there = [trace for trace in traces if len(traces) == 1 or not trace_file_problem(trace)]
+    wanted = Wanted((there or traces)[0], model, measurement, config)
+    if there:
+        study_of(wanted)
+    outputs = {trace: output or trace.with_suffix(".identified.json") for trace in traces}
+    written = [*outputs.values(), *filter(None, (report, table))]
+    if len({path.absolute() for path in written}) < len(written):
+        raise BiogripError("found the same file to be written twice; allowed are different ones.")
+    refuse_inputs(written, [*traces, *filter(None, [config])])
+    for path in written:
+        if path in (report, table, output) or path.parent.is_dir():
+            check_output(path, force=force)
+    page = None
+    if report is not None:
+        from biogrip.own_traces.page import Page
+
+        page = Page()
+    told = identify_traces(wanted, list(outputs), outputs, page)
+    if len(traces) == 1 and told.refused:
+        raise BiogripError(next(iter(told.refused.values())))
+    if table is not None:
+        write_table(told, table)
+    if page is not None and report is not None:
+        page.write(told.refused, report)
+    print(in_words(told.found[0]) if len(traces) == 1 else _of_many(told))
+    said = [outputs[Path(each["trace"])] for each in told.found]
+    said += [path for path in (report, table) if path is not None]
+    print(f"Written to {', '.join(map(str, said))}.")
+    return 1 if told.refused else 0
+
+
+def _of_many(told: Told) -> str:
+    return side_by_side(told.found, told.refused)

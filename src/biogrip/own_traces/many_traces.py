@@ -1,0 +1,102 @@
+"""Recorded traces one after the other: those that can be used, and why the others cannot."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from biogrip.errors import BiogripError
+from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
+from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.own_traces.page import Page
+from biogrip.products.files.rows import write_rows
+from biogrip.progress import Progress
+
+_OF_QUANTITY = ("verdict", "value", "low", "high")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What came of several traces.
+
+    Parameters
+    ----------
+    found
+        What is said of each that could be used, see `identify_trace`.
+    refused
+        Why the others could not, by file.
+    """
+
+    found: list[dict[str, Any]]
+    refused: dict[str, str]
+
+
+def identify_traces(
+    wanted: Wanted, traces: Iterable[Path], outputs: Mapping[Path, Path], page: Page | None
+) -> Told:
+    """Identify traces, each by itself.
+
+    Parameters
+    ----------
+    wanted
+        How, for all of them; its own trace does not count.
+    traces
+        CSV files.
+    outputs
+        Where what is said of each is written, JSON.
+    page
+        Is given every trace that could be used.
+    """
+    traces = list(traces)
+    found, refused = [], {}
+    progress = Progress("identify", len(traces))
+    for trace in traces:
+        try:
+            identified: Identified = identify_trace(replace(wanted, trace=trace), outputs[trace])
+        except BiogripError as error:
+            refused[str(trace)] = str(error)
+        else:
+            found.append(identified.data)
+            if page is not None:
+                page.add(identified)
+        progress.done()
+    return Told(found, refused)
+
+
+def write_table(told: Told, table: Path) -> None:
+    """Write a row a trace, CSV."""
+    quantities = list(
+        dict.fromkeys(q["quantity"] for each in told.found for q in each["quantities"])
+    )
+    columns = ["trace", "problem", "model", "samples", "noise_rad", "misfit_rad"]
+    columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
+    rows = [
+        (
+            each["trace"],
+            "",
+            each["model"],
+            each["samples"],
+            each["noise_rad"],
+            each["misfit_rad"],
+            *_of_quantities(each, quantities),
+            " ".join(each["notes"]),
+            each["advice"] or "",
+            each[WRITTEN_BY],
+        )
+        for each in told.found
+    ]
+    rows += [
+        (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in told.refused.items()
+    ]
+    write_rows(table, (*columns, "doubts", "advice", WRITTEN_BY), rows)
+
+
+def _of_quantities(found: Mapping[str, Any], quantities: Iterable[str]) -> list[object]:
+    by_label = {q["quantity"]: q for q in found["quantities"]}
+    return [
+        ""
+        if quantity not in by_label or by_label[quantity][what] is None
+        else by_label[quantity][what]
+        for quantity in quantities
+        for what in _OF_QUANTITY
+    ]

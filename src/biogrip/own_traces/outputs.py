@@ -1,0 +1,59 @@
+"""Files that are written beside a person's own, and never over them."""
+
+import json
+import os
+from pathlib import Path
+
+from biogrip.errors import BiogripError
+from biogrip.files import scratch_of
+
+WRITTEN_BY = "written_by_biogrip"
+"""Tells our files from others, which are not replaced."""
+
+_HEAD_BYTES = 500
+
+
+def check_output(output: Path, *, force: bool) -> None:
+    """Make sure that a file can be written, and is none of somebody else's.
+
+    Parameters
+    ----------
+    output
+        The file.
+    force
+        Whether to replace what this program did not write.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be written or must not be replaced.
+    """
+    folder = output.parent
+    if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
+        raise BiogripError(
+            f"{output}: cannot be written; allowed is a file in a folder that you may write to."
+        )
+    for place in (output, scratch_of(output)):
+        try:
+            os.lstat(place)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise BiogripError(f"{output}: cannot be written: {error.strerror}.") from error
+    if os.path.lexists(output) and not force and not _is_ours(output):
+        raise BiogripError(
+            f"{output}: is there, and biogrip did not write it; allowed is another name, "
+            "or --force to replace it."
+        )
+
+
+def _is_ours(output: Path) -> bool:
+    if output.is_symlink():
+        return False
+    try:
+        if output.suffix == ".json":
+            return WRITTEN_BY in json.loads(output.read_bytes())
+        with output.open("rb") as stream:
+            return WRITTEN_BY.encode() in stream.read(_HEAD_BYTES)
+    except (OSError, ValueError, TypeError, RecursionError):
+        return False

@@ -1,0 +1,77 @@
+"""What traces tell on one page that needs nothing else."""
+
+import base64
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import yaml
+from matplotlib.figure import Figure
+
+from biogrip import __version__
+from biogrip.files import write_text
+from biogrip.own_traces.one_trace import Identified
+from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.own_traces.words import limits_in_short, taken_for_granted
+from biogrip.products.figures.fit import draw_fit
+from biogrip.products.figures.profiles import Settings as ProfileSettings
+from biogrip.products.figures.profiles import draw_profiles
+from biogrip.products.figures.residual_diagnosis import draw_residuals
+from biogrip.products.figures.results import fit_of
+from biogrip.products.figures.style import styled
+
+
+class Page:
+    """The page, as far as traces have been added."""
+
+    def __init__(self) -> None:
+        self._traces: list[dict[str, Any]] = []
+
+    def add(self, identified: Identified) -> None:
+        """Draw what is said of a trace."""
+        data = identified.data
+        with styled():
+            figures = [(title, _embedded(drawn)) for title, drawn in _figures(identified).items()]
+        self._traces.append(
+            {
+                **data,
+                "figures": figures,
+                "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
+                "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
+                "granted": taken_for_granted(data) if data["by_default"] else None,
+            }
+        )
+
+    def write(self, refused: Mapping[str, str], page: Path) -> None:
+        """Write the page, HTML."""
+        template = Path(__file__).with_name("traces.html.j2").read_text(encoding="utf-8")
+        environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+        text = environment.from_string(template).render(
+            traces=self._traces,
+            refused=refused,
+            written_by=f"{WRITTEN_BY} {__version__}",
+            labels=list(
+                dict.fromkeys(q["quantity"] for each in self._traces for q in each["quantities"])
+            ),
+        )
+        write_text(page, text)
+
+
+def _figures(identified: Identified) -> dict[str, Figure]:
+    data, problem = identified.data, identified.problem
+    found = {item["quantity"]: item["value"] for item in data["quantities"]}
+    values = {name: found[name] for name in problem.searched.names}
+    fit = fit_of(problem, {**problem.fixed, **values}, identified.recorded, 0)
+    return {
+        "The trace, its best fit, and what that leaves": draw_fit(fit, "best fit", ""),
+        "What the fit leaves: over time, its correlation, its distribution": draw_residuals(fit),
+        "Profile likelihoods": draw_profiles(ProfileSettings("", {}), data),
+    }
+
+
+def _embedded(drawn: Figure) -> str:
+    content = io.BytesIO()
+    drawn.savefig(content, format="png", metadata={"Software": None})
+    return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode()

@@ -1,0 +1,111 @@
+"""What was identified, as text for a terminal."""
+
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tabulate import tabulate
+
+from biogrip.identifiability.verdicts import (
+    BOUNDED_ABOVE,
+    BOUNDED_BELOW,
+    DETERMINED,
+    NOT_DETERMINED,
+)
+
+_COLOURS = {DETERMINED: 32, BOUNDED_ABOVE: 33, BOUNDED_BELOW: 33, NOT_DETERMINED: 31}
+
+
+def in_words(found: Mapping[str, Any]) -> str:
+    """Return what is said of one trace, see `identify_trace`, as text to read."""
+    width = max(len(item["quantity"]) for item in found["quantities"])
+    lines = [
+        f"{found['trace']}: {found['samples']} samples, noise {found['noise_rad']:.3g} rad, "
+        f"misfit {found['misfit_rad']:.3g} rad",
+        f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
+        *(
+            f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
+            for item in found["quantities"]
+        ),
+    ]
+    if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
+        alone = f"{50 * (1 + found['confidence']):g} %"
+        lines.append(f"A limit that stands alone is an end of an interval with two: {alone}")
+    lines += [trade["words"] for trade in found["trades"]]
+    if "offset_rad" in found:
+        lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
+    if "drift_rad_per_s" in found:
+        lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
+    lines += [f"Note: {note}" for note in found["notes"]]
+    lines += [found["advice"]] if found["advice"] else []
+    lines += [taken_for_granted(found)] if found["by_default"] else []
+    return "\n".join(lines)
+
+
+def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:
+    """Return what is said of several traces as a table, a row a trace, and the refused ones."""
+    lines = []
+    if found:
+        labels = list(dict.fromkeys(q["quantity"] for each in found for q in each["quantities"]))
+        rows = [[each["trace"], *_cells(each, labels), _doubts(each)] for each in found]
+        units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
+        header = ["trace", *(f"{label} ({units[label]})" for label in labels), "doubts"]
+        lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
+        lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
+        provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
+        lines += [f"Sums are told provided {words}." for words in provided]
+        lines += [f"{each['trace']}: {note}" for each in found for note in each["notes"]]
+        lines += [taken_for_granted(found[0])] if found[0]["by_default"] else []
+    if refused:
+        lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
+        lines += [f"  {reason}" for reason in refused.values()]
+    return "\n".join(lines)
+
+
+def taken_for_granted(found: Mapping[str, Any]) -> str:
+    """Say of which of gripper and protocol the default study's are assumed."""
+    phases = ", ".join(_phase(phase) for phase in found["assumed"]["protocol"]["phases"])
+    said = {
+        "gripper": "the default study's gripper",
+        "protocol": f"the default study's protocol ({phases})",
+    }
+    words = " and ".join(said[name] for name in found["by_default"])
+    return f"Assumed: {words}; yours are given with --config."
+
+
+def _phase(phase: Mapping[str, Any]) -> str:
+    torque = phase.get("torque_Nm")
+    what = f"{torque:g} N m" if isinstance(torque, float) else "as there"
+    return f"{phase['duration_s']:g} s at {what}"
+
+
+def _cells(found: Mapping[str, Any], labels: Sequence[str]) -> list[str]:
+    by_label = {q["quantity"]: q for q in found["quantities"]}
+    return [
+        _coloured(limits_in_short(by_label[label]), by_label[label]["verdict"])
+        if label in by_label
+        else ""
+        for label in labels
+    ]
+
+
+def limits_in_short(quantity: Mapping[str, Any]) -> str:
+    """Say in few letters what a trace tells of a quantity."""
+    low, high = quantity["low"], quantity["high"]
+    if low is not None and high is not None:
+        return f"{quantity['value']:.3g} ({low:.3g} to {high:.3g})"
+    if low is not None:
+        return f"≥ {low:.2g}"
+    return "?" if high is None else f"≤ {high:.2g}"
+
+
+def _doubts(found: Mapping[str, Any]) -> str:
+    return str(len(found["notes"])) if found["notes"] else ""
+
+
+def _coloured(text: str, verdict: str) -> str:
+    """Colour a verdict where that can be seen (https://no-color.org)."""
+    if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
+        return text
+    return f"\x1b[{_COLOURS[verdict]}m{text}\x1b[0m"
