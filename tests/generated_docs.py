@@ -2,6 +2,7 @@
 
 import csv
 import importlib
+import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
@@ -15,6 +16,7 @@ import pandas as pd
 
 import biogrip.products.files
 from biogrip.cli import main
+from biogrip.groups.power import cells_needed
 from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
 from biogrip.products.files.rows import RowFile
@@ -24,6 +26,9 @@ from tests.published_numbers import renewed_numbers
 ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
+DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
+
+_RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
 
 def config_keys() -> str:
@@ -59,6 +64,36 @@ def _percent(text: str) -> str:
         return f"{float(f'{float(text):.2g}') + 0.0:g} %"
     except ValueError:
         return f"{text} %"
+
+
+def cells_needed_table() -> str:
+    """How many cells a group it takes for ratios to be found, by the spread of the cells."""
+    return _table(
+        {
+            "spread": f"{spread:g}, a factor of {math.exp(spread):.2f}",
+            **{f"ratio {ratio:g}": str(cells_needed(ratio, 0.8, spread, 0.0)) for ratio in _RATIOS},
+        }
+        for spread in (0.1, 0.2, 0.3, 0.5)
+    )
+
+
+def simulated_dishes() -> str:
+    """How often differences between simulated dishes held the truth, and were found."""
+    return _table(
+        {
+            "quantity": row["quantity"],
+            "samples": f"{row['rate_Hz']:g} Hz",
+            "cells that determine it": _percent(row["determined_percent"]),
+            "error": f"{row['error']:.2g}",
+            "ratio held": f"{row['coverage_percent']:.1f} %",
+            "found": f"{row['power_percent']:.1f} %",
+            "designed": f"{row['designed_power_percent']:.1f} %",
+            "held by ranks": f"{row['rank_coverage_percent']:.1f} %",
+            "spread held": f"{row['spread_coverage_percent']:.1f} %",
+            "shrunk cells held": f"{row['shrunk_coverage_percent']:.1f} %",
+        }
+        for row in pd.read_csv(DISHES).to_dict("records")
+    )
 
 
 def published_table(name: str) -> str:
@@ -146,6 +181,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"results": paper_against_study},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
+    ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
     ROOT / "docs" / "model.md": {
         name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
     },

@@ -90,6 +90,7 @@ def _parser() -> argparse.ArgumentParser:
     run.set_defaults(command=_run)
 
     _identify_parser(commands)
+    _groups_parser(commands)
 
     text = "make something of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
@@ -141,21 +142,7 @@ def _identify_parser(stages: Any) -> None:
     identify.add_argument(
         "traces", type=Path, nargs="+", metavar="TRACE", help="CSV file with a header"
     )
-    identify.add_argument("--time", default="time_s", help="column of times [%(default)s]")
-    identify.add_argument(
-        "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
-    )
-    identify.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
-    identify.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
-    identify.add_argument(
-        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
-    )
-    identify.add_argument(
-        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
-    )
-    identify.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
-    identify.add_argument("--offset", action="store_true", help="fit an offset along")
-    identify.add_argument("--drift", action="store_true", help="fit a linear drift along")
+    _trace_options(identify)
     identify.add_argument(
         "--report", type=Path, metavar="PAGE", help="HTML file: all of it on a page, with figures"
     )
@@ -166,6 +153,39 @@ def _identify_parser(stages: Any) -> None:
     identify.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
     )
+
+
+def _groups_parser(stages: Any) -> None:
+    text = "identify the cells of several groups in recorded traces, and compare the groups"
+    groups = stages.add_parser("groups", help=text, description=text)
+    groups.set_defaults(command=_groups)
+    groups.add_argument(
+        "table", type=Path, help="CSV file with the columns file, cell and group, a line a trace"
+    )
+    _trace_options(groups)
+    groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
+    groups.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
+
+
+def _trace_options(command: argparse.ArgumentParser) -> None:
+    """Add what tells how recorded traces are to be read and identified."""
+    command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
+    command.add_argument(
+        "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
+    )
+    command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
+    command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    command.add_argument(
+        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
+    )
+    command.add_argument(
+        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
+    )
+    command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
+    command.add_argument("--offset", action="store_true", help="fit an offset along")
+    command.add_argument("--drift", action="store_true", help="fit a linear drift along")
 
 
 def _make(options: argparse.Namespace) -> None:
@@ -179,6 +199,33 @@ def _make(options: argparse.Namespace) -> None:
 def _identify(options: argparse.Namespace) -> None:
     from biogrip.own_traces.identify import identify
 
+    options.status = identify(
+        options.traces,
+        options.model,
+        _measurement(options),
+        options.config,
+        output=options.output,
+        report=options.report,
+        table=options.csv,
+        force=options.force,
+    )
+
+
+def _groups(options: argparse.Namespace) -> None:
+    from biogrip.own_traces.many_cells import groups
+
+    options.status = groups(
+        options.table,
+        options.model,
+        _measurement(options),
+        options.config,
+        output=options.output,
+        force=options.force,
+    )
+
+
+def _measurement(options: argparse.Namespace) -> dict[str, Any]:
+    """Keys of the config's ``measurement`` block that were given as options."""
     measurement = {
         "time": options.time,
         "rotation": options.rotation,
@@ -188,16 +235,7 @@ def _identify(options: argparse.Namespace) -> None:
         "offset": options.offset,
         "drift": options.drift,
     }
-    options.status = identify(
-        options.traces,
-        options.model,
-        {key: value for key, value in measurement.items() if value is not None},
-        options.config,
-        output=options.output,
-        report=options.report,
-        table=options.csv,
-        force=options.force,
-    )
+    return {key: value for key, value in measurement.items() if value is not None}
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -1,0 +1,1 @@
+"""Cells of whole dishes: replicates fitted jointly, populations, and how far two are apart."""

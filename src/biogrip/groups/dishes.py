@@ -1,0 +1,175 @@
+"""What the cells of several groups tell: their populations, and how far these are apart."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from biogrip.groups.comparison import Difference, adjusted, difference
+from biogrip.groups.joint_fit import JointFit
+from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, population_of
+from biogrip.groups.power import ratio_seen
+from biogrip.groups.shift import Shift, shift
+from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identifiability.verdicts import DETERMINED, Finding
+
+USUAL_POWER = 0.8
+"""With which a difference that is there should be found (Cohen 1988)."""
+
+
+@dataclass(frozen=True)
+class JudgedCell:
+    """A cell of a group, and what its traces tell."""
+
+    name: str
+    group: str
+    fit: JointFit
+
+
+@dataclass(frozen=True)
+class GroupFinding:
+    """One quantity in one group.
+
+    Parameters
+    ----------
+    group, quantity, unit
+        Which.
+    estimates
+        Cells that determine the quantity.
+    others
+        Names of the cells that do not.
+    population
+        Where they come from; None of too few cells.
+    """
+
+    group: str
+    quantity: str
+    unit: str
+    estimates: Estimates
+    others: tuple[str, ...]
+    population: Population | None
+
+
+@dataclass(frozen=True)
+class GroupDifference:
+    """One quantity in one group, over the first group.
+
+    Parameters
+    ----------
+    quantity, group, against
+        Which.
+    difference
+        Of the populations.
+    adjusted_p
+        For as many groups as the quantity is compared in.
+    ranks
+        The logarithm of the ratio whatever the distribution.
+    ratio_seen
+        Smallest ratio that so many cells, scattering like these, show with `USUAL_POWER`.
+    """
+
+    quantity: str
+    group: str
+    against: str
+    difference: Difference
+    adjusted_p: float
+    ranks: Shift
+    ratio_seen: float
+
+
+def findings_of_groups(
+    cells: Sequence[JudgedCell], groups: Sequence[str], confidence: float
+) -> list[GroupFinding]:
+    """Judge every quantity in every group.
+
+    Parameters
+    ----------
+    cells
+        Of the same model, at least one.
+    groups
+        Names, in the order of what is returned; a group may have no cells.
+    confidence
+        Of the intervals, e.g. 0.95.
+    """
+    quantities = [finding.quantity for finding in cells[0].fit.diagnosis.findings]
+    return [
+        _finding(group, quantity, index, [c for c in cells if c.group == group], confidence)
+        for group in groups
+        for index, quantity in enumerate(quantities)
+    ]
+
+
+def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDifference]:
+    """Compare every group with the first, in every quantity that both determine often enough."""
+    compared: list[GroupDifference] = []
+    for quantity in dict.fromkeys(finding.quantity for finding in findings):
+        own = [finding for finding in findings if finding.quantity == quantity]
+        first = own[0]
+        pairs = [
+            (finding, finding.population, first.population)
+            for finding in own[1:]
+            if finding.population is not None and first.population is not None
+        ]
+        if not pairs:
+            continue
+        apart = [difference(one, other) for _, one, other in pairs]
+        p_values = adjusted([each.p_value for each in apart])
+        for (finding, one, other), each, p_value in zip(pairs, apart, p_values, strict=True):
+            compared.append(
+                GroupDifference(
+                    quantity,
+                    finding.group,
+                    first.group,
+                    each,
+                    p_value,
+                    shift(one.estimates.log_values, other.estimates.log_values, each.confidence),
+                    _ratio_seen(one, other),
+                )
+            )
+    return compared
+
+
+def log_deviation(finding: Finding, likelihood: Likelihood) -> float:
+    """Standard deviation of a determined quantity's logarithm: that of its interval."""
+    low, high = finding.profile.low, finding.profile.high
+    assert low is not None
+    assert high is not None
+    return (high - low) / (2 * sqrt(likelihood.threshold))
+
+
+def _finding(
+    group: str, quantity: Quantity, index: int, cells: Sequence[JudgedCell], confidence: float
+) -> GroupFinding:
+    told = [(cell.name, cell.fit.diagnosis) for cell in cells]
+    known = [
+        (
+            name,
+            each.findings[index].profile.best,
+            log_deviation(each.findings[index], each.likelihood),
+        )
+        for name, each in told
+        if each.findings[index].verdict == DETERMINED
+    ]
+    names = tuple(name for name, _, _ in known)
+    estimates = Estimates(
+        names,
+        np.array([value for _, value, _ in known]),
+        np.array([error for _, _, error in known]),
+    )
+    return GroupFinding(
+        group,
+        quantity.label,
+        quantity.unit,
+        estimates,
+        tuple(name for name, _ in told if name not in names),
+        population_of(estimates, confidence) if len(names) >= FEWEST_CELLS else None,
+    )
+
+
+def _ratio_seen(one: Population, other: Population) -> float:
+    fewer = 1 + min(one.freedom, other.freedom)
+    # Spread and errors together; of these, a cell that is badly known counts less.
+    variances = [(1 + each.freedom) * each.deviation**2 for each in (one, other)]
+    return ratio_seen(fewer, USUAL_POWER, sqrt(sum(variances) / 2), 0.0, one.confidence)

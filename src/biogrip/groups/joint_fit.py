@@ -1,0 +1,142 @@
+"""One cell from all its traces: shared parameters, and a noise for each trace.
+
+Where the noise is not known, likelihood is greatest where each trace's is what its residual is;
+that and the best fit are found in turn (iteratively reweighted least squares), until neither
+changes. Limits then hold the noises there, as the F threshold of a single trace does: with the
+hundreds of samples of a trace they could not tell the difference.
+
+References
+----------
+.. [1] G. A. F. Seber and C. J. Wild, Nonlinear Regression, Wiley, 1989, section 2.8.8 and
+   chapter 11: several responses, each with a variance of its own.
+.. [2] S. S. Wilks, The large-sample distribution of the likelihood ratio for testing composite
+   hypotheses, Annals of Mathematical Statistics 9 (1938), 60-62.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import log, sqrt
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import SampleModel
+from biogrip.groups.replicates import joint_problem
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identify.answer import Identification
+from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.problem import Problem
+
+# Noise is known to a share of one over the root of twice the samples; this is far below.
+_SETTLED = 1e-9
+_MOST_ROUNDS = 100
+_MOST_OPTIMA = 5
+# Replicates of one cell differ so much by chance once in a thousand.
+_DISAGREE = 1e-3
+
+
+@dataclass(frozen=True)
+class JointFit:
+    """What all traces of a cell tell together.
+
+    Parameters
+    ----------
+    diagnosis
+        Best fit and verdicts, as of one trace.
+    noise_rad
+        Standard deviation of the noise of each trace.
+    agreement
+        Probability that traces of one and the same sample differ as much; None of a single one.
+    """
+
+    diagnosis: Diagnosis
+    noise_rad: tuple[float, ...]
+    agreement: float | None
+
+
+def fitted_jointly(
+    problems: Sequence[Problem],
+    model: SampleModel,
+    identify: Callable[[Problem], Identification],
+    *,
+    confidence: float,
+    noise_rad: float | None = None,
+) -> JointFit:
+    """Identify a cell from all its traces, and judge what is identified.
+
+    Parameters
+    ----------
+    problems
+        One a trace.
+    model
+        Whose parameters are searched.
+    identify
+        Finds the global optimum of a problem.
+    confidence
+        Of the limits, e.g. 0.95.
+    noise_rad
+        Standard deviation of the noise if it is known, the same for all traces.
+    """
+    if len(problems) == 1:
+        (problem,) = problems
+        found = identify(problem)
+        told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+        return JointFit(told, (told.likelihood.noise_rad,), None)
+    levels = [noise_rad or problem.residuals.noise_scale_rad for problem in problems]
+    joint = joint_problem(problems, levels)
+    found = identify(joint)
+    for _ in range(_MOST_OPTIMA):
+        if noise_rad is None:
+            joint, found, levels = _reweighted(problems, joint, found, levels)
+        told = diagnose(joint, model, found, confidence=confidence, noise_rad=noise_rad)
+        best = np.exp(told.likelihood.best)
+        if noise_rad is not None or np.array_equal(best, found.parameters):
+            break
+        # A profile has led to a deeper optimum, with other noises.
+        found = replace(found, parameters=best, misfit_rad=told.likelihood.misfit_rad)
+    agreement = _agreement(problems, told.likelihood.best, noise_rad)
+    if agreement < _DISAGREE:
+        told.notes.append(
+            "The traces do not tell of one and the same sample (replicates differ so much once in "
+            f"with p = {agreement:.1g}): the cell changed, or the intervals are too narrow."
+        )
+    return JointFit(told, tuple(levels), agreement)
+
+
+def _reweighted(
+    problems: Sequence[Problem], joint: Problem, found: Identification, levels: list[float]
+) -> tuple[Problem, Identification, list[float]]:
+    """Fit, and weight each trace by what is left of it, until neither changes."""
+    x = np.log(found.parameters)
+    free, shared = joint.residuals.free, len(x)
+    for _ in range(_MOST_ROUNDS):
+        # Of the parameters, each trace bears a share.
+        left = [problem.residuals.free * (1 - shared / free) for problem in problems]
+        sums = [_square_sum(problem, x) for problem in problems]
+        before, levels = levels, [sqrt(s / own) for s, own in zip(sums, left, strict=True)]
+        joint = joint_problem(problems, levels)
+        fit = settled(joint, local_fit(joint, x))
+        x = fit.log_parameters
+        if max(abs(log(now / then)) for now, then in zip(levels, before, strict=True)) < _SETTLED:
+            break
+    return joint, replace(found, parameters=np.exp(x), misfit_rad=fit.misfit_rad), levels
+
+
+def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None) -> float:
+    """Probability of so much better fits with parameters of each trace's own (Wilks 1938)."""
+    from scipy.special import chdtrc
+
+    gained = 0.0
+    for problem in problems:
+        alone = settled(problem, local_fit(problem, best)).log_parameters
+        joint, own = _square_sum(problem, best), _square_sum(problem, alone)
+        if noise_rad is not None:
+            gained += (joint - own) / noise_rad**2
+        else:
+            gained += problem.residuals.free * log(joint / own)
+    return float(chdtrc((len(problems) - 1) * len(best), max(gained, 0.0)))
+
+
+def _square_sum(problem: Problem, x: Array) -> float:
+    residual, _ = problem.residuals(x)
+    return float(residual @ residual)

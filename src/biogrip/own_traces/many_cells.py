@@ -1,0 +1,373 @@
+"""Recorded traces of the cells of several groups, from files to differences, without a workflow."""
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from math import exp
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from tabulate import tabulate
+
+from biogrip import __version__
+from biogrip.arrays import Array
+from biogrip.digits import rounded
+from biogrip.errors import BiogripError
+from biogrip.experiment.random_streams import stream
+from biogrip.files import refuse_inputs, write_text
+from biogrip.groups.dishes import (
+    USUAL_POWER,
+    GroupDifference,
+    GroupFinding,
+    JudgedCell,
+    differences_of_groups,
+    findings_of_groups,
+)
+from biogrip.groups.joint_fit import fitted_jointly
+from biogrip.groups.membership import Cell, read_cells
+from biogrip.groups.population import FEWEST_CELLS
+from biogrip.identify.answer import Identification
+from biogrip.identify.methods import identifier
+from biogrip.identify.problem import Problem
+from biogrip.own_traces.one_trace import Wanted, study_of
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.stages import judgement, recording
+from biogrip.progress import Progress
+from biogrip.study.trace_file import trace_file_problem
+
+
+@dataclass(frozen=True)
+class _Posed:
+    """A recorded trace that can be used, and how it is judged."""
+
+    trace: Path
+    problem: Problem
+    settings: judgement.Settings
+
+
+def groups(
+    table: Path,
+    model: str,
+    measurement: dict[str, Any],
+    config: Path | None,
+    *,
+    output: Path | None,
+    force: bool,
+) -> int:
+    """Compare the groups of a table, write what is found, and print it.
+
+    Parameters
+    ----------
+    table
+        CSV file, see `read_cells`.
+    model, measurement, config
+        As of `Wanted`.
+    output
+        JSON file; by default beside the table.
+    force
+        Whether to replace a file that this program did not write.
+
+    Returns
+    -------
+    int
+        1 if any trace could not be used.
+
+    Raises
+    ------
+    BiogripError
+        If nothing can be compared as asked.
+    """
+    if problem := trace_file_problem(table):
+        raise BiogripError(f"TABLE: {problem}")
+    cells = read_cells(table)
+    written = output or table.with_suffix(".compared.json")
+    traces = [trace for cell in cells for trace in cell.traces]
+    refuse_inputs([written], [table, *traces, *filter(None, [config])])
+    check_output(written, force=force)
+    found = compare_groups(Wanted(table, model, measurement, config), cells, written)
+    print(in_words(found))
+    print(f"Written to {written}.")
+    return 1 if found["skipped"] else 0
+
+
+def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
+    """Identify every cell from its traces, and compare the groups of cells.
+
+    Traces that cannot be used are left out, and told of.
+
+    Parameters
+    ----------
+    wanted
+        How to read and to identify each trace; its trace is the table of cells.
+    cells
+        What the table holds.
+    output
+        Is written with what is returned, JSON.
+
+    Raises
+    ------
+    BiogripError
+        If an option or the config cannot be used, or none of the traces.
+    """
+    # What is wrong with the options is no trace's fault, and is said once.
+    study = study_of(wanted)
+    (case,) = study.cases.values()
+    posed, confidence = case.problem, case.confidence
+    progress = Progress(str(wanted.trace), len(cells))
+    judged: list[JudgedCell] = []
+    data: list[dict[str, Any]] = []
+    traces = _Traces(wanted)
+    for cell in cells:
+        progress.doing(f"cell {cell.name}")
+        usable = traces.of(cell)
+        if usable:
+            fit = fitted_jointly(
+                [each.problem for each in usable],
+                posed.searched,
+                _identify(usable[0], progress.within),
+                confidence=confidence,
+                noise_rad=posed.noise_rad,
+            )
+            judged.append(JudgedCell(cell.name, cell.group, fit))
+            data.append(
+                {
+                    "cell": cell.name,
+                    "group": cell.group,
+                    "traces": [
+                        {"file": str(each.trace), "noise_rad": rounded(noise)}
+                        for each, noise in zip(usable, fit.noise_rad, strict=True)
+                    ],
+                    "agreement_p": rounded(fit.agreement),
+                    **diagnosis_data(fit.diagnosis),
+                }
+            )
+        progress.done()
+    if not judged:
+        raise BiogripError(
+            f"{wanted.trace}: none of its traces can be used; the first: "
+            f"{traces.skipped[0]['reason']}"
+        )
+    # The first in the table is compared with, whichever of its traces can be used.
+    names = list(dict.fromkeys(cell.group for cell in cells))
+    findings = findings_of_groups(judged, names, confidence)
+    found = {
+        WRITTEN_BY: __version__,
+        "table": str(wanted.trace),
+        "model": posed.model.name,
+        "model_title": posed.model.title,
+        "confidence": confidence,
+        "cells": data,
+        "groups": [_group_data(finding) for finding in findings],
+        "differences": [_difference_data(each) for each in differences_of_groups(findings)],
+        "skipped": traces.skipped,
+    }
+    write_text(output, json.dumps(found, indent=1) + "\n")
+    return found
+
+
+def in_words(found: dict[str, Any]) -> str:
+    """Return what `compare_groups` found as tables to read."""
+    percent = f"{100 * found['confidence']:g} %"
+    parts = [f"{found['table']}: {found['model_title']}, {percent} limits"]
+    parts += [_cell_in_words(cell) for cell in found["cells"]]
+    parts.append(_groups_in_words(found["groups"], percent))
+    parts += _left_out_in_words(found["groups"])
+    if found["differences"]:
+        parts.append(_differences_in_words(found["differences"], percent))
+    elif len({row["group"] for row in found["groups"]}) > 1:
+        parts.append(
+            f"No quantity is determined in {FEWEST_CELLS} cells or more of two groups: "
+            "nothing is compared."
+        )
+    parts += [f"Skipped: {each['reason']}" for each in found["skipped"]]
+    return "\n\n".join(parts)
+
+
+class _Traces:
+    """Reads traces, and notes those that cannot be used."""
+
+    def __init__(self, wanted: Wanted) -> None:
+        self.skipped: list[dict[str, str]] = []
+        self._wanted = wanted
+        self._read: dict[bytes, Path] = {}
+
+    def of(self, cell: Cell) -> list[_Posed]:
+        """Pose the problems of a cell's traces."""
+        posed = []
+        for trace in cell.traces:
+            try:
+                posed.append(self._posed(trace))
+            except BiogripError as error:
+                reason = str(error) if str(trace) in str(error) else f"{trace}: {error}"
+                self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
+        return posed
+
+    def _posed(self, trace: Path) -> _Posed:
+        study = study_of(replace(self._wanted, trace=trace))
+        (case,) = study.cases.values()
+        recorded = recording.read_checked(recording.settings_of(case), trace)
+        rotation_rad = recorded.rotation_rad[0]
+        # Noise is never the same twice; copies would pass for cells that agree to the last digit.
+        same = sha256(rotation_rad.tobytes()).digest()
+        if (before := self._read.setdefault(same, trace)) != trace:
+            raise BiogripError(
+                f"{trace}: found the very rotations of {before}, allowed is each trace once."
+            )
+        problem = case.problem.of(recorded.time_s, rotation_rad)
+        return _Posed(trace, problem, judgement.settings_of(study, case))
+
+
+def _identify(
+    posed: _Posed, progress: Callable[[int, float], None]
+) -> Callable[[Problem], Identification]:
+    """Find global optima as `identify_trace` does for the trace."""
+    settings = posed.settings
+    identify = identifier("least_squares", settings.least_squares)
+
+    def found(problem: Problem) -> Identification:
+        rng = stream(settings.study_seed, settings.case, 0, "identifiability")
+        (answer,) = identify([problem], [rng], progress)
+        return answer
+
+    return found
+
+
+def _group_data(finding: GroupFinding) -> dict[str, Any]:
+    known, population = finding.estimates, finding.population
+    data: dict[str, Any] = {
+        "group": finding.group,
+        "quantity": finding.quantity,
+        "unit": finding.unit,
+        "determined": [
+            {"cell": cell, "value": rounded(exp(value)), "log_deviation": rounded(float(deviation))}
+            for cell, value, deviation in zip(
+                known.cells, known.log_values, known.deviations, strict=True
+            )
+        ],
+        "not_determined": list(finding.others),
+    }
+    if population is not None:
+        reach = population.reach * population.shrunk_deviations
+        data |= {
+            "median": rounded(population.median),
+            "low": rounded(population.low),
+            "high": rounded(population.high),
+            "spread": {
+                "log_deviation": rounded(population.spread),
+                "low": rounded(population.spread_low),
+                "high": rounded(population.spread_high),
+            },
+            "shrunk": _shrunk(known.cells, population.shrunk, reach),
+        }
+    return data
+
+
+def _shrunk(cells: Iterable[str], values: Array, reach: Array) -> list[dict[str, Any]]:
+    ends = (np.exp(values), np.exp(values - reach), np.exp(values + reach))
+    return [
+        {
+            "cell": cell,
+            "value": rounded(float(value)),
+            "low": rounded(float(low)),
+            "high": rounded(float(high)),
+        }
+        for cell, value, low, high in zip(cells, *ends, strict=True)
+    ]
+
+
+def _difference_data(each: GroupDifference) -> dict[str, Any]:
+    apart, ranks = each.difference, each.ranks
+    return {
+        "quantity": each.quantity,
+        "group": each.group,
+        "against": each.against,
+        "ratio": rounded(apart.ratio),
+        "low": rounded(apart.low),
+        "high": rounded(apart.high),
+        "degrees_of_freedom": rounded(apart.freedom),
+        "p": rounded(apart.p_value),
+        "adjusted_p": rounded(each.adjusted_p),
+        "by_ranks": {
+            "ratio": rounded(exp(ranks.estimate)),
+            "low": None if ranks.low is None else rounded(exp(ranks.low)),
+            "high": None if ranks.high is None else rounded(exp(ranks.high)),
+        },
+        "ratio_seen": rounded(each.ratio_seen),
+    }
+
+
+def _cell_in_words(cell: dict[str, Any]) -> str:
+    width = max(len(item["quantity"]) for item in cell["quantities"])
+    lines = [f"{cell['cell']} ({cell['group']})"]
+    lines += [
+        f"  {Path(trace['file']).name}: noise {trace['noise_rad']:.3g} rad"
+        for trace in cell["traces"]
+    ]
+    lines += [f"  {item['quantity']:<{width}}  {item['in_words']}" for item in cell["quantities"]]
+    lines += [f"  Note: {note}" for note in cell["notes"]]
+    return "\n".join(lines)
+
+
+def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
+    table = []
+    for row in rows:
+        cells = len(row["determined"])
+        line = [row["group"], row["quantity"], f"{cells} of {cells + len(row['not_determined'])}"]
+        if "median" in row:
+            spread = row["spread"]
+            line += [
+                f"{row['median']:.3g} {row['unit']}",
+                f"{row['low']:.3g} to {row['high']:.3g}",
+                f"{exp(spread['log_deviation']):.2f}",
+                f"{exp(spread['low']):.2f} to {exp(spread['high']):.2f}",
+            ]
+        table.append(line)
+    header = [
+        *("group", "quantity", "cells that determine it"),
+        *("median", f"{percent} interval", "spread, times", f"{percent} interval"),
+    ]
+    return _table(table, header)
+
+
+def _left_out_in_words(rows: list[dict[str, Any]]) -> list[str]:
+    """Name the cells of which a group's median says nothing, where it says something of others."""
+    words = [
+        f"{row['quantity']} in {row['group']} is of the cells that determine it, without "
+        f"{', '.join(row['not_determined'])}."
+        for row in rows
+        if row["not_determined"] and "median" in row
+    ]
+    return ["\n".join(words)] if words else []
+
+
+def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
+    table = []
+    for row in rows:
+        ranks = row["by_ranks"]
+        by_ranks = f"{ranks['ratio']:.3g}"
+        if ranks["low"] is not None:
+            by_ranks += f" ({ranks['low']:.3g} to {ranks['high']:.3g})"
+        table.append(
+            [
+                row["quantity"],
+                f"{row['group']} over {row['against']}",
+                f"{row['ratio']:.3g}",
+                f"{row['low']:.3g} to {row['high']:.3g}",
+                f"{row['p']:.2g}",
+                f"{row['adjusted_p']:.2g}",
+                by_ranks,
+                f"{row['ratio_seen']:.3g}",
+            ]
+        )
+    header = [
+        *("quantity", "groups", "ratio of medians", f"{percent} interval", "p", "adjusted p"),
+        *("by ranks", f"ratio found in {100 * USUAL_POWER:g} %"),
+    ]
+    return _table(table, header)
+
+
+def _table(rows: list[list[str]], header: list[str]) -> str:
+    return str(tabulate(rows, header, disable_numparse=True))

@@ -1,0 +1,62 @@
+"""Dishes simulated from traces to differences: a few here, the published hundreds as they came out.
+
+The hundreds are `groups_campaign`'s.
+"""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tests.helpers.groups_campaign import QUANTITIES, TABLE, counted, dishes
+
+
+def test_cells_are_known_as_well_as_they_say() -> None:
+    """And what is said of a pair does not depend on which others are simulated with it."""
+    found = dishes([0, 1], 1.0, 5)
+    (alone,) = dishes([1], 1.0, 5)
+    for together, own in zip(found[1], alone, strict=True):
+        for one, other in zip(together, own, strict=True):
+            assert one.estimates.cells == other.estimates.cells
+            assert np.array_equal(one.estimates.log_values, other.estimates.log_values)
+            assert np.array_equal(one.estimates.deviations, other.estimates.deviations)
+    # At this rate the interval of k, the first, is skewed, and no multiple of a deviation.
+    for index in range(1, len(QUANTITIES)):
+        own = [dish[index] for pair in found for dish in pair]
+        away = np.concatenate(
+            [(d.estimates.log_values - d.truth) / d.estimates.deviations for d in own]
+        )
+        # Of twenty squares, 1.5e-4 of chi^2 is beyond either limit.
+        assert len(away) > 15
+        assert 0.25 < float(np.mean(away**2)) < 2.6
+
+
+def test_pairs_are_counted() -> None:
+    table = counted(dishes([3], 1.0, 4), 1.0, 4)
+    assert list(table["quantity"]) == [quantity.label for quantity in QUANTITIES]
+    assert set(table["coverage_percent"]) <= {0.0, 100.0}
+
+
+@pytest.fixture(scope="module")
+def published() -> pd.DataFrame:
+    return pd.read_csv(TABLE)
+
+
+def test_published_differences_hold_the_truth(published: pd.DataFrame) -> None:
+    """500 pairs: one standard deviation of a share of 95 % is 1 %."""
+    assert set(published["pairs"]) == {500}
+    assert published["coverage_percent"].between(93, 97).all()
+
+
+def test_published_power_is_that_designed(published: pd.DataFrame) -> None:
+    """Three standard deviations of a share of 500, and what Welch's t differs from a pooled one.
+
+    Where errors come near the spread they differ from cell to cell, and the design, which takes
+    them as all the same, must not promise too much.
+    """
+    share = published["designed_power_percent"] / 100
+    allowed = 3 * 100 * np.sqrt(share * (1 - share) / published["pairs"]) + 1
+    apart = published["power_percent"] - published["designed_power_percent"]
+    assert (apart >= -allowed).all()
+    small = published["error"] < published["spread"] / 2
+    assert small.sum() == 5
+    assert (apart[small] <= allowed[small]).all()

@@ -1,0 +1,122 @@
+"""From verdicts on cells to groups: which cells count, which groups are compared, and how."""
+
+from typing import Any, cast
+from unittest.mock import Mock
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from biogrip.groups.dishes import (
+    GroupFinding,
+    JudgedCell,
+    differences_of_groups,
+    findings_of_groups,
+)
+from biogrip.groups.joint_fit import JointFit
+from biogrip.groups.power import power
+from biogrip.identifiability.diagnosis import Diagnosis
+from biogrip.identifiability.profile import Likelihood, Profile
+from biogrip.identifiability.quantities import Quantity
+from biogrip.identifiability.verdicts import Finding
+
+THRESHOLD = 4.0
+K, C = Quantity("k", "$k$", "N/m", (0,)), Quantity("c", "$c$", "N s/m", (1,))
+
+
+def judged(group: str, number: int, k: float | None, c: float | None) -> JudgedCell:
+    """A cell whose logarithms are known to 0.1, or bounded above only."""
+    findings = [
+        Finding(
+            quantity,
+            Profile(
+                *(np.zeros(2), np.zeros(2), value or 0.0, value and value - 0.2),
+                *((value or 0.0) + 0.2, np.zeros(2)),
+            ),
+            0.1,
+        )
+        for quantity, value in ((K, k), (C, c))
+    ]
+    likelihood = cast(Likelihood, Mock(threshold=THRESHOLD))
+    told = Diagnosis(likelihood, findings, [], cast(Any, None), [])
+    return JudgedCell(f"{group}{number}", group, JointFit(told, (1e-6,), None))
+
+
+RNG = np.random.default_rng(7)
+VALUES = {
+    group: middle + 0.3 * RNG.standard_normal(count)
+    for group, middle, count in (("a", 1.0, 6), ("b", 1.5, 5), ("d", 2.5, 4))
+}
+CELLS = [
+    # c of the second group is determined in two cells only.
+    judged(group, number, value, None if group == "b" and number > 1 else value)
+    for group, values in VALUES.items()
+    for number, value in enumerate(values)
+]
+
+
+@pytest.fixture(scope="module")
+def findings() -> list[GroupFinding]:
+    return findings_of_groups(CELLS, [*VALUES], 0.95)
+
+
+def test_only_cells_that_determine_a_quantity_count(findings: list[GroupFinding]) -> None:
+    by_name = {(each.group, each.quantity): each for each in findings}
+    assert list(by_name) == [(group, quantity) for group in "abd" for quantity in "kc"]
+    few = by_name["b", "c"]
+    assert few.estimates.cells == ("b0", "b1")
+    assert few.others == ("b2", "b3", "b4")
+    assert few.population is None
+    all_of_them = by_name["b", "k"]
+    assert all_of_them.others == ()
+    assert all_of_them.estimates.log_values == pytest.approx(VALUES["b"])
+    # Half an interval is two deviations at a threshold of four.
+    assert all_of_them.estimates.deviations == pytest.approx(0.1)
+    assert all_of_them.population is not None
+
+
+def test_groups_are_compared_with_the_first(findings: list[GroupFinding]) -> None:
+    found = differences_of_groups(findings)
+    assert [(each.quantity, each.group, each.against) for each in found] == [
+        *(("k", "b", "a"), ("k", "d", "a"), ("c", "d", "a"))
+    ]
+    # All errors the same, the weights are too: but for these, Welch's test.
+    for each in found:
+        expected = stats.ttest_ind(VALUES[each.group], VALUES["a"], equal_var=False)
+        assert each.difference.log_ratio == pytest.approx(
+            np.mean(VALUES[each.group]) - np.mean(VALUES["a"])
+        )
+        assert each.difference.p_value == pytest.approx(expected.pvalue, rel=1e-5)
+    first, second, alone = found
+    larger = max(first.difference.p_value, second.difference.p_value)
+    smaller = min(first.difference.p_value, second.difference.p_value)
+    assert sorted((first.adjusted_p, second.adjusted_p)) == pytest.approx(
+        [2 * smaller, max(2 * smaller, larger)]
+    )
+    assert alone.adjusted_p == alone.difference.p_value
+
+
+def test_the_ratio_that_is_seen_has_the_usual_power(findings: list[GroupFinding]) -> None:
+    found = differences_of_groups(findings)[1]
+    spreads = [each.population.spread for each in (findings[0], findings[4]) if each.population]
+    spread = float(np.sqrt(np.mean(np.square(spreads))))
+    assert power(found.ratio_seen, 4, spread, 0.1) == pytest.approx(0.8, abs=1e-6)
+
+
+def test_the_order_of_cells_does_not_matter(findings: list[GroupFinding]) -> None:
+    turned = CELLS[::-1]
+    for ours, theirs in zip(
+        differences_of_groups(findings),
+        differences_of_groups(findings_of_groups(turned, [*VALUES], 0.95)),
+        strict=True,
+    ):
+        assert ours.difference.ratio == pytest.approx(theirs.difference.ratio, rel=1e-12)
+        assert ours.difference.high == pytest.approx(theirs.difference.high, rel=1e-12)
+        assert ours.ranks == theirs.ranks
+
+
+def test_a_first_group_without_cells_is_compared_with_nothing() -> None:
+    found = findings_of_groups(CELLS, ["none", *VALUES], 0.95)
+    assert found[0].population is None
+    assert found[0].estimates.cells == found[0].others == ()
+    assert differences_of_groups(found) == []
