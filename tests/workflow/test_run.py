@@ -62,14 +62,27 @@ def test_a_config_that_cannot_be_used_is_named_before_anything_starts(
     assert {path.name for path in tmp_path.iterdir()} <= {"my.yaml"}
 
 
-def test_config_files_come_first(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["-n", "--configfile", "missing.yaml"], "missing.yaml: cannot be read: No such file"),
+        (["--configfile", "my.yaml", "-n"], "my.yaml, line 2: seedz: unknown key"),
+        (["my.yaml", "-n", "--configfile"], "--configfile: needs a file"),
+    ],
+)
+def test_config_files_may_be_given_as_to_snakemake(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+    given: list[str],
+    message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "my.yaml").write_text(TINY)
-    assert main(["run", "-n", "--configfile", "my.yaml"]) == 1
+    (tmp_path / "my.yaml").write_text("seeds: 2\nseedz: 3\n")
+    assert main(["run", *given]) == 1
     said = "".join(capfd.readouterr())
-    assert said.startswith("biogrip: --configfile: config files come first")
+    assert message in said
+    assert "Traceback" not in said
 
 
 def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:

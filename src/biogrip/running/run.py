@@ -110,7 +110,14 @@ def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     count = 0
     while count < len(names) and names[count].endswith((".yaml", ".yml", ".json")):
         count += 1
-    return names[:count], names[count:]
+    # As Snakemake has it, too; what it says of one that cannot be used ends in a traceback.
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
+    parser.add_argument("--configfile", "--configfiles", nargs="+", action="extend", default=[])
+    try:
+        known, rest = parser.parse_known_args(names[count:])
+    except argparse.ArgumentError as error:
+        raise BiogripError("--configfile: needs a file.") from error
+    return names[:count] + known.configfile, rest
 
 
 def _known(rest: list[str]) -> argparse.Namespace:
@@ -121,12 +128,7 @@ def _known(rest: list[str]) -> argparse.Namespace:
     parser.add_argument("-c", "--cores", "-j", "--jobs", nargs="?", const="all")
     parser.add_argument("--profile", "--workflow-profile")
     parser.add_argument("-q", "--quiet", nargs="*")
-    parser.add_argument("--configfile", "--configfiles", nargs="*")
     known, _ = parser.parse_known_args(rest)
-    if known.configfile is not None:
-        raise BiogripError(
-            "--configfile: config files come first here: biogrip run my.yaml, then options."
-        )
     return known
 
 
