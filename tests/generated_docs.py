@@ -10,6 +10,7 @@ from functools import partial
 from io import StringIO
 from pathlib import Path
 from pkgutil import iter_modules
+from tempfile import TemporaryDirectory
 from unittest import mock
 
 import pandas as pd
@@ -21,6 +22,7 @@ from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
 from biogrip.products.files.rows import RowFile
 from biogrip.study.reference import file_schema, reference
+from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
 
 ROOT = Path(__file__).parents[1]
@@ -106,6 +108,14 @@ def published_table(name: str) -> str:
     return file.read_text(encoding="utf-8").strip()
 
 
+def identified_example() -> str:
+    """What `biogrip identify` prints of the quantities of the example."""
+    with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said:
+        main(["identify", str(EXAMPLE), "--output", f"{folder}/found.json"])
+    lines = [line for line in said.getvalue().splitlines() if line.startswith("  ")]
+    return "\n".join(f"  {line}" for line in lines)
+
+
 def command_help() -> str:
     """What the command and each of its subcommands say of themselves."""
     overview = _help()
@@ -178,7 +188,7 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
-    ROOT / "README.md": {"results": paper_against_study},
+    ROOT / "README.md": {"results": paper_against_study, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
     ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
