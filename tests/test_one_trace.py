@@ -2,10 +2,12 @@
 
 import json
 import os
+import pty
 import shutil
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -403,3 +405,26 @@ def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "\x1b[32m2 (1 to 3)\x1b[0m" in side_by_side([found], {})
     monkeypatch.setenv("NO_COLOR", "1")
     assert "\x1b" not in side_by_side([found], {})
+
+
+def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path) -> None:
+    screen, terminal = pty.openpty()
+    command = [sys.executable, "-m", "biogrip", "identify", str(EXAMPLE)]
+    command += ["--output", str(tmp_path / "found.json")]
+    environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
+    with subprocess.Popen(command, stdout=terminal, stderr=terminal, env=environment) as running:
+        os.close(terminal)
+        shown = b""
+        # Whoever reads a terminal that is closed at the other end is told so by an error.
+        with suppress(OSError):
+            while more := os.read(screen, 65536):
+                shown += more
+    os.close(screen)
+    assert running.returncode == 0
+    said = shown.decode()
+    for phase in ("fitting 801 samples", "finding confidence limits", "trying other sample models"):
+        assert phase in said
+    # The line of the phases is gone before anything is told.
+    assert "\r\x1b[K" in said.split(str(EXAMPLE))[-2]
+    assert "\x1b[32mdetermined: " in said
+    assert "\x1b[33monly bounded above" in said

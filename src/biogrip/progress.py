@@ -2,8 +2,10 @@
 
 import sys
 import time
+from typing import Self
 
 _EVERY_S = 5.0
+_CLEARED = "\r\x1b[K"
 
 
 class Progress:
@@ -15,14 +17,27 @@ class Progress:
         Name of the job.
     total
         How many pieces it has.
+    live
+        Whether somebody who waits at a terminal sees every phase as it begins, in a line
+        that goes when all is done. Not for jobs that share a terminal.
     """
 
-    def __init__(self, what: str, total: int) -> None:
+    def __init__(self, what: str, total: int, *, live: bool = False) -> None:
         self._what = what
         self._total = total
+        self._live = live and sys.stderr.isatty()
         self._done = 0
         self._phase = ""
         self._said = time.monotonic()
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave nothing on the terminal."""
+        if self._live:
+            print(_CLEARED, end="", file=sys.stderr, flush=True)
 
     def done(self, pieces: int = 1) -> None:
         """Count what is done."""
@@ -41,12 +56,13 @@ class Progress:
 
     def _say(self, more: str) -> None:
         now = time.monotonic()
-        if now - self._said >= _EVERY_S:
+        said = f"{self._what}: {self._done} of {self._total} done{self._phase}{more}"
+        if self._live:
+            print(f"{_CLEARED}{said}", end="", file=sys.stderr, flush=True)
+        elif now - self._said >= _EVERY_S:
             self._said = now
             # Past the job's log, to whoever waits at the terminal.
-            print(
-                f"{self._what}: {self._done} of {self._total} done{self._phase}{more}", flush=True
-            )
+            print(said, flush=True)
 
 
 def warn(text: str) -> None:

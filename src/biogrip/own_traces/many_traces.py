@@ -1,5 +1,6 @@
 """Recorded traces one after the other: those that can be used, and why the others cannot."""
 
+import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +11,6 @@ from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import Page
 from biogrip.products.files.rows import write_rows
-from biogrip.progress import Progress
 
 _OF_QUANTITY = ("verdict", "value", "low", "high")
 
@@ -49,8 +49,7 @@ def identify_traces(
     """
     traces = list(traces)
     found, refused = [], {}
-    progress = Progress("identify", len(traces))
-    for trace in traces:
+    for number, trace in enumerate(traces, start=1):
         try:
             identified: Identified = identify_trace(replace(wanted, trace=trace), outputs[trace])
         except BiogripError as error:
@@ -59,7 +58,8 @@ def identify_traces(
             found.append(identified.data)
             if page is not None:
                 page.add(identified)
-        progress.done()
+        if len(traces) > 1:
+            print(f"{number} of {len(traces)}: {trace}", file=sys.stderr, flush=True)
     return Told(found, refused)
 
 

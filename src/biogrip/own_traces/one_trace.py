@@ -103,36 +103,36 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     """
     study = study_of(wanted)
     (case,) = study.cases.values()
-    progress = Progress(str(wanted.trace), 4)
-    recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
-    progress.done()
-    progress.doing(f"fitting {len(recorded.time_s)} samples")
-    settings, posed = judgement.settings_of(study, case), case.problem
-    problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
-    rng = stream(study.study_seed, case.name, 0, "identifiability")
-    identify = identifier("least_squares", settings.least_squares)
-    (found,) = identify([problem], [rng], progress.within)
-    progress.done()
-    progress.doing("finding confidence limits")
-    confidence = case.confidence
-    told = diagnose(
-        problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
-    )
-    progress.done()
-    progress.doing("trying other sample models")
-    data = {
-        WRITTEN_BY: __version__,
-        "trace": str(wanted.trace),
-        "model": posed.model.name,
-        "model_title": posed.model.title,
-        "confidence": confidence,
-        **_instrument(posed, recorded, np.exp(told.likelihood.best)),
-        **diagnosis_data(told),
-        **models_tried(study, case, recorded, progress.within),
-        "assumed": assumed(case),
-        "by_default": by_default(wanted.config),
-        "versions": versions(),
-    }
+    with Progress(str(wanted.trace), 4, live=True) as progress:
+        recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
+        progress.done()
+        progress.doing(f"fitting {len(recorded.time_s)} samples")
+        settings, posed = judgement.settings_of(study, case), case.problem
+        problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
+        rng = stream(study.study_seed, case.name, 0, "identifiability")
+        identify = identifier("least_squares", settings.least_squares)
+        (found,) = identify([problem], [rng], progress.within)
+        progress.done()
+        progress.doing("finding confidence limits")
+        confidence = case.confidence
+        told = diagnose(
+            problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
+        )
+        progress.done()
+        progress.doing("trying other sample models")
+        data = {
+            WRITTEN_BY: __version__,
+            "trace": str(wanted.trace),
+            "model": posed.model.name,
+            "model_title": posed.model.title,
+            "confidence": confidence,
+            **_instrument(posed, recorded, np.exp(told.likelihood.best)),
+            **diagnosis_data(told),
+            **models_tried(study, case, recorded, progress.within),
+            "assumed": assumed(case),
+            "by_default": by_default(wanted.config),
+            "versions": versions(),
+        }
     write_text(output, json.dumps(data, indent=1) + "\n")
     return Identified(data, posed, recorded)
 
