@@ -8,12 +8,15 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
 from biogrip.files import watched
 from biogrip.running.journal import recorded_in
+
+if TYPE_CHECKING:
+    from biogrip.own_traces.read_as import ReadAs
 
 RESULTS = Path("results")
 _SHOWN = 200
@@ -202,7 +205,7 @@ def _identify(options: argparse.Namespace) -> None:
     options.status = identify(
         options.traces,
         options.model,
-        _measurement(options),
+        _read_as(options),
         options.config,
         output=options.output,
         report=options.report,
@@ -217,25 +220,25 @@ def _groups(options: argparse.Namespace) -> None:
     options.status = groups(
         options.table,
         options.model,
-        _measurement(options),
+        _read_as(options),
         options.config,
         output=options.output,
         force=options.force,
     )
 
 
-def _measurement(options: argparse.Namespace) -> dict[str, Any]:
-    """Keys of the config's ``measurement`` block that were given as options."""
-    measurement = {
-        "time": options.time,
-        "rotation": options.rotation,
-        "time_unit": options.time_unit,
-        "rotation_unit": options.rotation_unit,
-        "noise_rad": options.noise,
-        "offset": options.offset,
-        "drift": options.drift,
-    }
-    return {key: value for key, value in measurement.items() if value is not None}
+def _read_as(options: argparse.Namespace) -> "ReadAs":
+    from biogrip.own_traces.read_as import ReadAs
+
+    return ReadAs(
+        options.time,
+        options.rotation,
+        options.time_unit,
+        options.rotation_unit,
+        options.noise,
+        options.offset,
+        options.drift,
+    )
 
 
 def _run(options: argparse.Namespace) -> None:

@@ -12,6 +12,7 @@ from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.own_traces.one_trace import Wanted, identify_trace
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.response.linear import rotation, step_response
 
 SAMPLES, MEANS_OF = 200_000, 50
@@ -31,7 +32,7 @@ def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
 
 
 def found_in(path: Path) -> dict[str, Any]:
-    wanted = Wanted(path, MODEL.name, {"time": "time_s", "rotation": "rotation_rad"}, None)
+    wanted = Wanted(path, MODEL.name, ReadAs(), None)
     return identify_trace(wanted, path.with_suffix(".json")).data
 
 

@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
 from biogrip.own_traces.many_traces import Told, identify_traces, write_table
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import check_output
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import in_words, side_by_side
 from biogrip.study.trace_file import trace_file_problem
 
@@ -16,7 +16,7 @@ from biogrip.study.trace_file import trace_file_problem
 def identify(
     traces: Sequence[Path],
     model: str,
-    measurement: dict[str, Any],
+    read_as: ReadAs,
     config: Path | None,
     *,
     output: Path | None,
@@ -30,7 +30,7 @@ def identify(
     ----------
     traces
         CSV files.
-    model, measurement, config
+    model, read_as, config
         As of `Wanted`.
     output
         JSON file, of a single trace; else each has one beside it.
@@ -53,7 +53,7 @@ def identify(
         raise BiogripError("--output: is of one trace; of several, each has its own beside it.")
     # What is wrong with all of them is said once, of the first that is there.
     there = [trace for trace in traces if len(traces) == 1 or not trace_file_problem(trace)]
-    wanted = Wanted((there or traces)[0], model, measurement, config)
+    wanted = Wanted((there or traces)[0], model, read_as, config)
     if there:
         study_of(wanted)
     outputs = {trace: output or trace.with_suffix(".identified.json") for trace in traces}

@@ -33,6 +33,7 @@ from biogrip.identify.methods import identifier
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
@@ -51,7 +52,7 @@ class _Posed:
 def groups(
     table: Path,
     model: str,
-    measurement: dict[str, Any],
+    read_as: ReadAs,
     config: Path | None,
     *,
     output: Path | None,
@@ -63,7 +64,7 @@ def groups(
     ----------
     table
         CSV file, see `read_cells`.
-    model, measurement, config
+    model, read_as, config
         As of `Wanted`.
     output
         JSON file; by default beside the table.
@@ -87,7 +88,7 @@ def groups(
     traces = [trace for cell in cells for trace in cell.traces]
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
-    found = compare_groups(Wanted(table, model, measurement, config), cells, written)
+    found = compare_groups(Wanted(table, model, read_as, config), cells, written)
     print(in_words(found))
     print(f"Written to {written}.")
     return 1 if found["skipped"] else 0

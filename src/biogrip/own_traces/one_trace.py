@@ -21,6 +21,7 @@ from biogrip.identify.methods import identifier
 from biogrip.own_traces.assumed import assumed, by_default, versions
 from biogrip.own_traces.models_tried import models_tried
 from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
@@ -31,18 +32,6 @@ from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.study.validation import value_problem
-
-_OPTIONS = {
-    "time": "--time",
-    "rotation": "--rotation",
-    "time_unit": "--time-unit",
-    "rotation_unit": "--rotation-unit",
-    "noise_rad": "--noise",
-    "offset": "--offset",
-    "drift": "--drift",
-}
-"""By key of the ``measurement`` block, what gives it on the command line."""
 
 
 @dataclass(frozen=True)
@@ -55,15 +44,15 @@ class Wanted:
         CSV file.
     model
         Name of the sample model.
-    measurement
-        Keys of the config's ``measurement`` block that concern the file.
+    read_as
+        Where in the file it stands, and what the instrument added.
     config
         YAML file laid over the default study: gripper, protocol, search range.
     """
 
     trace: Path
     model: str
-    measurement: dict[str, Any]
+    read_as: ReadAs
     config: Path | None
 
 
@@ -158,9 +147,7 @@ def study_of(wanted: Wanted) -> Study:
         With the option, or with file, line and key, of what no trace could be identified with.
     """
     check_trace_file(wanted.trace)
-    for key, value in wanted.measurement.items():
-        if problem := value_problem(("measurement", key), value):
-            raise BiogripError(f"{_OPTIONS[key]}: {problem}")
+    wanted.read_as.check()
     if wanted.model not in CANDIDATES:
         hint, names = nearest(wanted.model, CANDIDATES), ", ".join(CANDIDATES)
         raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {names}.")
@@ -169,7 +156,7 @@ def study_of(wanted: Wanted) -> Study:
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    measurement = {**wanted.measurement, "file": str(wanted.trace)}
+    measurement = {**wanted.read_as.block, "file": str(wanted.trace)}
     # A config may name cases of its own, for the workflow.
     merged.pop("only", None)
     merged["cases"] = {

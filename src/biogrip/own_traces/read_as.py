@@ -1,0 +1,51 @@
+"""How the file of a recorded trace is to be read."""
+
+from dataclasses import asdict, dataclass
+
+from biogrip.errors import BiogripError
+from biogrip.study.validation import value_problem
+
+_OPTIONS = {"noise_rad": "noise"}
+
+
+@dataclass(frozen=True)
+class ReadAs:
+    """Keys of the config's ``measurement`` block that concern a trace, as options give them.
+
+    Parameters
+    ----------
+    time, rotation
+        Names of the columns.
+    time_unit, rotation_unit
+        Where the columns' names have none.
+    noise_rad
+        Standard deviation of the noise, if it is known.
+    offset, drift
+        Whether the instrument may have added a constant, and a drift linear in time.
+    """
+
+    time: str = "time_s"
+    rotation: str = "rotation_rad"
+    time_unit: str | None = None
+    rotation_unit: str | None = None
+    noise_rad: float | None = None
+    offset: bool = False
+    drift: bool = False
+
+    @property
+    def block(self) -> dict[str, str | float | bool]:
+        """The keys that are given."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+    def check(self) -> None:
+        """Refuse what the config would refuse.
+
+        Raises
+        ------
+        BiogripError
+            With the option.
+        """
+        for key, value in self.block.items():
+            if problem := value_problem(("measurement", key), value):
+                option = _OPTIONS.get(key, key).replace("_", "-")
+                raise BiogripError(f"--{option}: {problem}")
