@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
@@ -16,6 +17,9 @@ from biogrip.response.grip import Grip
 _TOO_MUCH = 1.2
 # Correlation of neighbouring residuals, in standard deviations of that of white noise.
 _CORRELATED = 5.0
+# Stretches over which residuals are averaged, samples in the shortest, and the share of traces
+# with white noise that are said to wander.
+_STRETCHES, _SHORTEST, _FALSE_ALARM = 20, 5, 0.005
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
 
@@ -124,6 +128,14 @@ def _notes(likelihood: Likelihood) -> list[str]:
             f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the model, "
             "the protocol or the gripper is not the right one."
         )
+    chance = wandering(residual)
+    if chance < _FALSE_ALARM:
+        notes.append(
+            "The residual wanders: its means over stretches of the trace scatter as those of white "
+            f"noise would once in {1 / max(chance, 1e-300):.1g} traces. Something slow is in it "
+            "that the model does not have, a drift of the instrument perhaps: the intervals are "
+            "too narrow."
+        )
     scale = likelihood.problem.residuals.noise_scale_rad
     if misfit_rad > _TOO_MUCH * scale:
         notes.append(
@@ -131,3 +143,26 @@ def _notes(likelihood: Likelihood) -> list[str]:
             "protocol, the gripper or the unit is not the right one."
         )
     return notes
+
+
+def wandering(residual: Array) -> float:
+    """Return the probability that means of white noise over stretches scatter as much.
+
+    The sum of n_i m_i^2 / sigma^2 over stretches of n_i samples and mean m_i is
+    chi-squared for white noise, with a degree of freedom each; what a fit has
+    taken from it only lowers it. Parts of a spectrum below some ten periods a trace
+    show in it, however little they are beside the noise of single samples.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        What a fit leaves of a trace.
+    """
+    from scipy.special import chdtrc
+
+    stretches = min(_STRETCHES, len(residual) // _SHORTEST)
+    if stretches < 2:
+        return 1.0
+    parts = np.array_split(residual, stretches)
+    scatter = sum(len(part) * float(np.mean(part)) ** 2 for part in parts)
+    return float(chdtrc(stretches, scatter / float(np.mean(np.square(residual)))))

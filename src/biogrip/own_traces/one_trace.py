@@ -22,6 +22,7 @@ from biogrip.own_traces.assumed import assumed, by_default, versions
 from biogrip.own_traces.models_tried import models_tried
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
@@ -92,7 +93,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     """
     study = study_of(wanted)
     (case,) = study.cases.values()
-    with Progress(str(wanted.trace), 4, live=True) as progress:
+    with Progress(str(wanted.trace), 5, live=True) as progress:
         recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
@@ -108,7 +109,11 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
         )
         progress.done()
+        progress.doing("trying an offset and a drift")
+        doubts = second_opinion(study, case, recorded, told, progress.within)
+        progress.done()
         progress.doing("trying other sample models")
+        said = diagnosis_data(told)
         data = {
             WRITTEN_BY: __version__,
             "trace": str(wanted.trace),
@@ -116,7 +121,8 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             "model_title": posed.model.title,
             "confidence": confidence,
             **_instrument(posed, recorded, np.exp(told.likelihood.best)),
-            **diagnosis_data(told),
+            **said,
+            "notes": [*said["notes"], *doubts],
             **models_tried(study, case, recorded, progress.within),
             "assumed": assumed(case),
             "by_default": by_default(wanted.config),

@@ -1,0 +1,84 @@
+"""Whether the instrument may have added an offset or a drift that nobody declared."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import chdtrc
+
+from biogrip.experiment.random_streams import stream
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.verdicts import Finding
+from biogrip.identify.answer import Progress
+from biogrip.identify.methods import identifier
+from biogrip.products.files.traces import Measurements
+from biogrip.study.study import Case, Study
+
+FALSE_ALARM = 0.005
+"""Share of traces without offset and drift of which they are suspected."""
+
+
+def second_opinion(
+    study: Study, case: Case, recorded: Measurements, told: Diagnosis, progress: Progress
+) -> list[str]:
+    """Fit an offset and a drift along, and say so if they explain the trace far better.
+
+    By the likelihood ratio: chi^2 would fall by as much as chi-squared with as many
+    degrees of freedom as are added (Wilks 1938), more in one of 200 traces.
+
+    Parameters
+    ----------
+    study, case, recorded
+        The trace and how it is identified.
+    told
+        What it tells as it was declared.
+    progress
+        Is told of the fit.
+
+    Returns
+    -------
+    list of str
+        A sentence or none; none either where both are declared, or a fit takes minutes.
+    """
+    posed = case.problem
+    added = 2 - posed.offset - posed.drift
+    if not added or posed.nonlinear:
+        return []
+    also = replace(posed, offset=True, drift=True)
+    problem = also.of(recorded.time_s, recorded.rotation_rad[0])
+    identify = identifier("least_squares", case.method("least_squares"))
+    rng = stream(study.study_seed, case.name, 0, "instrument")
+    (found,) = identify([problem], [rng], progress)
+    fall = _fall(told, found.misfit_rad, known=posed.noise_rad is not None)
+    chance = float(chdtrc(added, fall))
+    if chance >= FALSE_ALARM:
+        return []
+    other = diagnose(
+        problem, also.searched, found, confidence=case.confidence, noise_rad=posed.noise_rad
+    )
+    changed = [
+        f"{after.quantity.label} would be {after.words()}"
+        for before, after in zip(told.findings, other.findings, strict=True)
+        if _differ(before, after)
+    ]
+    return [
+        "An offset and a drift of the instrument, fitted along, explain the trace far better "
+        f"(χ² falls by {fall:.3g}; by chance it would once in {1 / max(chance, 1e-300):.1g} "
+        f"traces): {'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, "
+        "identify the trace with --offset --drift."
+    ]
+
+
+def _fall(told: Diagnosis, misfit_rad: float, *, known: bool) -> float:
+    likelihood = told.likelihood
+    samples, before = likelihood.problem.residuals.samples, likelihood.misfit_rad
+    if known:
+        return samples * (before**2 - misfit_rad**2) / likelihood.noise_rad**2
+    return 2 * samples * float(np.log(before / misfit_rad))
+
+
+def _differ(before: Finding, after: Finding) -> bool:
+    """Whether one verdict is another, or an estimate outside the other interval."""
+    if before.verdict != after.verdict:
+        return True
+    low, high = before.low or 0.0, before.high or np.inf
+    return bool(before.told and not low <= after.value <= high)

@@ -1,0 +1,87 @@
+"""What drifts slowly beside the noise is said of a trace, and what does not is not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from biogrip.arrays import Array
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose, wandering
+from biogrip.identify.answer import silent
+from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
+from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.second_opinion import second_opinion
+from biogrip.products.files.traces import Measurements
+from tests.helpers.problems import clean, run
+
+TIMES, CLEAN = clean("endothelial_cell", 5.0)
+SIGMA = 0.1 * float(CLEAN.max())
+DRIFT = SIGMA * TIMES / TIMES[-1]
+SLOW = SIGMA * np.sin(2 * np.pi * TIMES / 150)
+
+
+def trace(seed: int, added: Array) -> Array:
+    noise: Array = SIGMA * np.random.default_rng([seed, 11]).standard_normal(len(TIMES))
+    return CLEAN + added + noise
+
+
+def written(path: Path, rotation: Array) -> Path:
+    rows = zip(TIMES, rotation, strict=True)
+    path.write_text("time_s,rotation_rad\n" + "".join(f"{t:.6g},{x:.8e}\n" for t, x in rows))
+    return path
+
+
+def suspected(folder: Path, seed: int, added: Array) -> tuple[Diagnosis, list[str]]:
+    """What is said of a trace, and of an offset and a drift in it."""
+    rotation = trace(seed, added)
+    study = study_of(Wanted(written(folder / "t.csv", rotation), "liquid_drop", ReadAs(), None))
+    (case,) = study.cases.values()
+    problem = case.problem.of(TIMES, rotation)
+    told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
+    recorded = Measurements(TIMES, None, {0: rotation})
+    return told, second_opinion(study, case, recorded, told, silent)
+
+
+def test_white_noise_wanders_as_often_as_it_should() -> None:
+    """Within four standard deviations of the share; the statistic's own distribution is SciPy's."""
+    rng = np.random.default_rng(0)
+    chances = [wandering(rng.standard_normal(1000)) for _ in range(4000)]
+    assert np.mean(np.less(chances, 0.005)) == pytest.approx(0.005, abs=4 * (0.005 / 4000) ** 0.5)
+    residual = rng.standard_normal(1000)
+    means = residual.reshape(20, 50).mean(axis=1)
+    expected = chi2.sf(np.sum(50 * means**2) / np.mean(residual**2), 20)
+    assert wandering(residual) == pytest.approx(expected, rel=1e-12)
+    assert wandering(np.ones(9)) == 1.0
+
+
+def test_what_is_slow_is_seen_where_samples_next_to_each_other_do_not_show_it(
+    tmp_path: Path,
+) -> None:
+    """A quarter of the noise: neighbouring residuals are correlated by three hundredths."""
+    told, _ = suspected(tmp_path, 0, 0.4 * SLOW)
+    assert any("wanders" in note for note in told.notes)
+    assert not any("correlated" in note for note in told.notes)
+
+
+def test_a_drift_that_a_sample_could_have_shown_is_suspected(tmp_path: Path) -> None:
+    """Most of it is fitted away, as a softer sample."""
+    for seed in range(3):
+        (said,) = suspected(tmp_path, seed, 0.6 * DRIFT)[1]
+        assert "--offset --drift" in said
+        assert "k_p would be determined" in said
+
+
+def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
+    """Each would be once in two hundred times."""
+    for seed in range(4):
+        told, doubts = suspected(tmp_path, seed, 0 * DRIFT)
+        assert (told.notes, doubts) == ([], [])
+
+
+def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
+    file = written(tmp_path / "t.csv", trace(0, DRIFT))
+    for declared in (ReadAs(), ReadAs(offset=True, drift=True)):
+        wanted = Wanted(file, "liquid_drop", declared, None)
+        notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]
+        assert any("--offset --drift" in note for note in notes) == (not declared.drift)
