@@ -3,7 +3,6 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.cli import main
 from tests.generated_docs import GENERATED, ROOT, renewed
 
 
@@ -44,15 +43,3 @@ def test_the_readme_leads_to_every_document() -> None:
             if there.is_file():
                 left.append(str(there.resolve().relative_to(ROOT)))
     assert {str(file.relative_to(ROOT)) for file in (ROOT / "docs").rglob("*.md")} <= found
-
-
-def test_the_readme_shows_what_the_example_prints(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    trace = ROOT / "data" / "example_trace.csv"
-    assert main(["identify", str(trace), "--output", str(tmp_path / "found.json")]) == 0
-    printed = [line.strip() for line in capsys.readouterr().out.splitlines()]
-    shown = (ROOT / "README.md").read_text(encoding="utf-8").split("prints\n")[1].split("\n\n")[0]
-    lines = [line.strip() for line in shown.strip().splitlines()]
-    assert len(lines) == 5
-    assert [line for line in lines if line not in printed] == []
