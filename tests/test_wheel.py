@@ -74,7 +74,7 @@ def test_the_wheel_identifies_the_example(commands: Path, tmp_path: Path) -> Non
     (tmp_path / "trace.csv").write_bytes(EXAMPLE.read_bytes())
     said = called(commands / "biogrip", "identify", "trace.csv", folder=tmp_path)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    shown = readme.split("prints\n")[1].split("\n\n")[0].strip().splitlines()
+    shown = readme.split("example: begin")[1].split("\n\n")[1].strip().splitlines()
     assert len(shown) == 5
     printed = [line.strip() for line in said.splitlines()]
     assert [line for line in shown if line.strip() not in printed] == []
