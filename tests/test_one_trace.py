@@ -18,6 +18,9 @@ import yaml
 
 from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.errors import BiogripError
+from biogrip.own_traces.many_traces import Told, write_table
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.words import side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
@@ -277,6 +280,20 @@ def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("command", ["verify", "clean", "identify --config", "compare", "publish"])
+def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
+    """Its mark stands at the end of a header that may be long."""
+    table = tmp_path / "table.csv"
+    found = {"trace": "a.csv", "model": "m", "samples": 1, "noise_rad": 1.0, "misfit_rad": 1.0}
+    quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
+    quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
+    rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
+    write_table(Told([{**found, **rest}], {}), table)
+    check_output(table, force=False)
+    table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
+    with pytest.raises(BiogripError, match="biogrip did not write it"):
+        check_output(table, force=False)
+
+
 def test_a_path_that_no_system_allows_is_one_message(
     capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
@@ -308,12 +325,13 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path) -> None:
     bad.write_text(EXAMPLE.read_text().replace(",", ";", 5))
     page, table = tmp_path / "out.html", tmp_path / "out.csv"
     missing = tmp_path / "c.csv"
-    done = identify(*good, bad, missing, "--report", page, "--csv", table)
+    # Of a folder there is no name to write beside.
+    done = identify(*good, good[0], bad, missing, "/", "--report", page, "--csv", table)
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stderr
     rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
-    assert list(rows.index) == [*map(str, good), str(bad), str(missing)]
-    assert list(rows["problem"] != "") == [False, False, True, True]
+    assert list(rows.index) == [*map(str, good), str(bad), str(missing), "/"]
+    assert list(rows["problem"] != "") == [False, False, True, True, True]
     told = json.loads((tmp_path / "a.identified.json").read_text())
     assert rows.loc[str(good[0]), "k value"] == str(told["quantities"][0]["value"])
     # The same trace under another name is the same trace.

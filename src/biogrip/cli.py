@@ -153,9 +153,6 @@ def _identify_parser(stages: Any) -> None:
     identify.add_argument(
         "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
     )
-    identify.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
 
 
 def _groups_parser(stages: Any) -> None:
@@ -167,9 +164,6 @@ def _groups_parser(stages: Any) -> None:
     )
     _trace_options(groups)
     groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
-    groups.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:
@@ -189,6 +183,9 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
     command.add_argument("--offset", action="store_true", help="fit an offset along")
     command.add_argument("--drift", action="store_true", help="fit a linear drift along")
+    command.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
 
 
 def _make(options: argparse.Namespace) -> None:

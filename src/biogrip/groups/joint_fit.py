@@ -22,7 +22,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.groups.replicates import joint_problem
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose, one_in
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
@@ -97,8 +97,8 @@ def fitted_jointly(
     agreement = _agreement(problems, told.likelihood.best, noise_rad)
     if agreement < _DISAGREE:
         told.notes.append(
-            "The traces do not tell of one and the same sample (replicates differ so much once in "
-            f"with p = {agreement:.1g}): the cell changed, or the intervals are too narrow."
+            "The traces do not tell of one and the same sample (replicates of one would differ as "
+            f"much {one_in(agreement)}): the cell changed, or the intervals are too narrow."
         )
     return JointFit(told, tuple(levels), agreement)
 

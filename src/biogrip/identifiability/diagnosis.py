@@ -17,11 +17,13 @@ from biogrip.response.grip import Grip
 _TOO_MUCH = 1.2
 # Correlation of neighbouring residuals, in standard deviations of that of white noise.
 _CORRELATED = 5.0
-# Stretches over which residuals are averaged, samples in the shortest, and the share of traces
-# with white noise that are said to wander.
-_STRETCHES, _SHORTEST, _FALSE_ALARM = 20, 5, 0.005
+# Stretches over which residuals are averaged, and samples in the shortest.
+_STRETCHES, _SHORTEST = 20, 5
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
+
+FALSE_ALARM = 0.005
+"""Share of traces with white noise of which something slow is suspected, by any one test."""
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,10 @@ def _notes(likelihood: Likelihood) -> list[str]:
             "the protocol or the gripper is not the right one."
         )
     chance = wandering(residual)
-    if chance < _FALSE_ALARM:
+    if chance < FALSE_ALARM:
         notes.append(
             "The residual wanders: its means over stretches of the trace scatter as those of white "
-            f"noise would once in {1 / max(chance, 1e-300):.1g} traces. Something slow is in it "
+            f"noise would {one_in(chance)} traces. Something slow is in it "
             "that the model does not have, a drift of the instrument perhaps: the intervals are "
             "too narrow."
         )
@@ -143,6 +145,11 @@ def _notes(likelihood: Likelihood) -> list[str]:
             "protocol, the gripper or the unit is not the right one."
         )
     return notes
+
+
+def one_in(chance: float) -> str:
+    """Say how rare something is, e.g. ``"once in 2e+03"``."""
+    return f"once in {1 / max(chance, 1e-300):.1g}"
 
 
 def wandering(residual: Array) -> float:

@@ -119,3 +119,23 @@ def identifier(name: str, settings: object) -> Identify:
         ]
 
     return identify
+
+
+def best_fit(
+    problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
+) -> Identification:
+    """Identify one trace by multi-start least squares, the method of every judgement.
+
+    Parameters
+    ----------
+    problem
+        The trace.
+    least_squares
+        The method's settings.
+    rng
+        Draws the starts.
+    progress
+        Is told of the fits.
+    """
+    (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
+    return found

@@ -6,7 +6,7 @@ from pathlib import Path
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
 from biogrip.own_traces.many_traces import Told, identify_traces, write_table
-from biogrip.own_traces.one_trace import Wanted, study_of
+from biogrip.own_traces.one_trace import Wanted, check_trace_file, study_of
 from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import in_words, side_by_side
@@ -51,25 +51,29 @@ def identify(
     """
     if output is not None and len(traces) > 1:
         raise BiogripError("--output: is of one trace; of several, each has its own beside it.")
-    # What is wrong with all of them is said once, of the first that is there.
-    there = [trace for trace in traces if len(traces) == 1 or not trace_file_problem(trace)]
+    if len(traces) == 1:
+        check_trace_file(traces[0])
+    problems = {trace: trace_file_problem(trace) for trace in traces}
+    absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
+    there = [trace for trace in traces if str(trace) not in absent]
     wanted = Wanted((there or traces)[0], model, read_as, config)
-    if there:
+    if len(traces) > 1 and there:
+        # What is wrong with all of them is said once.
         study_of(wanted)
-    outputs = {trace: output or trace.with_suffix(".identified.json") for trace in traces}
+    outputs = {trace: output or trace.with_suffix(".identified.json") for trace in there}
     written = [*outputs.values(), *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     refuse_inputs(written, [*traces, *filter(None, [config])])
     for path in written:
-        if path in (report, table, output) or path.parent.is_dir():
-            check_output(path, force=force)
+        check_output(path, force=force)
     page = None
     if report is not None:
         from biogrip.own_traces.page import Page
 
         page = Page()
-    told = identify_traces(wanted, list(outputs), outputs, page)
+    told = identify_traces(wanted, outputs, page)
+    told.refused.update(absent)
     if len(traces) == 1 and told.refused:
         raise BiogripError(next(iter(told.refused.values())))
     if table is not None:

@@ -29,7 +29,7 @@ from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.groups.membership import Cell, read_cells
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identify.answer import Identification
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
@@ -226,12 +226,10 @@ def _identify(
 ) -> Callable[[Problem], Identification]:
     """Find global optima as `identify_trace` does for the trace."""
     settings = posed.settings
-    identify = identifier("least_squares", settings.least_squares)
 
     def found(problem: Problem) -> Identification:
         rng = stream(settings.study_seed, settings.case, 0, "identifiability")
-        (answer,) = identify([problem], [rng], progress)
-        return answer
+        return best_fit(problem, settings.least_squares, rng, progress)
 
     return found
 

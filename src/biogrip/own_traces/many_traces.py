@@ -10,6 +10,7 @@ from biogrip.errors import BiogripError
 from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import Page
+from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
 
 _OF_QUANTITY = ("verdict", "value", "low", "high")
@@ -31,43 +32,36 @@ class Told:
     refused: dict[str, str]
 
 
-def identify_traces(
-    wanted: Wanted, traces: Iterable[Path], outputs: Mapping[Path, Path], page: Page | None
-) -> Told:
+def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: Page | None) -> Told:
     """Identify traces, each by itself.
 
     Parameters
     ----------
     wanted
         How, for all of them; its own trace does not count.
-    traces
-        CSV files.
     outputs
-        Where what is said of each is written, JSON.
+        Where what is said of each is written, JSON, by CSV file.
     page
         Is given every trace that could be used.
     """
-    traces = list(traces)
     found, refused = [], {}
-    for number, trace in enumerate(traces, start=1):
+    for number, (trace, output) in enumerate(outputs.items(), start=1):
         try:
-            identified: Identified = identify_trace(replace(wanted, trace=trace), outputs[trace])
+            identified: Identified = identify_trace(replace(wanted, trace=trace), output)
         except BiogripError as error:
             refused[str(trace)] = str(error)
         else:
             found.append(identified.data)
             if page is not None:
                 page.add(identified)
-        if len(traces) > 1:
-            print(f"{number} of {len(traces)}: {trace}", file=sys.stderr, flush=True)
+        if len(outputs) > 1:
+            print(f"{number} of {len(outputs)}: {trace}", file=sys.stderr, flush=True)
     return Told(found, refused)
 
 
 def write_table(told: Told, table: Path) -> None:
     """Write a row a trace, CSV."""
-    quantities = list(
-        dict.fromkeys(q["quantity"] for each in told.found for q in each["quantities"])
-    )
+    quantities = labels_of(told.found)
     columns = ["trace", "problem", "model", "samples", "noise_rad", "misfit_rad"]
     columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
     rows = [

@@ -6,7 +6,7 @@ from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.answer import Progress
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import best_fit
 from biogrip.identify.model_choice import advice, ranked
 from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study
@@ -22,14 +22,13 @@ def models_tried(
     posed, candidates = case.problem, study.models_of(case)
     if posed.nonlinear or posed.fixed:
         return {"models": [], "advice": None}
-    identify = identifier("least_squares", case.method("least_squares"))
+    least_squares = case.method("least_squares")
     misfits = []
     for name in candidates:
         model = CANDIDATES[name].model
         problem = posed.of(recorded.time_s, recorded.rotation_rad[0], model)
         rng = stream(study.study_seed, case.name, 0, f"model {name}")
-        (found,) = identify([problem], [rng], progress)
-        misfits.append(found.misfit_rad)
+        misfits.append(best_fit(problem, least_squares, rng, progress).misfit_rad)
     tried = ranked(candidates, misfits, len(recorded.time_s))
     rows = [
         {

@@ -17,7 +17,7 @@ from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import best_fit
 from biogrip.own_traces.assumed import assumed, by_default, versions
 from biogrip.own_traces.models_tried import models_tried
 from biogrip.own_traces.outputs import WRITTEN_BY
@@ -100,8 +100,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
         settings, posed = judgement.settings_of(study, case), case.problem
         problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
         rng = stream(study.study_seed, case.name, 0, "identifiability")
-        identify = identifier("least_squares", settings.least_squares)
-        (found,) = identify([problem], [rng], progress.within)
+        found = best_fit(problem, settings.least_squares, rng, progress.within)
         progress.done()
         progress.doing("finding confidence limits")
         confidence = case.confidence

@@ -11,6 +11,7 @@ WRITTEN_BY = "written_by_biogrip"
 """Tells our files from others, which are not replaced."""
 
 _HEAD_BYTES = 500
+_LONGEST = 100_000
 
 
 def check_output(output: Path, *, force: bool) -> None:
@@ -54,6 +55,10 @@ def _is_ours(output: Path) -> bool:
         if output.suffix == ".json":
             return WRITTEN_BY in json.loads(output.read_bytes())
         with output.open("rb") as stream:
-            return WRITTEN_BY.encode() in stream.read(_HEAD_BYTES)
+            # The header of a table, however many quantities it has; the first lines of a page.
+            head = (
+                stream.readline(_LONGEST) if output.suffix == ".csv" else stream.read(_HEAD_BYTES)
+            )
+            return WRITTEN_BY.encode() in head
     except (OSError, ValueError, TypeError, RecursionError):
         return False

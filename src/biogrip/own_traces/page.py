@@ -1,6 +1,5 @@
 """What traces tell on one page that needs nothing else."""
 
-import base64
 import io
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,13 +13,14 @@ from biogrip import __version__
 from biogrip.files import write_text
 from biogrip.own_traces.one_trace import Identified
 from biogrip.own_traces.outputs import WRITTEN_BY
-from biogrip.own_traces.words import limits_in_short, taken_for_granted
+from biogrip.own_traces.words import labels_of, limits_in_short, taken_for_granted
 from biogrip.products.figures.fit import draw_fit
 from biogrip.products.figures.profiles import Settings as ProfileSettings
 from biogrip.products.figures.profiles import draw_profiles
 from biogrip.products.figures.residual_diagnosis import draw_residuals
 from biogrip.products.figures.results import fit_of
 from biogrip.products.figures.style import styled
+from biogrip.products.pages.png_address import png_address
 
 
 class Page:
@@ -52,9 +52,7 @@ class Page:
             traces=self._traces,
             refused=refused,
             written_by=f"{WRITTEN_BY} {__version__}",
-            labels=list(
-                dict.fromkeys(q["quantity"] for each in self._traces for q in each["quantities"])
-            ),
+            labels=labels_of(self._traces),
         )
         write_text(page, text)
 
@@ -74,4 +72,4 @@ def _figures(identified: Identified) -> dict[str, Figure]:
 def _embedded(drawn: Figure) -> str:
     content = io.BytesIO()
     drawn.savefig(content, format="png", metadata={"Software": None})
-    return "data:image/png;base64," + base64.b64encode(content.getvalue()).decode()
+    return png_address(content.getvalue())

@@ -6,15 +6,12 @@ import numpy as np
 from scipy.special import chdtrc
 
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.diagnosis import FALSE_ALARM, Diagnosis, diagnose, one_in
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.answer import Progress
-from biogrip.identify.methods import identifier
+from biogrip.identify.methods import best_fit
 from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study
-
-FALSE_ALARM = 0.005
-"""Share of traces without offset and drift of which they are suspected."""
 
 
 def second_opinion(
@@ -45,9 +42,8 @@ def second_opinion(
         return []
     also = replace(posed, offset=True, drift=True)
     problem = also.of(recorded.time_s, recorded.rotation_rad[0])
-    identify = identifier("least_squares", case.method("least_squares"))
     rng = stream(study.study_seed, case.name, 0, "instrument")
-    (found,) = identify([problem], [rng], progress)
+    found = best_fit(problem, case.method("least_squares"), rng, progress)
     fall = _fall(told, found.misfit_rad, known=posed.noise_rad is not None)
     chance = float(chdtrc(added, fall))
     if chance >= FALSE_ALARM:
@@ -62,7 +58,7 @@ def second_opinion(
     ]
     return [
         "An offset and a drift of the instrument, fitted along, explain the trace far better "
-        f"(χ² falls by {fall:.3g}; by chance it would once in {1 / max(chance, 1e-300):.1g} "
+        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} "
         f"traces): {'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, "
         "identify the trace with --offset --drift."
     ]

@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from tabulate import tabulate
@@ -47,7 +47,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
     """Return what is said of several traces as a table, a row a trace, and the refused ones."""
     lines = []
     if found:
-        labels = list(dict.fromkeys(q["quantity"] for each in found for q in each["quantities"]))
+        labels = labels_of(found)
         rows = [[each["trace"], *_cells(each, labels), _doubts(each)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
         header = ["trace", *(f"{label} ({units[label]})" for label in labels), "doubts"]
@@ -61,6 +61,11 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
         lines += [f"  {reason}" for reason in refused.values()]
     return "\n".join(lines)
+
+
+def labels_of(found: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return what is said of any of several traces, each quantity once."""
+    return list(dict.fromkeys(q["quantity"] for each in found for q in each["quantities"]))
 
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:

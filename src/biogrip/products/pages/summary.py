@@ -1,6 +1,5 @@
 """What a trace tells on one page, with its figures inside."""
 
-import base64
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from biogrip.products.figures.judged_fit import JUDGED_FIT
 from biogrip.products.figures.profiles import PROFILES
 from biogrip.products.figures.valley import VALLEY
 from biogrip.products.files.verdicts import PATH, read_verdicts
+from biogrip.products.pages.png_address import png_address
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, the, wildcards_of
 from biogrip.products.stages.judgement import TRACE
@@ -88,7 +88,7 @@ def embedded(path: Path) -> str:
         If it cannot be read.
     """
     try:
-        return "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()
+        return png_address(path.read_bytes())
     except OSError as error:
         raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
 

@@ -17,7 +17,7 @@ from biogrip.identifiability.valley import valley_and_deeper
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.local_fit import local_fit, settled
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.methods import METHODS, best_fit
 from biogrip.identify.multi_start import fitted_from
 from biogrip.identify.problem import Problem
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
@@ -103,9 +103,8 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     posed = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     problem = posed.of(recorded.time_s, recorded.rotation_rad[TRACE])
-    identify = identifier("least_squares", settings.least_squares)
     rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
-    (found,) = identify([problem], [rng], silent)
+    found = best_fit(problem, settings.least_squares, rng, silent)
     told, valley = _diagnosed(problem, posed, found, settings.confidence)
     data = {
         "case": settings.case,
