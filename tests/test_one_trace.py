@@ -280,20 +280,6 @@ def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("command", ["verify", "clean", "identify --config", "compare", "publish"])
-def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
-    """Its mark stands at the end of a header that may be long."""
-    table = tmp_path / "table.csv"
-    found = {"trace": "a.csv", "model": "m", "samples": 1, "noise_rad": 1.0, "misfit_rad": 1.0}
-    quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
-    quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
-    rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
-    write_table(Told([{**found, **rest}], {}), table)
-    check_output(table, force=False)
-    table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
-    with pytest.raises(BiogripError, match="biogrip did not write it"):
-        check_output(table, force=False)
-
-
 def test_a_path_that_no_system_allows_is_one_message(
     capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
@@ -306,6 +292,20 @@ def test_a_path_that_no_system_allows_is_one_message(
     said = capsys.readouterr().err
     assert said.startswith("biogrip: ")
     assert said.count("\n") == 1
+
+
+def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
+    """Its mark stands at the end of a header that may be long."""
+    table = tmp_path / "table.csv"
+    found = {"trace": "a.csv", "model": "m", "samples": 1, "noise_rad": 1.0, "misfit_rad": 1.0}
+    quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
+    quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
+    rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
+    write_table(Told([{**found, **rest}], {}), table)
+    check_output(table, force=False)
+    table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
+    with pytest.raises(BiogripError, match="biogrip did not write it"):
+        check_output(table, force=False)
 
 
 def test_nobody_reading_on_is_no_error(tmp_path: Path) -> None:
