@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from biogrip.arrays import Array
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose, wandering
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.whiteness import wandering
 from biogrip.identify.answer import silent
 from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs

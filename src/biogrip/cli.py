@@ -184,6 +184,9 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--offset", action="store_true", help="fit an offset along")
     command.add_argument("--drift", action="store_true", help="fit a linear drift along")
     command.add_argument(
+        "--noise-model", help="white, or coloured: intervals that allow for noise that remembers"
+    )
+    command.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
     )
 
@@ -235,6 +238,7 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         options.noise,
         options.offset,
         options.drift,
+        options.noise_model,
     )
 
 

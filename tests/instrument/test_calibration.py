@@ -79,7 +79,10 @@ def test_calibration_is_written_and_read_back(tmp_path: Path) -> None:
     found = calibrate(noisy(ARM, 0.05, 2), *CAUSES)
     path, nominal = tmp_path / "gripper.yaml", Gripper(1.5e-3, 75.0, ARM, ARM)
     path.write_text(calibration_yaml(found, found))
-    read = read_calibrated_arms(path, nominal)
+    read, known = read_calibrated_arms(path, nominal)
+    assert known["left"]["stiffness_Nm_per_rad"] == pytest.approx(
+        found.uncertainty.stiffness_Nm_per_rad, rel=0.05
+    )
     np.testing.assert_allclose(
         dataclasses.astuple(read.left), dataclasses.astuple(found.arm), rtol=1e-6
     )

@@ -22,7 +22,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.groups.replicates import joint_problem
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose, one_in
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.whiteness import one_in
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem

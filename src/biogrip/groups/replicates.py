@@ -68,6 +68,11 @@ class JointResiduals(Residuals):
         return self._stacked([part.condensed(log_parameters) for part in self._parts])
 
     @property
+    def coloured(self) -> bool:
+        """Whether noise was not white, and has been made so."""
+        return all(part.coloured for part in self._parts)
+
+    @property
     def condensable(self) -> bool:
         """Whether few rows may stand for all samples of every trace."""
         return all(part.condensable for part in self._parts)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
+from biogrip.identifiability.whiteness import doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
@@ -15,15 +15,8 @@ from biogrip.response.grip import Grip
 
 # A misfit that exceeds what neighbouring samples scatter by so much is not noise.
 _TOO_MUCH = 1.2
-# Correlation of neighbouring residuals, in standard deviations of that of white noise.
-_CORRELATED = 5.0
-# Stretches over which residuals are averaged, and samples in the shortest.
-_STRETCHES, _SHORTEST = 20, 5
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
-
-FALSE_ALARM = 0.005
-"""Share of traces with white noise of which something slow is suspected, by any one test."""
 
 
 @dataclass(frozen=True)
@@ -118,58 +111,20 @@ def _pulling(grip: Grip, last_s: float) -> list[str]:
 
 
 def _notes(likelihood: Likelihood) -> list[str]:
-    residual, _ = likelihood.problem.residuals(likelihood.best)
-    misfit_rad = likelihood.misfit_rad
+    residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
+    residual, _ = residuals(likelihood.best)
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return []
-    notes = []
-    correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
-    if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
+    notes = doubts_about_noise(residual)
+    if notes and not residuals.coloured:
         notes.append(
-            f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
-            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the model, "
-            "the protocol or the gripper is not the right one."
+            "Intervals that allow for such noise are those of measurement.noise_model: coloured, "
+            "or --noise-model coloured."
         )
-    chance = wandering(residual)
-    if chance < FALSE_ALARM:
-        notes.append(
-            "The residual wanders: its means over stretches of the trace scatter as those of white "
-            f"noise would {one_in(chance)} traces. Something slow is in it "
-            "that the model does not have, a drift of the instrument perhaps: the intervals are "
-            "too narrow."
-        )
-    scale = likelihood.problem.residuals.noise_scale_rad
+    scale = residuals.noise_scale_rad
     if misfit_rad > _TOO_MUCH * scale:
         notes.append(
             f"The misfit is {misfit_rad / scale:.2g} times the noise of the trace: the model, the "
             "protocol, the gripper or the unit is not the right one."
         )
     return notes
-
-
-def one_in(chance: float) -> str:
-    """Say how rare something is, e.g. ``"once in 2e+03"``."""
-    return f"once in {1 / max(chance, 1e-300):.1g}"
-
-
-def wandering(residual: Array) -> float:
-    """Return the probability that means of white noise over stretches scatter as much.
-
-    The sum of n_i m_i^2 / sigma^2 over stretches of n_i samples and mean m_i is
-    chi-squared for white noise, with a degree of freedom each; what a fit has
-    taken from it only lowers it. Parts of a spectrum below some ten periods a trace
-    show in it, however little they are beside the noise of single samples.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        What a fit leaves of a trace.
-    """
-    from scipy.special import chdtrc
-
-    stretches = min(_STRETCHES, len(residual) // _SHORTEST)
-    if stretches < 2:
-        return 1.0
-    parts = np.array_split(residual, stretches)
-    scatter = sum(len(part) * float(np.mean(part)) ** 2 for part in parts)
-    return float(chdtrc(stretches, scatter / float(np.mean(np.square(residual)))))

@@ -15,6 +15,8 @@ from biogrip.identify.problem import Problem, condensed_of, problem_of
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.nuisance import nuisance_basis, with_uncertain
+from biogrip.response.whitening import Colour, Whitening
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,10 @@ class CaseProblem:
     ----------
     gripper, ranges, nonlinear, offset, drift, noise_rad
         As of `problem_of`.
+    coloured
+        Whether the noise of a trace may be other than white, see `trace_fit`.
+    uncertainty
+        Standard uncertainties of the gripper's arms, by arm and key.
     phases
         The protocol.
     sample
@@ -42,6 +48,8 @@ class CaseProblem:
     offset: bool = False
     drift: bool = False
     noise_rad: float | None = None
+    coloured: bool = False
+    uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     _condensed: dict[bytes, Condensed] = field(default_factory=dict, init=False, compare=False)
 
     @cached_property
@@ -69,7 +77,8 @@ class CaseProblem:
         """
         if not files:
             return self
-        return replace(self, gripper=read_calibrated_arms(files[0], self.gripper))
+        gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
+        return replace(self, gripper=gripper, uncertainty=uncertainty)
 
     def of(
         self,
@@ -77,8 +86,12 @@ class CaseProblem:
         rotation_rad: Array,
         model: SampleModel | None = None,
         noise_rad: float | None = None,
+        condensed: Condensed | None = None,
     ) -> Problem:
-        """Pose the problem for a trace; a model and a level of noise replace the case's."""
+        """Pose the problem for a trace.
+
+        A model, a level of noise and what `in_noise` gives replace the case's.
+        """
         return problem_of(
             self.gripper,
             model or self.searched,
@@ -90,7 +103,31 @@ class CaseProblem:
             offset=self.offset,
             drift=self.drift,
             noise_rad=noise_rad or self.noise_rad,
-            condensed=self._condensed_at(time_s),
+            condensed=condensed or self._condensed_at(time_s),
+        )
+
+    def nuisance(self, time_s: Array) -> Array:
+        """What the instrument may have added, (n_functions, n_samples)."""
+        return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
+
+    def in_noise(self, time_s: Array, colour: Colour | None, uncertain: Array) -> Condensed:
+        """Condense for noise that is not just white.
+
+        Parameters
+        ----------
+        time_s : (n_samples,)
+            Ascending sampling times.
+        colour
+            Of the noise, unless that is white.
+        uncertain : (n_functions, n_samples)
+            What is added with an amplitude that is known about, see `with_uncertain`.
+        """
+        nuisance, whitening = self.nuisance(time_s), None
+        if colour is not None:
+            whitening = Whitening(time_s, colour, nuisance, uncertain)
+        nuisance = with_uncertain(nuisance, uncertain)
+        return Condensed(
+            self.torque, time_s, nuisance, nonlinear=self.nonlinear, whitening=whitening
         )
 
     def _condensed_at(self, time_s: Array) -> Condensed:

@@ -99,8 +99,8 @@ def problem_of(
         nonlinear=nonlinear,
         nuisance=condensed.nuisance,
     )
-    formed = isinstance(misfit, FormedMisfit)
-    if formed and len(time_s) > _MANY_SAMPLES and residuals.condensable:
+    many = isinstance(misfit, FormedMisfit) and len(time_s) > _MANY_SAMPLES
+    if condensed.coloured or (many and residuals.condensable):
         misfit = residuals.condensed_misfit
     return Problem(
         misfit,

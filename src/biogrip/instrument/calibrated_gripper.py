@@ -37,8 +37,17 @@ def calibration_yaml(left: CalibratedArm, right: CalibratedArm) -> str:
     return yaml.safe_dump({"gripper": block}, sort_keys=False)
 
 
-def read_calibrated_arms(path: Path, gripper: Gripper) -> Gripper:
+def read_calibrated_arms(
+    path: Path, gripper: Gripper
+) -> tuple[Gripper, dict[str, dict[str, float]]]:
     """Return a gripper with the arms of a calibration in place of its own.
+
+    Returns
+    -------
+    gripper
+        With the calibrated arms.
+    uncertainty
+        Standard uncertainties by arm and key.
 
     Raises
     ------
@@ -47,12 +56,15 @@ def read_calibrated_arms(path: Path, gripper: Gripper) -> Gripper:
     """
     try:
         block = yaml.safe_load(path.read_text(encoding="utf-8"))["gripper"]
-        left, right = (
-            Arm(**{key: float(block[name][key]) for key in ARM_KEYS}) for name in ("left", "right")
-        )
+        left, right = (_numbers(block[name]) for name in ("left", "right"))
+        uncertainty = {name: _numbers(block["uncertainty"][name]) for name in ("left", "right")}
     except (OSError, yaml.YAMLError, KeyError, TypeError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a calibration: {error}.") from error
-    return replace(gripper, left=left, right=right)
+    return replace(gripper, left=Arm(**left), right=Arm(**right)), uncertainty
+
+
+def _numbers(block: dict[str, float]) -> dict[str, float]:
+    return {key: float(block[key]) for key in ARM_KEYS}
 
 
 def _rounded(arm: Arm, digits: int) -> dict[str, float]:

@@ -217,8 +217,13 @@ class _Traces:
             raise BiogripError(
                 f"{trace}: found the very rotations of {before}, allowed is each trace once."
             )
+        settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)
-        return _Posed(trace, problem, judgement.settings_of(study, case))
+        if case.problem.coloured:
+            # Of one gripper for all cells the error is common to them, and no part of the noise.
+            assumed = replace(case.problem, uncertainty={})
+            problem = settings.fit(assumed, recorded.time_s, rotation_rad, 0).problem
+        return _Posed(trace, problem, settings)
 
 
 def _identify(

@@ -8,14 +8,15 @@ from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.answer import Progress
 from biogrip.identify.methods import best_fit
 from biogrip.identify.model_choice import advice, ranked
+from biogrip.identify.trace_fit import TraceFit
 from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study
 
 
 def models_tried(
-    study: Study, case: Case, recorded: Measurements, progress: Progress
+    study: Study, case: Case, recorded: Measurements, fit: TraceFit, progress: Progress
 ) -> dict[str, Any]:
-    """Fit the other sample models, too, and say which the trace asks for.
+    """Fit the other sample models in the same noise, and say which the trace asks for.
 
     With parameters that are known, or where a fit takes minutes, there is nothing to say.
     """
@@ -26,10 +27,10 @@ def models_tried(
     misfits = []
     for name in candidates:
         model = CANDIDATES[name].model
-        problem = posed.of(recorded.time_s, recorded.rotation_rad[0], model)
+        problem = fit.problem_of(posed, recorded.time_s, recorded.rotation_rad[0], model)
         rng = stream(study.study_seed, case.name, 0, f"model {name}")
         misfits.append(best_fit(problem, least_squares, rng, progress).misfit_rad)
-    tried = ranked(candidates, misfits, len(recorded.time_s))
+    tried = ranked(candidates, misfits, fit.problem.residuals.samples)
     rows = [
         {
             "model": each.candidate,

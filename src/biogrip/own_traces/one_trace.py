@@ -12,12 +12,10 @@ from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import best_fit
 from biogrip.own_traces.assumed import assumed, by_default, versions
 from biogrip.own_traces.models_tried import models_tried
 from biogrip.own_traces.outputs import WRITTEN_BY
@@ -98,14 +96,12 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
         settings, posed = judgement.settings_of(study, case), case.problem
-        problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
-        rng = stream(study.study_seed, case.name, 0, "identifiability")
-        found = best_fit(problem, settings.least_squares, rng, progress.within)
+        fit = settings.fit(posed, recorded.time_s, recorded.rotation_rad[0], 0, progress.within)
         progress.done()
         progress.doing("finding confidence limits")
         confidence = case.confidence
         told = diagnose(
-            problem, posed.searched, found, confidence=confidence, noise_rad=posed.noise_rad
+            fit.problem, posed.searched, fit.found, confidence=confidence, noise_rad=posed.noise_rad
         )
         progress.done()
         progress.doing("trying an offset and a drift")
@@ -121,8 +117,8 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             "confidence": confidence,
             **_instrument(posed, recorded, np.exp(told.likelihood.best)),
             **said,
-            "notes": [*said["notes"], *doubts],
-            **models_tried(study, case, recorded, progress.within),
+            "notes": [*fit.notes(), *said["notes"], *doubts],
+            **models_tried(study, case, recorded, fit, progress.within),
             "assumed": assumed(case),
             "by_default": by_default(wanted.config),
             "versions": versions(),

@@ -22,6 +22,8 @@ class ReadAs:
         Standard deviation of the noise, if it is known.
     offset, drift
         Whether the instrument may have added a constant, and a drift linear in time.
+    noise_model
+        What noise is taken for; ``white`` or ``coloured``.
     """
 
     time: str = "time_s"
@@ -31,6 +33,7 @@ class ReadAs:
     noise_rad: float | None = None
     offset: bool = False
     drift: bool = False
+    noise_model: str | None = None
 
     @property
     def block(self) -> dict[str, str | float | bool]:

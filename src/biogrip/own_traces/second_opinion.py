@@ -6,8 +6,9 @@ import numpy as np
 from scipy.special import chdtrc
 
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.diagnosis import FALSE_ALARM, Diagnosis, diagnose, one_in
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.verdicts import Finding
+from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Progress
 from biogrip.identify.methods import best_fit
 from biogrip.products.files.traces import Measurements
@@ -38,13 +39,19 @@ def second_opinion(
     """
     posed = case.problem
     added = 2 - posed.offset - posed.drift
-    if not added or posed.nonlinear:
+    if not added or posed.nonlinear or posed.coloured:
         return []
     also = replace(posed, offset=True, drift=True)
     problem = also.of(recorded.time_s, recorded.rotation_rad[0])
     rng = stream(study.study_seed, case.name, 0, "instrument")
     found = best_fit(problem, case.method("least_squares"), rng, progress)
-    fall = _fall(told, found.misfit_rad, known=posed.noise_rad is not None)
+    likelihood = told.likelihood
+    fall = fall_of(
+        problem.residuals.samples,
+        likelihood.misfit_rad,
+        found.misfit_rad,
+        likelihood.noise_rad if posed.noise_rad is not None else None,
+    )
     chance = float(chdtrc(added, fall))
     if chance >= FALSE_ALARM:
         return []
@@ -64,12 +71,23 @@ def second_opinion(
     ]
 
 
-def _fall(told: Diagnosis, misfit_rad: float, *, known: bool) -> float:
-    likelihood = told.likelihood
-    samples, before = likelihood.problem.residuals.samples, likelihood.misfit_rad
-    if known:
-        return samples * (before**2 - misfit_rad**2) / likelihood.noise_rad**2
-    return 2 * samples * float(np.log(before / misfit_rad))
+def fall_of(
+    samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
+) -> float:
+    """Return by how much twice the log-likelihood rises with a better fit.
+
+    Parameters
+    ----------
+    samples
+        How many there are.
+    before_rad, after_rad
+        Misfit of both fits.
+    noise_rad
+        Standard deviation of the noise if it is known; else it is what each fit leaves.
+    """
+    if noise_rad is not None:
+        return samples * (before_rad**2 - after_rad**2) / noise_rad**2
+    return 2 * samples * float(np.log(before_rad / after_rad))
 
 
 def _differ(before: Finding, after: Finding) -> bool:

@@ -28,6 +28,7 @@ from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
 from biogrip.response.sensitivity import responses_of_modes
+from biogrip.response.whitening import Whitening
 
 MOST_NODES = 50_000
 """With more, finding the times that stand for all would take gigabytes."""
@@ -52,18 +53,38 @@ class Condensed:
     time_s : (n_samples,)
         Ascending sampling times.
     nuisance : (n_functions, n_samples)
-        What is taken out of trace and responses, see `nuisance_basis`.
+        What is taken out of trace and responses, see `nuisance_basis` and `with_uncertain`.
     nonlinear
         Whether rows must also do for what the nonlinear model has over the linear one.
+    whitening
+        What makes the noise white, and takes the nuisance out, if noise is not white as it is.
     """
 
     def __init__(
-        self, torque: TorqueHistory, time_s: Array, nuisance: Array, *, nonlinear: bool = False
+        self,
+        torque: TorqueHistory,
+        time_s: Array,
+        nuisance: Array,
+        *,
+        nonlinear: bool = False,
+        whitening: Whitening | None = None,
     ) -> None:
-        self.nuisance = nuisance
+        self.nuisance = nuisance if whitening is None else whitening.nuisance
         self.nonlinear = nonlinear
+        self._whitening = whitening
         self._torque = torque
         self._all_s = time_s
+
+    def cleared(self, rows: Array) -> Array:
+        """Take the nuisance out of functions of time, (..., n_samples), and make noise white."""
+        if self._whitening is not None:
+            return self._whitening(rows)
+        return without(self.nuisance, rows)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether noise is not white as it is."""
+        return self._whitening is not None
 
     @property
     def possible(self) -> bool:
@@ -97,7 +118,7 @@ class Condensed:
         """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
         values = self._dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
-            values[:, self._chosen], without(self._seen_nuisance, self._span.T) @ self._basis
+            values[:, self._chosen], self._cleared_rows(self._span.T) @ self._basis
         )
         return np.pad(matrix, ((0, 0), (0, 1)))
 
@@ -111,7 +132,9 @@ class Condensed:
 
     @cached_property
     def _dense(self) -> DenseSamples:
-        return DenseSamples(self._torque, self._all_s, self._edges_s)
+        # What is whitened is no longer smooth: each sample is a node.
+        dense = self._whitening is None
+        return DenseSamples(self._torque, self._all_s, self._edges_s, dense=dense)
 
     @cached_property
     def _edges_s(self) -> Array:
@@ -129,7 +152,7 @@ class Condensed:
     @cached_property
     def of_corrections(self) -> Array:
         """Matrix that turns values of a `Correction`, from its left, into rows."""
-        rows = without(self._seen_nuisance, self._corrections) @ self._basis
+        rows = self._cleared_rows(self._corrections) @ self._basis
         return np.pad(rows, ((0, 0), (0, 1)))
 
     @cached_property
@@ -173,4 +196,10 @@ class Condensed:
     @cached_property
     def _basis(self) -> Array:
         """Orthonormal rows that span all responses less nuisance, (n_nodes, n_rows - 1)."""
-        return np.linalg.qr(without(self._seen_nuisance, self._span.T).T)[0]
+        return np.linalg.qr(self._cleared_rows(self._span.T).T)[0]
+
+    def _cleared_rows(self, rows: Array) -> Array:
+        """Do with rows of the nodes what `cleared` does with samples."""
+        if self._whitening is not None:
+            return self._whitening(rows)
+        return without(self._seen_nuisance, rows)

@@ -67,10 +67,17 @@ class DenseSamples:
         Ascending sampling times.
     further_edges_s : (n_edges,)
         Where else they may be less smooth.
+    dense
+        Whether nodes may stand for samples; else each sample is one.
     """
 
     def __init__(
-        self, torque: TorqueHistory, time_s: Array, further_edges_s: Array | None = None
+        self,
+        torque: TorqueHistory,
+        time_s: Array,
+        further_edges_s: Array | None = None,
+        *,
+        dense: bool = True,
     ) -> None:
         self._all_s = time_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
@@ -80,7 +87,8 @@ class DenseSamples:
         self._longest_s = 2 * np.pi / omega.max() if len(omega) else np.inf
         edges = starts if further_edges_s is None else [*starts, *further_edges_s]
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(edges), [len(time_s)])))
-        self._pieces = list(_joined(p for ends in pairwise(bounds) for p in self._divided(*ends)))
+        divided = (p for ends in pairwise(bounds) for p in self._divided(*ends))
+        self._pieces = list(_joined(divided)) if dense else [_Piece(0, len(time_s), None)]
         self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
         """Times of the nodes, (n_nodes,), ascending."""
 

@@ -12,7 +12,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, grip_of
 from biogrip.response.linear import LEFT
-from biogrip.response.nuisance import without
+from biogrip.response.nuisance import taken_out
 from biogrip.response.sensitivity import (
     corrections,
     differences,
@@ -34,7 +34,8 @@ class Residuals:
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
-        Of the protocol and the sampling times; knows what the instrument may have added.
+        Of the protocol and the sampling times; knows what the instrument may have added, and
+        the colour of the noise. Residuals are white.
     nonlinear
         Whether to simulate the nonlinear model.
     noise_rad
@@ -58,9 +59,8 @@ class Residuals:
         self._torque = torque
         self._time_s = time_s
         self.nonlinear = nonlinear
-        self._nuisance = condensed.nuisance
         self._condensed = condensed
-        self._rotation_rad = without(self._nuisance, rotation_rad)
+        self._rotation_rad = condensed.cleared(rotation_rad)
         self.samples = len(time_s)
         self.duration_s = float(time_s[-1])
         if noise_rad is None:
@@ -70,7 +70,7 @@ class Residuals:
     @property
     def free(self) -> int:
         """Degrees of freedom that samples and nuisance leave to parameters and noise."""
-        return self.samples - len(self._nuisance)
+        return self.samples - taken_out(self._condensed.nuisance)
 
     def grip(self, log_parameters: Array) -> Grip:
         """Force of the jaws on a sample, with which they press it or would have to pull."""
@@ -99,8 +99,8 @@ class Residuals:
             In rad.
         """
         rotation, sensitivity = self._simulated(log_parameters, self._time_s)
-        residual = without(self._nuisance, rotation) - self._rotation_rad
-        return residual, without(self._nuisance, sensitivity)
+        residual = self._condensed.cleared(rotation) - self._rotation_rad
+        return residual, self._condensed.cleared(sensitivity)
 
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
@@ -127,6 +127,11 @@ class Residuals:
         rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
         to_rows = self._condensed.to_rows
         return rotation @ to_rows - self.condensed_trace, sensitivity @ to_rows
+
+    @property
+    def coloured(self) -> bool:
+        """Whether noise was not white, and has been made so."""
+        return self._condensed.coloured
 
     @property
     def condensable(self) -> bool:

@@ -1,6 +1,6 @@
 """The gripper, as the config says it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -8,7 +8,10 @@ from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibrated_gripper import ARM_KEYS
 from biogrip.instrument.contact import Contact, contact
 from biogrip.instrument.gripper import Gripper
-from biogrip.keys import Key
+from biogrip.keys import Key, Problem
+
+# Of an arm's property; more would be no small change of its response.
+_MOST_UNCERTAIN = 0.5
 
 _Uncertainties = Annotated[
     Mapping[Annotated[str, Key(choices=ARM_KEYS)], Annotated[float, Key(low=0, high=1e3)]], Key()
@@ -17,7 +20,7 @@ _Uncertainties = Annotated[
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard uncertainties of a calibrated gripper, arm by arm; information only."""
+    """Standard uncertainties of a calibrated gripper, arm by arm; a part of all intervals."""
 
     left: Annotated[_Uncertainties | None, Key("Uncertainties of the left arm's keys.")] = None
     right: Annotated[_Uncertainties | None, Key("Uncertainties of the right arm's keys.")] = None
@@ -32,6 +35,22 @@ class GripperBlock(Gripper):
         Key("Distance between the jaws in the neutral configuration.", "m", low=1e-9, high=1.0),
     ]
     uncertainty: Annotated[Uncertainty | None, Key()] = None
+
+    @property
+    def uncertainties(self) -> dict[str, Mapping[str, float]]:
+        """Standard uncertainties by arm and key."""
+        if self.uncertainty is None:
+            return {}
+        return {name: known for name, known in vars(self.uncertainty).items() if known}
+
+    def problems(self) -> Iterator[Problem]:
+        """Find arms of which next to nothing is known."""
+        for name, known in self.uncertainties.items():
+            for key, uncertainty in known.items():
+                value = getattr(getattr(self, name), key)
+                if uncertainty >= _MOST_UNCERTAIN * value:
+                    text = f"found {uncertainty:g}, allowed is less than half of {value:g}."
+                    yield ("uncertainty", name, key), text
 
     @property
     def neutral(self) -> Gripper:

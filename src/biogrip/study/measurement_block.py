@@ -9,6 +9,9 @@ from biogrip.keys import Key, Problem
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
 
+COLOURED = "coloured"
+NOISE_MODELS = ("white", COLOURED)
+
 
 @dataclass(frozen=True, kw_only=True)
 class MeasurementBlock:
@@ -86,10 +89,28 @@ class MeasurementBlock:
             "along. By default no."
         ),
     ] = False
+    noise_model: Annotated[
+        str | None,
+        Key(
+            "What noise is taken for where a trace is judged. `white`: samples are independent; "
+            "`coloured`: it may remember and have a spectrum 1/f, an offset and a drift are fitted "
+            "along, and samples that stand out are left out, so that intervals are wider and stay "
+            "honest. By default white.",
+            choices=NOISE_MODELS,
+        ),
+    ] = None
     noise: Annotated[Noise, Key()]
+
+    @property
+    def coloured(self) -> bool:
+        """Whether noise may be other than white."""
+        return self.noise_model == COLOURED
 
     def problems(self) -> Iterator[Problem]:
         """A recorded trace needs a file that is there, and the names of its columns."""
+        if self.coloured and self.noise_rad is not None:
+            text = "is that of white noise; leave it out where noise_model is coloured."
+            yield ("noise_rad",), text
         if self.file is None:
             for key in ("time", "rotation", "time_unit", "rotation_unit", "noise_rad"):
                 if getattr(self, key) is not None:

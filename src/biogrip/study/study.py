@@ -188,6 +188,8 @@ class Case:
             offset=measurement.offset,
             drift=measurement.drift,
             noise_rad=measurement.noise_rad,
+            coloured=measurement.coloured,
+            uncertainty=self.block.gripper.uncertainties,
         )
 
     def method(self, name: str) -> object:

@@ -135,7 +135,7 @@ def _rows(
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
         for group in groups(some):
-            traces = _traces(settings, group, rotation)
+            traces = _traces(settings, group, time_s, rotation)
             likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
             known = np.tile(truth, (len(group), 1))
             if len(told):
@@ -165,9 +165,11 @@ def _rest_known(
     return with_fixed(posed.searched, given), told, truth
 
 
-def _traces(settings: Settings, group: Sequence[int], rotation: Array) -> list[Array]:
+def _traces(
+    settings: Settings, group: Sequence[int], time_s: Array, rotation: Array
+) -> list[Array]:
     rngs = [stream(settings.study_seed, settings.case, seed, "noise") for seed in group]
-    return [add_noise(rotation, settings.noise, rng) for rng in rngs]
+    return [add_noise(rotation, settings.noise, rng, time_s) for rng in rngs]
 
 
 def _fitted(

@@ -8,18 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.profile import MISSED
 from biogrip.identifiability.valley import valley_and_deeper
-from biogrip.identify.answer import Identification, silent
+from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.methods import METHODS, best_fit
 from biogrip.identify.multi_start import fitted_from
 from biogrip.identify.problem import Problem
+from biogrip.identify.trace_fit import TraceFit, trace_fit
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
 from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
 from biogrip.products.plan import Wildcards
@@ -50,6 +52,22 @@ class Settings:
     problem: CaseProblem
     least_squares: object
     confidence: float
+
+    def fit(
+        self,
+        posed: CaseProblem,
+        time_s: Array,
+        rotation_rad: Array,
+        seed: int,
+        progress: Progress = silent,
+    ) -> TraceFit:
+        """Identify a trace as all judgements do, by least squares."""
+
+        def find(problem: Problem) -> Identification:
+            rng = stream(self.study_seed, self.case, seed, "identifiability")
+            return best_fit(problem, self.least_squares, rng, progress)
+
+        return trace_fit(posed, time_s, rotation_rad, find)
 
 
 @dataclass(frozen=True)
@@ -102,15 +120,15 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     """
     posed = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
-    problem = posed.of(recorded.time_s, recorded.rotation_rad[TRACE])
-    rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
-    found = best_fit(problem, settings.least_squares, rng, silent)
-    told, valley = _diagnosed(problem, posed, found, settings.confidence)
+    fit = settings.fit(posed, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    told, valley = _diagnosed(fit.problem, posed, fit.found, settings.confidence)
+    said = diagnosis_data(told)
     data = {
         "case": settings.case,
         "model": posed.model.name,
         "confidence": settings.confidence,
-        **diagnosis_data(told),
+        **said,
+        "notes": [*fit.notes(), *said["notes"]],
         "valley": valley,
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")

@@ -40,6 +40,7 @@ def measure(settings: Settings, seeds: Iterable[int], target: Path, measurements
             rotation,
             settings.noise,
             stream(settings.study_seed, settings.case, seed, "noise"),
+            time_s,
         )
         for seed in seeds
     }

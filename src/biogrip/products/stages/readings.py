@@ -96,7 +96,7 @@ def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
                 purpose: [stream(settings.study_seed, case, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             }
-            traces = [add_noise(rotation, reading.noise, rng) for rng in streams["noise"]]
+            traces = [add_noise(rotation, reading.noise, rng, time_s) for rng in streams["noise"]]
             problems = [posed.of(time_s, trace) for trace in traces]
             found = identify_many(problems, reading.genetic, streams["genetic"])
             for seed, trace, answer in zip(seeds, traces, found, strict=True):

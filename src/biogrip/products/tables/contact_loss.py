@@ -127,7 +127,7 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     if not free.parted_s:
         return []
     noise = [
-        add_noise(held, case.noise, stream(study_seed, name, seed, "noise")) - held
+        add_noise(held, case.noise, stream(study_seed, name, seed, "noise"), time_s) - held
         for seed in range(case.seeds)
     ]
     lost = free.parted_s[0]

@@ -1,0 +1,66 @@
+"""What a gripper that is only known about may do to a rotation."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.simulation import simulated_rotation
+
+# A slow sample is not rung by its arms: their inertia is left out of what is fitted.
+_SEEN = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
+
+
+def gripper_functions(posed: CaseProblem, time_s: Array, parameters: Array) -> Array:
+    """Return what a standard uncertainty of each property of the arms adds to a rotation.
+
+    Half of the difference between the property a standard uncertainty above and below its
+    value, as metrology has it where models are not straight [1]_.
+
+    Parameters
+    ----------
+    posed
+        What the identification assumes.
+    time_s : (n_times,)
+        Ascending times.
+    parameters : (n_parameters,)
+        Those that are searched, SI units.
+
+    Returns
+    -------
+    (n_properties, n_times)
+        In rad, of the properties that are uncertain.
+
+    References
+    ----------
+    .. [1] JCGM 100:2008, Evaluation of measurement data: guide to the expression of uncertainty
+       in measurement, section 5.1.3, note 2.
+    """
+    network = posed.searched.network(parameters)
+
+    def simulated(gripper: Gripper) -> Array:
+        rows = simulated_rotation(gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear)
+        return rows[0]
+
+    found = [
+        0.5 * (simulated(above) - simulated(below))
+        for above, below in _pairs(posed.gripper, posed.uncertainty)
+    ]
+    return np.reshape(found, (len(found), len(time_s)))
+
+
+def _pairs(
+    gripper: Gripper, uncertainty: Mapping[str, Mapping[str, float]]
+) -> Iterator[tuple[Gripper, Gripper]]:
+    """Two grippers for each property, one above and one below."""
+    for name, known in uncertainty.items():
+        arm = getattr(gripper, name)
+        for key in _SEEN:
+            if known.get(key):
+                above, below = (
+                    replace(arm, **{key: getattr(arm, key) + sign * known[key]}) for sign in (1, -1)
+                )
+                yield replace(gripper, **{name: above}), replace(gripper, **{name: below})
