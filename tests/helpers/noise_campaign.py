@@ -111,13 +111,11 @@ def seen(kind: Kind, seed: int) -> Seen:
     time_s = case.sampling.over(posed.torque.end_s)
     sample = case.sample.model.sample(case.parameters)
     error = kind.gripper * rng.standard_normal()
-    gripper = replace(
-        posed.gripper,
-        **{
-            name: replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + error))
-            for name, arm in (("left", posed.gripper.left), ("right", posed.gripper.right))
-        },
+    left, right = (
+        replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + error))
+        for arm in (posed.gripper.left, posed.gripper.right)
     )
+    gripper = replace(posed.gripper, left=left, right=right)
     clean = simulated_rotation(gripper, sample, posed.torque, time_s, nonlinear=False)[0]
     trace = add_noise(clean, kind.noise, rng, time_s)
     truth = posed.logs(case.parameters)

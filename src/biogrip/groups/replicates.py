@@ -68,6 +68,11 @@ class JointResiduals(Residuals):
         return self._stacked([part.condensed(log_parameters) for part in self._parts])
 
     @property
+    def freedom(self) -> float:
+        """Degrees of freedom with which the colour of the noise of the least known is known."""
+        return min(part.freedom for part in self._parts)
+
+    @property
     def coloured(self) -> bool:
         """Whether noise was not white, and has been made so."""
         return all(part.coloured for part in self._parts)

@@ -73,7 +73,7 @@ class Likelihood:
         Standard deviation of the noise, known or estimated from the residual.
     threshold
         Rise of chi^2 at the confidence limits: chi-squared with one degree of
-        freedom where the noise is known, F where it is estimated. It is that of an
+        freedom where the noise is known, F where it, or its colour, is estimated. It is that of an
         interval with two ends: a limit that stands alone is one of these ends, and
         holds with more than the confidence.
     certainty
@@ -162,7 +162,7 @@ def likelihood_of(
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
         from scipy.special import fdtri
 
-        threshold, certainty = fdtri(1, left, levels)
+        threshold, certainty = fdtri(1, min(left, problem.residuals.freedom), levels)
     return Likelihood(problem, best, misfit_rad, noise_rad, float(threshold), float(certainty))
 
 

@@ -1,15 +1,17 @@
-"""What colour the noise of a trace has, by restricted maximum likelihood.
+"""What colour the noise of a trace has, and how well that is known, by restricted likelihood.
 
 What a fit leaves has less noise than the trace, most of all at low frequencies, where
 parameters, offset and drift take it for their own. Restricted likelihood is that of
-what none of them can reach, so the colour comes out without that bias [1]_ [2]_.
+what none of them can reach, so the colour comes out without that bias [1]_. The share of
+1/f noise is kept from vanishing, as it often would by chance alone [2]_.
 
 References
 ----------
 .. [1] H. D. Patterson and R. Thompson, Recovery of inter-block information when block sizes are
    unequal, Biometrika 58 (1971), 545-554.
-.. [2] D. A. Harville, Maximum likelihood approaches to variance component estimation and to
-   related problems, Journal of the American Statistical Association 72 (1977), 320-338.
+.. [2] Y. Chung, S. Rabe-Hesketh, V. Dorie, A. Gelman and J. Liu, A nondegenerate penalized
+   likelihood estimator for variance parameters in multilevel models, Psychometrika 78 (2013),
+   685-709: a gamma prior of shape 2 on a standard deviation.
 """
 
 import numpy as np
@@ -20,15 +22,17 @@ from biogrip.response.whitening import Colour, Whitening
 # Logarithms of the odds of a part against the white one: from nothing to all.
 _LEAST, _MOST = -9.0, 7.0
 # Likelihoods of colours have several maxima. Odds, and places between the shortest and the longest
-# time, that are tried; the best is followed.
-_ODDS, _PLACES = (-4.0, -1.0, 2.0), (0.1, 0.35, 0.6, 0.85)
-_STEP, _SETTLED = 1e-4, 1e-10
+# time, that are tried; the best with more of one part, and with more of the other, are followed.
+_ODDS, _PLACES = (_LEAST, -4.0, -1.0, 2.0, 6.0), (0.15, 0.35, 0.6, 0.85)
+_STEP, _SETTLED = 1e-4, 1e-9
+# Of second differences: where a parabola may end.
+_APART = 0.1
+# A share, or a time, is known to some e-folds whatever the trace.
+_KNOWN = 3.0
 
 
-def colour_of(
-    time_s: Array, residual: Array, directions: Array, near: Colour | None = None
-) -> Colour:
-    """Estimate the colour of the noise that a fit leaves.
+class ColourLikelihood:
+    """How likely the noise that a fit leaves is to be of a colour.
 
     Parameters
     ----------
@@ -38,47 +42,113 @@ def colour_of(
         What is left of a trace.
     directions : (n_directions, n_samples)
         Where residuals may have been taken in: derivatives by the parameters, and nuisance.
-    near
-        Colour to start from, if one is known.
-
-    Returns
-    -------
-    Colour
-        That of the highest restricted likelihood.
     """
-    from scipy.optimize import minimize
 
-    reached = _independent(directions)
-    none = np.zeros((0, len(time_s)))
-    shortest, longest = float(np.diff(time_s).min()), float(time_s[-1] - time_s[0])
-    times = np.log([shortest / 2, longest])
-    bounds = [(_LEAST, _MOST), (times[0], times[1]), (_LEAST, _MOST)]
+    def __init__(self, time_s: Array, residual: Array, directions: Array) -> None:
+        self._time_s, self._residual = time_s, residual
+        self._reached = _independent(directions)
+        shortest, longest = float(np.diff(time_s).min()), float(time_s[-1] - time_s[0])
+        times = float(np.log(shortest / 2)), float(np.log(longest))
+        self._bounds = [(_LEAST, _MOST), times, (_LEAST, _MOST)]
 
-    def deviance(x: Array) -> float:
-        whitening = Whitening(time_s, _colour(x), none)
-        white = whitening(np.vstack((reached, residual)))
+    def best(self, near: Colour | None = None) -> Colour:
+        """Return the colour of the highest likelihood, near to one that is known if there is."""
+        from scipy.optimize import minimize
+
+        starts = [_logarithms(near)] if near is not None else self._best_of_each()
+        found = [
+            minimize(
+                self._deviance,
+                np.clip(start, *np.transpose(self._bounds)),
+                method="L-BFGS-B",
+                bounds=self._bounds,
+                options={"eps": _STEP, "ftol": _SETTLED},
+            )
+            for start in starts
+        ]
+        return _colour(min(found, key=lambda each: float(each.fun)).x)
+
+    def freedom(self, colour: Colour, sensitivity: Array, nuisance: Array) -> float:
+        """Degrees of freedom of the variances that follow from a colour, of the least known.
+
+        From how the variance of an estimate changes with the colour, and how well that is
+        known: that of a chi-squared variable with as large a spread [1]_.
+
+        Parameters
+        ----------
+        colour
+            The best.
+        sensitivity : (n_parameters, n_samples)
+            Derivatives by the log-parameters, over the noise's standard deviation.
+        nuisance : (n_functions, n_samples)
+            What the instrument may have added.
+
+        References
+        ----------
+        .. [1] F. E. Satterthwaite, An approximate distribution of estimates of variance
+           components, Biometrics Bulletin 2 (1946), 110-114.
+        """
+
+        def variances(x: Array) -> Array:
+            white = Whitening(self._time_s, _colour(x), nuisance)(sensitivity)
+            # Every parameter counts as known to an e-fold beforehand, as in `Likelihood.deviation`.
+            inverse = np.linalg.inv(white @ white.T + np.eye(len(white)))
+            return np.log(np.diagonal(inverse)) + 2 * self._log_scale(x)
+
+        x = _logarithms(colour)
+        steps = _APART * np.eye(len(x))
+        slopes = np.array([variances(x + step) - variances(x - step) for step in steps])
+        slopes /= 2 * _APART
+        spread = np.einsum("iq,iq->q", slopes, np.linalg.solve(self._information(x), slopes))
+        return float(2 / max(spread.max(), 1e-12))
+
+    def _information(self, x: Array) -> Array:
+        """Half of the second derivatives of the deviance, and what is known beforehand."""
+        steps = _APART * np.eye(len(x))
+        middle = self._deviance(x)
+        ahead, behind = ([self._deviance(x + sign * s) for s in steps] for sign in (1, -1))
+        curvature = np.diag(np.add(ahead, behind) - 2 * middle)
+        for i, one in enumerate(steps):
+            for j, other in enumerate(steps[:i]):
+                both = self._deviance(x + one + other) + self._deviance(x - one - other)
+                mixed = (both + 2 * middle - ahead[i] - ahead[j] - behind[i] - behind[j]) / 2
+                curvature[i, j] = curvature[j, i] = mixed
+        sizes, axes = np.linalg.eigh(curvature / (2 * _APART**2))
+        information: Array = (axes * np.maximum(sizes, 0)) @ axes.T + np.eye(len(x)) / _KNOWN**2
+        return information
+
+    def _deviance(self, x: Array) -> float:
+        free, (left, of_reached, determinant) = self._free, self._parts(x)
+        return free * float(np.log(left)) + determinant + of_reached - float(x[2])
+
+    def _log_scale(self, x: Array) -> float:
+        """Logarithm of the noise's standard deviation, if it is of a colour."""
+        return 0.5 * float(np.log(self._parts(x)[0] / self._free))
+
+    @property
+    def _free(self) -> int:
+        return len(self._time_s) - len(self._reached)
+
+    def _parts(self, x: Array) -> tuple[float, float, float]:
+        """Sum of squares, and logarithms of the determinants of what is reached and of all."""
+        whitening = Whitening(self._time_s, _colour(x), np.zeros((0, len(self._time_s))))
+        white = whitening(np.vstack((self._reached, self._residual)))
         basis, triangle = np.linalg.qr(white[:-1].T)
         left = white[-1] - basis @ (basis.T @ white[-1])
         of_reached = 2 * float(np.sum(np.log(np.abs(np.diagonal(triangle)))))
-        free = len(time_s) - len(reached)
-        return free * float(np.log(left @ left)) + whitening.log_determinant + of_reached
+        return float(left @ left), of_reached, whitening.log_determinant
 
-    starts = [
-        np.array([relaxing, times[0] + place * (times[1] - times[0]), flicker])
-        for relaxing in _ODDS
-        for place in _PLACES
-        for flicker in (_LEAST, *_ODDS[:2])
-    ]
-    if near is not None:
-        starts = [np.clip(_logarithms(near), *np.transpose(bounds))]
-    found = minimize(
-        deviance,
-        min(starts, key=deviance),
-        method="L-BFGS-B",
-        bounds=bounds,
-        options={"eps": _STEP, "ftol": _SETTLED},
-    )
-    return _colour(found.x)
+    def _best_of_each(self) -> list[Array]:
+        """The best points of a grid with more that relaxes, and with more of spectrum 1/f."""
+        shortest, longest = self._bounds[1]
+        tried = [
+            np.array([relaxing, shortest + place * (longest - shortest), flicker])
+            for relaxing in _ODDS
+            for place in (_PLACES if relaxing > _LEAST else _PLACES[:1])
+            for flicker in _ODDS
+        ]
+        sides = [x for x in tried if x[0] > x[2]], [x for x in tried if x[0] <= x[2]]
+        return [min(side, key=self._deviance) for side in sides]
 
 
 def _logarithms(colour: Colour) -> Array:

@@ -16,7 +16,7 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.local_fit import local_fit, settled
-from biogrip.identify.noise_colour import colour_of
+from biogrip.identify.noise_colour import ColourLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
@@ -29,6 +29,8 @@ MOST_SAMPLES = 50_000
 _ROUNDS = 5
 # Shares and times that change by less change no limit in its third digit.
 _SETTLED = 1e-2
+# So does a fit that moves by less, in standard deviations.
+_STAYED = 0.03
 _WORTH_SAYING = 0.005
 
 Find = Callable[[Problem], Identification]
@@ -152,22 +154,27 @@ def _in_turn(
     posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
 ) -> tuple[Problem, Identification, Colour | None, Condensed | None]:
     """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
-    problem, colour, condensed = plain, None, None
+    problem, colour, condensed, freedom = plain, None, None, np.inf
     for _ in range(_ROUNDS):
         residual, sensitivity = _left(plain, found)
         uncertain = gripper_functions(posed, time_s, found.parameters)
-        before: Colour | None = colour
-        if posed.coloured:
-            directions = np.vstack((sensitivity, posed.nuisance(time_s), uncertain))
-            colour = colour_of(time_s, residual, directions, near=before)
         left = problem.residuals.free - len(found.parameters)
         noise_rad = posed.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
-        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad)
+        before: Colour | None = colour
+        if posed.coloured:
+            nuisance = posed.nuisance(time_s)
+            directions = np.vstack((sensitivity, nuisance, uncertain))
+            likelihood = ColourLikelihood(time_s, residual, directions)
+            colour = likelihood.best(near=before)
+            freedom = likelihood.freedom(colour, sensitivity / noise_rad, nuisance)
+        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, freedom)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
-        fit = settled(problem, local_fit(problem, np.log(found.parameters)))
-        moved = np.abs(fit.log_parameters - np.log(found.parameters)).max()
+        start = np.log(found.parameters)
+        fit = settled(problem, local_fit(problem, start))
+        _, slopes = problem.residuals.condensed(fit.log_parameters)
+        moved = np.linalg.norm((fit.log_parameters - start) @ slopes) / noise_rad
         found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
-        if moved < _SETTLED and _alike(before, colour):
+        if moved < _STAYED and _alike(before, colour):
             break
     return problem, found, colour, condensed
 

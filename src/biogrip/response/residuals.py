@@ -129,6 +129,11 @@ class Residuals:
         return rotation @ to_rows - self.condensed_trace, sensitivity @ to_rows
 
     @property
+    def freedom(self) -> float:
+        """Degrees of freedom with which the colour of the noise is known."""
+        return self._condensed.freedom
+
+    @property
     def coloured(self) -> bool:
         """Whether noise was not white, and has been made so."""
         return self._condensed.coloured
