@@ -1,7 +1,12 @@
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter, periodogram
 
+from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing, remembering
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
 
@@ -49,3 +54,77 @@ def test_an_instruments_noise_does_not_depend_on_the_sample() -> None:
     for nothing in (Noise("gaussian", 0.0, "peak"), Noise("gaussian", 0.1, "peak", 0.0)):
         assert nothing.absent
         np.testing.assert_array_equal(add_noise(CLEAN, nothing, rng), CLEAN)
+
+
+TIMES: Array = np.arange(4000) * 0.1
+
+
+def noises(count: int = 200, times: np.ndarray = TIMES, **parts: Any) -> np.ndarray:
+    """Unit noise on a trace of ones, a row a seed."""
+    noise, clean = Noise("gaussian", 1.0, "peak", **parts), np.ones(len(times))
+    rngs = [np.random.default_rng(seed) for seed in range(count)]
+    return np.array([add_noise(clean, noise, rng, times) - clean for rng in rngs])
+
+
+def test_a_part_that_remembers_is_an_autoregressive_process() -> None:
+    """SciPy's recursion on the same draws; and its correlation at uneven times."""
+    rng = np.random.default_rng(0)
+    draws = np.random.default_rng(0).standard_normal((4000, 1))[:, 0]
+    coefficient = np.exp(-0.1 / 2.0)
+    draws[1:] *= np.sqrt(1 - coefficient**2)
+    expected = lfilter([1.0], [1.0, -coefficient], draws)
+    found = remembering(TIMES, np.array([1.0]), np.array([0.5]), rng)
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+    times = np.array([0.0, 0.3, 0.4, 2.0, 7.0])
+    seen = noises(20_000, times, relaxing=Relaxing(1.0, 2.0))
+    expected = np.exp(-np.abs(np.subtract.outer(times, times)) / 2.0)
+    # A correlation of 20,000 pairs is known to 0.007.
+    np.testing.assert_allclose(np.cov(seen.T), expected, atol=4 * 0.01)
+
+
+def test_flicker_has_equal_power_in_every_octave() -> None:
+    """The slope of its spectrum is -1, as SciPy's periodogram and a straight line have it."""
+    seen = noises(200, flicker=Flicker(1.0))
+    frequency, power = periodogram(seen, fs=10.0, window="hann")
+    band = (frequency > 0.01) & (frequency < 0.5)
+    slope = np.polyfit(np.log(frequency[band]), np.log(power.mean(axis=0)[band]), 1)[0]
+    assert slope == pytest.approx(-1, abs=0.05)
+    assert np.mean(seen**2) == pytest.approx(1, rel=0.1)
+
+
+def test_shares_leave_the_variance_as_it_is() -> None:
+    seen = noises(400, relaxing=Relaxing(0.3, 1.0), flicker=Flicker(0.2))
+    assert np.mean(seen**2) == pytest.approx(1, rel=0.05)
+
+
+def test_a_drift_goes_either_way() -> None:
+    plain, drifting = noises(40), noises(40, drift=Drift(3.0))
+    course = drifting - plain
+    np.testing.assert_allclose(course[:, 0], 0, atol=1e-12)
+    np.testing.assert_allclose(np.abs(course[:, -1]), 3.0, rtol=1e-12)
+    np.testing.assert_allclose(np.diff(course, 2), 0, atol=1e-12)
+    assert 10 < np.sum(course[:, -1] > 0) < 30
+
+
+def test_outliers_are_few_and_far() -> None:
+    away = noises(40, outliers=Outliers(0.02, 50.0)) - noises(40)
+    struck = np.abs(away) > 0
+    # 160,000 samples: a share of 0.02 is known to 0.00035, a standard deviation to 1.3 %.
+    assert struck.mean() == pytest.approx(0.02, abs=0.0015)
+    assert away[struck].std() == pytest.approx(50.0, rel=0.06)
+
+
+def test_white_noise_is_what_it_was() -> None:
+    """Parts are drawn after it, so that a study without them keeps its noise."""
+    plain = add_noise(CLEAN, Noise("gaussian", 0.1, "peak"), np.random.default_rng(1))
+    timed = add_noise(CLEAN, Noise("gaussian", 0.1, "peak"), np.random.default_rng(1), CLEAN)
+    np.testing.assert_array_equal(plain, timed)
+    with pytest.raises(ValueError, match="sampling times"):
+        add_noise(CLEAN, Noise("gaussian", 0.1, "peak", drift=Drift(1.0)), np.random.default_rng(1))
+
+
+def test_parts_are_no_more_than_the_whole() -> None:
+    noise = Noise("gaussian", 0.1, "peak", relaxing=Relaxing(0.7, 1.0), flicker=Flicker(0.4))
+    ((path, text),) = noise.problems()
+    assert path == ("flicker", "share")
+    assert "found 1.1" in text

@@ -67,6 +67,12 @@ class CaseProblem:
         """Sample model without the parameters that are known."""
         return with_fixed(self.model, self.fixed)
 
+    @property
+    def plain(self) -> bool:
+        """Whether noise is taken for white, and the gripper for known."""
+        known = [value for arm in self.uncertainty.values() for value in arm.values()]
+        return not self.coloured and not any(known)
+
     def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
         """Return the problem with the arms of a calibration, YAML, if there is one.
 

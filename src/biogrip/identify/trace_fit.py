@@ -113,7 +113,7 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
     if not posed.coloured:
         plain = posed.of(time_s, rotation_rad)
         found = find(plain)
-        if not _is_uncertain(posed):
+        if posed.plain:
             return TraceFit(plain, found, None, ~kept)
     else:
         if len(time_s) > MOST_SAMPLES:
@@ -130,10 +130,6 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
     if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
         found = other
     return TraceFit(problem, found, colour, ~kept, condensed)
-
-
-def _is_uncertain(posed: CaseProblem) -> bool:
-    return any(any(known.values()) for known in posed.uncertainty.values())
 
 
 def _without_outliers(

@@ -16,10 +16,12 @@ from biogrip.identifiability.many_limits import limits_and_deeper, limits_of
 from biogrip.identifiability.profile import Likelihood, likelihood_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
-from biogrip.identify.answer import silent
+from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.many_starts import fitted_from
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.methods import METHODS, best_fit, identifier
+from biogrip.identify.problem import Problem
+from biogrip.identify.trace_fit import trace_fit
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
@@ -182,12 +184,10 @@ def _fitted(
 ) -> tuple[list[Likelihood], Array]:
     """Optima of a group and their limits; where these lead deeper, both are found again."""
     rngs = [stream(settings.study_seed, settings.case, seed, "coverage") for seed in group]
-    problems = [posed.of(time_s, trace) for trace in traces]
-    identify = identifier("least_squares", settings.least_squares)
     confidence = settings.confidence
     found = [
         likelihood_of(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
-        for problem, each in zip(problems, identify(problems, rngs, silent), strict=True)
+        for problem, each in _optima(settings, posed, time_s, traces, rngs)
     ]
     quantities = [chosen.every[index] for index in chosen.wanted]
     limits, deeper = limits_and_deeper(found, quantities)
@@ -195,6 +195,28 @@ def _fitted(
         if (again := refitted(found[trace], x, confidence)) is not None:
             found[trace], limits[trace] = again, limits_of([again], quantities)[0]
     return found, limits
+
+
+def _optima(
+    settings: Settings,
+    posed: CaseProblem,
+    time_s: Array,
+    traces: list[Array],
+    rngs: Sequence[np.random.Generator],
+) -> Iterator[tuple[Problem, Identification]]:
+    """Pose and identify traces, together where they share all but white noise."""
+    if posed.plain:
+        problems = [posed.of(time_s, trace) for trace in traces]
+        identify = identifier("least_squares", settings.least_squares)
+        yield from zip(problems, identify(problems, rngs, silent), strict=True)
+        return
+    for trace, rng in zip(traces, rngs, strict=True):
+
+        def find(problem: Problem, rng: np.random.Generator = rng) -> Identification:
+            return best_fit(problem, settings.least_squares, rng, silent)
+
+        fit = trace_fit(posed, time_s, trace, find)
+        yield fit.problem, fit.found
 
 
 def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:

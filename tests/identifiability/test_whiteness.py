@@ -1,0 +1,50 @@
+"""Tests of white noise: how often they are wrong, and what they see."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import Outliers, Relaxing
+from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise, uneven
+
+TIMES: Array = np.arange(4001) * 0.1
+
+
+def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
+    """SciPy's test of the same shares, as if they were a sample of a uniform distribution."""
+    for seed in range(20):
+        residual = np.random.default_rng(seed).standard_normal(4001)
+        power = np.abs(np.fft.rfft(residual)[1:]) ** 2
+        shares = np.cumsum(power)[:-1] / power.sum()
+        expected = kstest(shares, "uniform", method="asymp").pvalue
+        # SciPy has steps of 1/1999 where there are steps of 1/2000.
+        assert uneven(residual) == pytest.approx(expected, rel=0.15, abs=0.02)
+    assert uneven(np.ones(3)) == 1.0
+
+
+def test_white_noise_is_seldom_doubted() -> None:
+    """Three tests of 0.003 and one of next to nothing: of 1500 traces 13 or so are wrong."""
+    rng = np.random.default_rng(1)
+    doubted = sum(bool(doubts_about_noise(rng.standard_normal(1001))) for _ in range(1500))
+    assert doubted <= 3 * FALSE_ALARM * 1500 + 4 * np.sqrt(3 * FALSE_ALARM * 1500)
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ({"relaxing": Relaxing(1.0, 0.1)}, "Neighbouring residuals"),
+        ({"relaxing": Relaxing(0.05, 1.5)}, "more of some frequencies"),
+        ({"relaxing": Relaxing(0.05, 20.0)}, "The residual wanders"),
+        ({"outliers": Outliers(0.005, 20.0)}, "samples are outliers"),
+    ],
+)
+def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:
+    noise = Noise("gaussian", 1.0, "peak", **parts)
+    clean = np.ones(len(TIMES))
+    for seed in range(10):
+        residual = add_noise(clean, noise, np.random.default_rng(seed), TIMES) - clean
+        assert any(said in doubt for doubt in doubts_about_noise(residual))

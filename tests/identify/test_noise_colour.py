@@ -1,0 +1,96 @@
+"""The colour of noise: its likelihood against matrices of all samples, and how well it is known."""
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import Flicker, Relaxing
+from biogrip.identify.noise_colour import ColourLikelihood, _logarithms
+from biogrip.response.whitening import Colour, Whitening
+from tests.response.test_whitening import correlation
+
+TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
+DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
+NONE = np.zeros((0, 200))
+
+
+def restricted(time_s: Array, rows: Array, left: Array, colour: Colour) -> float:
+    """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
+    matrix = correlation(time_s, colour)
+    inverse = np.linalg.inv(matrix)
+    information = rows @ inverse @ rows.T
+    taken = inverse - inverse @ rows.T @ np.linalg.solve(information, rows @ inverse)
+    return float(
+        (len(time_s) - len(rows)) * np.log(left @ taken @ left)
+        + np.linalg.slogdet(matrix)[1]
+        + np.linalg.slogdet(information)[1]
+    )
+
+
+def test_the_likelihood_is_that_of_what_no_direction_reaches() -> None:
+    """Differences between colours, less the prior on the share of 1/f noise; twelve digits are
+    there, and the condition of the matrices takes four."""
+    left = np.random.default_rng(1).standard_normal(200)
+    likelihood = ColourLikelihood(TIMES, left, DIRECTIONS)
+    colours = [Colour(0.3, 5.0, 0.2), Colour(0.9, 1.0, 0.05), Colour(0.01, 100.0, 0.6)]
+    found, expected = [], []
+    for colour in colours:
+        x = _logarithms(colour)
+        found.append(likelihood._deviance(x) + x[2])
+        expected.append(restricted(TIMES, DIRECTIONS, left, colour))
+    np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
+
+
+def test_what_directions_have_in_it_does_not_matter() -> None:
+    left = np.random.default_rng(2).standard_normal(200)
+    plain = ColourLikelihood(TIMES, left, DIRECTIONS)
+    other = ColourLikelihood(TIMES, left + np.array([3.0, -0.1, 7.0]) @ DIRECTIONS, DIRECTIONS)
+    x = _logarithms(Colour(0.3, 5.0, 0.2))
+    assert other._deviance(x) == pytest.approx(plain._deviance(x), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("noise", "expected"),
+    [
+        (Noise("gaussian", 1.0, "peak"), (0.0, 0.0)),
+        (Noise("gaussian", 1.0, "peak", relaxing=Relaxing(0.5, 10.0)), (0.45, 0.0)),
+        (Noise("gaussian", 1.0, "peak", flicker=Flicker(0.5)), (0.0, 0.5)),
+    ],
+)
+def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
+    """On the median of nine traces; the scatter of one is some 0.15.
+
+    What relaxes counts by what is left of it after a sample.
+    """
+    times = np.arange(1500.0)
+    found = []
+    for seed in range(9):
+        trace = add_noise(np.ones(1500), noise, np.random.default_rng([seed, 5]), times)
+        colour = ColourLikelihood(times, trace, np.ones((1, 1500))).best()
+        # What is forgotten within a sample is white.
+        slow = colour.relaxing * np.exp(-1 / colour.time_s)
+        found.append((slow, colour.flicker))
+    np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
+
+
+def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
+    """The logarithm of a chi-squared variable with f degrees of freedom has a variance of some 2/f.
+
+    Of the variance of a slope in noise that relaxes, over forty traces; the variance of
+    logarithms is known to 22 %, and Satterthwaite's formula is of first order.
+    """
+    times = np.arange(400.0)
+    noise = Noise("gaussian", 1.0, "peak", relaxing=Relaxing(0.6, 8.0))
+    direction = (times / 400)[None]
+    logs, freedoms = [], []
+    for seed in range(40):
+        trace = add_noise(np.ones(400), noise, np.random.default_rng([seed, 6]), times)
+        likelihood = ColourLikelihood(times, trace, np.vstack((direction, np.ones(400))))
+        colour = likelihood.best()
+        x = _logarithms(colour)
+        white = Whitening(times, colour, np.ones((1, 400)) / 20)(direction)
+        logs.append(2 * likelihood._log_scale(x) - np.log(float(white[0] @ white[0])))
+        scaled = direction / np.exp(likelihood._log_scale(x))
+        freedoms.append(likelihood.freedom(colour, scaled, np.ones((1, 400)) / 20))
+    assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5

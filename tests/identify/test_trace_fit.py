@@ -1,0 +1,147 @@
+"""Identification with what an instrument does to a trace, against least squares with all of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise_parts import Drift, Outliers, Relaxing
+from biogrip.identify.answer import Identification
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.outliers import FAR, outliers_of
+from biogrip.identify.problem import Problem
+from biogrip.identify.trace_fit import MOST_SAMPLES, trace_fit
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.simulation import simulated_rotation
+from tests.helpers.default import STUDY
+
+CASE = STUDY.cases["liquid_drop_2"]
+POSED = CASE.problem
+TIMES = np.linspace(0, POSED.torque.end_s, 801)
+TRUTH = POSED.logs(CASE.parameters)
+
+
+def simulated(gripper: Gripper, x: Array) -> Array:
+    network = POSED.searched.network(np.exp(x))
+    return simulated_rotation(gripper, network, POSED.torque, TIMES, nonlinear=False)[0]
+
+
+CLEAN = simulated(POSED.gripper, TRUTH)
+
+
+def find(problem: Problem) -> Identification:
+    return fitted_from(problem, TRUTH)
+
+
+def noisy(noise: Noise, seed: int = 0) -> Array:
+    return add_noise(CLEAN, noise, np.random.default_rng([seed, 3]), TIMES)
+
+
+def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
+    trace = noisy(Noise("gaussian", 0.02, "peak"))
+    fit = trace_fit(POSED, TIMES, trace, find)
+    expected = find(POSED.of(TIMES, trace))
+    np.testing.assert_array_equal(fit.found.parameters, expected.parameters)
+    assert fit.colour is None
+    assert not fit.outliers.any()
+    assert fit.notes() == []
+
+
+def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
+    """SciPy fits both arms' stiffness along, each held by what is known of it.
+
+    Estimates and standard deviations of the logarithms agree to a twentieth of the latter:
+    what is taken for straight is 2 % of a stiffness.
+    """
+    share, level = 0.02, 0.02 * CLEAN.max()
+    arms = POSED.gripper.left, POSED.gripper.right
+    known = [share * arm.stiffness_Nm_per_rad for arm in arms]
+    uncertainty = {
+        name: {"stiffness_Nm_per_rad": value}
+        for name, value in zip(("left", "right"), known, strict=True)
+    }
+    posed = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
+    trace = noisy(Noise("gaussian", 0.02, "peak"))
+    fit = trace_fit(posed, TIMES, trace, find)
+    _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
+    told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
+
+    def residuals(z: Array) -> Array:
+        left, right = (
+            replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + share * y))
+            for arm, y in zip(arms, z[4:], strict=True)
+        )
+        gripper = replace(POSED.gripper, left=left, right=right)
+        return np.append((simulated(gripper, z[:4]) - trace) / level, z[4:])
+
+    start = np.append(np.log(fit.found.parameters), [0.0, 0.0])
+    low, high = np.append(fit.problem.low, [-5, -5]), np.append(fit.problem.high, [5, 5])
+    start[:4] = np.clip(start[:4], fit.problem.low + 1e-6, fit.problem.high - 1e-6)
+    both = least_squares(residuals, start, bounds=(low, high), x_scale="jac")
+
+    def deviations(information: Array) -> Array:
+        return np.sqrt(np.diagonal(np.linalg.inv(information + 1e-6 * np.eye(len(information)))))
+
+    own = deviations((slopes @ slopes.T / level**2)[np.ix_(told, told)])
+    rows = both.jac[:, [*told, 4, 5]]
+    expected = deviations(rows.T @ rows)[:2]
+    alone = deviations(both.jac[:-2, told].T @ both.jac[:-2, told])
+    np.testing.assert_allclose(own, expected, rtol=0.05)
+    assert np.all(own > 1.2 * alone)
+    moved = (np.log(fit.found.parameters) - both.x[:4])[told]
+    assert np.all(np.abs(moved) < 0.05 * expected + 1e-3)
+
+
+def test_noise_is_found_and_said() -> None:
+    noise = Noise("gaussian", 0.02, "peak", relaxing=Relaxing(0.5, 5.0), drift=Drift(2.0))
+    noise = replace(noise, outliers=Outliers(0.01, 30.0))
+    posed = replace(POSED, coloured=True)
+    fit = trace_fit(posed, TIMES, noisy(noise), find)
+    assert fit.colour is not None
+    assert fit.colour.relaxing + fit.colour.flicker == pytest.approx(0.5, abs=0.25)
+    away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
+    # What is only just outside of the noise may be missed, or not.
+    assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
+    assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
+    model, outliers = fit.notes()
+    assert "remembered for some" in model
+    assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
+    assert fit.problem.residuals.freedom < 1000
+    other = fit.problem_of(posed, TIMES, noisy(noise), POSED.searched)
+    np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
+
+
+def test_a_drift_changes_nothing_of_what_is_found() -> None:
+    """It is fitted along whether it is there or not, so the same noise gives the same limits."""
+    posed = replace(POSED, coloured=True)
+    steady = Noise("gaussian", 0.02, "peak")
+    drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
+    one, other = (
+        trace_fit(posed, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
+    )
+    np.testing.assert_allclose(one.found.parameters[[0, 2]], other.found.parameters[[0, 2]], 1e-3)
+    first, second = (each.problem.residuals(TRUTH)[1] for each in (one, other))
+    np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=1e-2, atol=1e-18)
+
+
+def test_too_many_samples_for_a_colour_are_refused() -> None:
+    posed: CaseProblem = replace(POSED, coloured=True)
+    times = np.linspace(0, 400, MOST_SAMPLES + 1)
+    with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
+        trace_fit(posed, times, times, find)
+
+
+def test_outliers_are_as_rare_as_gaussian_noise_has_them() -> None:
+    """Of a million samples beyond 4.5 standard deviations there are 7."""
+    rng = np.random.default_rng(0)
+    found = sum(int(outliers_of(rng.standard_normal(10_000)).sum()) for _ in range(100))
+    assert found <= 20
+    trace = rng.standard_normal(1000) + 100 * np.sin(np.arange(1000) / 100)
+    trace[[30, 500]] += 9.0
+    np.testing.assert_array_equal(np.flatnonzero(outliers_of(trace)), [30, 500])
+    assert not outliers_of(np.zeros(100)).any()
