@@ -28,6 +28,7 @@ from tests.published_numbers import renewed_numbers
 ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
+NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 
 _RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
@@ -76,6 +77,21 @@ def cells_needed_table() -> str:
             **{f"ratio {ratio:g}": str(cells_needed(ratio, 0.8, spread, 0.0)) for ratio in _RATIOS},
         }
         for spread in (0.1, 0.2, 0.3, 0.5)
+    )
+
+
+def simulated_noise() -> str:
+    """How often intervals held the truth in noise of several kinds, and what was said of it."""
+    return _table(
+        {
+            "beside white noise": row["noise"],
+            "quantity": row["quantity"],
+            "flagged": f"{row['flagged_percent']:.1f} %",
+            "held, taken for white": f"{row['white_coverage_percent']:.1f} %",
+            "held, allowed for": f"{row['coverage_percent']:.1f} %",
+            "times as wide": f"{row['times_wider']:.2g}",
+        }
+        for row in pd.read_csv(NOISE).to_dict("records")
     )
 
 
@@ -191,6 +207,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"results": paper_against_study, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
+    ROOT / "docs" / "identifiability.md": {"noise": simulated_noise},
     ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
     ROOT / "docs" / "model.md": {
         name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")

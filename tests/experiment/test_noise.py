@@ -56,7 +56,7 @@ def test_an_instruments_noise_does_not_depend_on_the_sample() -> None:
         np.testing.assert_array_equal(add_noise(CLEAN, nothing, rng), CLEAN)
 
 
-TIMES: Array = np.arange(4000) * 0.1
+TIMES: Array = np.linspace(0, 399.9, 4000)
 
 
 def noises(count: int = 200, times: np.ndarray = TIMES, **parts: Any) -> np.ndarray:
