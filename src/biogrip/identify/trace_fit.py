@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
+from biogrip.digits import rounded
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.answer import Identification
@@ -67,6 +68,17 @@ class TraceFit:
         """Pose the same trace in the same noise for another sample model."""
         kept = ~self.outliers
         return posed.of(time_s[kept], rotation_rad[kept], model, condensed=self.condensed)
+
+    def noise_data(self) -> dict[str, float | int] | None:
+        """Return what the noise was found to be as plain data."""
+        if self.colour is None:
+            return None
+        shares = {"white": self.colour.white, **vars(self.colour)}
+        return {
+            **{name: rounded(share) for name, share in shares.items()},
+            "degrees_of_freedom": rounded(self.problem.residuals.freedom),
+            "outliers": int(np.count_nonzero(self.outliers)),
+        }
 
     def notes(self) -> list[str]:
         """Say in sentences what the noise was found to be."""

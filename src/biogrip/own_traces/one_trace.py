@@ -118,6 +118,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             **_instrument(posed, recorded, np.exp(told.likelihood.best)),
             **said,
             "notes": [*fit.notes(), *said["notes"], *doubts],
+            "noise_model": fit.noise_data(),
             **models_tried(study, case, recorded, fit, progress.within),
             "assumed": assumed(case),
             "by_default": by_default(wanted.config),

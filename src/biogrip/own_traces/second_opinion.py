@@ -39,7 +39,7 @@ def second_opinion(
     """
     posed = case.problem
     added = 2 - posed.offset - posed.drift
-    if not added or posed.nonlinear or posed.coloured:
+    if not added or posed.nonlinear:
         return []
     also = replace(posed, offset=True, drift=True)
     problem = also.of(recorded.time_s, recorded.rotation_rad[0])

@@ -129,6 +129,7 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
         "confidence": settings.confidence,
         **said,
         "notes": [*fit.notes(), *said["notes"]],
+        "noise_model": fit.noise_data(),
         "valley": valley,
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
