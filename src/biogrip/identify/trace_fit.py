@@ -69,7 +69,7 @@ class TraceFit:
         kept = ~self.outliers
         return posed.of(time_s[kept], rotation_rad[kept], model, condensed=self.condensed)
 
-    def noise_data(self) -> dict[str, float | int] | None:
+    def noise_data(self) -> dict[str, float | None] | None:
         """Return what the noise was found to be as plain data."""
         if self.colour is None:
             return None
