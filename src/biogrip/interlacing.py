@@ -1,0 +1,180 @@
+"""Zeros of sums of simple poles, which interlace with the poles: relaxation rates of networks.
+
+A network of springs and dampers that has Maxwell branches side by side has as many
+modes as branches, or one more, and with the branches' rates p_0 < p_1 < ... theirs
+are the zeros of
+
+    f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
+
+one in each interval between neighbouring rates and one beyond the last. However
+many branches there are, each zero is sought on its own, as its distance from the
+nearer pole: none of the digits of a zero close to a pole is lost, and no polynomial
+is formed, whose coefficients would span hundreds of decades.
+
+References
+----------
+.. [1] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
+   (1994): both neighbouring poles matched in value and slope, the middle way.
+.. [2] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
+   eigenproblem, Numerische Mathematik 31 (1978), 31-48.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array
+
+_MOST_SWEEPS = 60
+_ROUNDING = 4e-16
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """Zeros of n functions, as distances from poles.
+
+    Parameters
+    ----------
+    pole : (n_zeros, n)
+        The pole that each zero is counted from.
+    beyond : (n_zeros, n)
+        How far beyond it the zero is; complex where the weights were, with the derivative
+        in its imaginary part.
+    """
+
+    pole: Array
+    beyond: NDArray[Any]
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The zeros themselves, (n_zeros, n), ascending."""
+        return self.pole + self.beyond
+
+    def from_pole(self, pole: Array) -> NDArray[Any]:
+        """Distances of the zeros from a pole of each function, (n,), without cancellation."""
+        return (self.pole - pole) + self.beyond
+
+
+def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
+    """Find the zeros of sum_j w_j / (x - p_j) - b.
+
+    What is found for a function does not depend, to the last bit, on the others.
+
+    Parameters
+    ----------
+    weights : (n_poles, n)
+        Positive; an imaginary part, far smaller than the real one, carries a derivative.
+    poles : (n_poles, n)
+        Ascending and real.
+    level : (n,)
+        b, positive, or complex like the weights.
+
+    Returns
+    -------
+    Zeros
+        As many as poles, each above its own pole and below the next.
+    """
+    if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
+        return _real_zeros(weights, poles, level)
+    # Samples that are tilted in one parameter or another have the same real parts.
+    real = np.concatenate((weights.real, poles, level.real[None]))
+    _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
+    of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
+    found = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    # One step of Newton's method takes an infinitesimal change of the weights all the way.
+    change = -np.imag(level) * np.ones_like(found.pole)
+    slope = np.zeros_like(found.pole)
+    for pole, weight in zip(poles, weights, strict=True):
+        distance = found.from_pole(pole)
+        term = weight / distance
+        change += term.imag
+        slope -= term.real / distance
+    return Zeros(found.pole, found.beyond - 1j * change / slope)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Sums over the poles below some points and over those above, and their derivatives."""
+
+    below: Array
+    below_slope: Array
+    above: Array
+    above_slope: Array
+
+
+def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
+    pole, *interval = _intervals(weights, poles, level)
+    beyond = np.empty_like(pole)
+    # Of what is still searched for: which functions; from the zero's pole, its neighbours to
+    # the left and right, two bounds and the zero; which zeros have been found.
+    which, search = np.arange(len(level)), np.array([pole, *interval])
+    settled = np.zeros(pole.shape, dtype=bool)
+    for _ in range(_MOST_SWEEPS):
+        origin, left, right, low, high, at = search
+        sides = _sides(weights, poles, Zeros(origin, at))
+        value = sides.below + sides.above - level
+        settled |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
+        np.copyto(low, at, where=value > 0)
+        np.copyto(high, at, where=value < 0)
+        moved = at + _step(value, sides, at - left, at - right, level)
+        outside = ~((moved > low) & (moved < high))
+        np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * np.abs(at))), where=outside)
+        np.copyto(moved, at, where=settled)
+        settled |= np.abs(moved - at) <= _ROUNDING * np.abs(moved)
+        at[:] = beyond[:, which] = moved
+        left_over = ~np.all(settled, axis=0)
+        if not np.any(left_over):
+            break
+        if not np.all(left_over):
+            which, level, search = which[left_over], level[left_over], search[..., left_over]
+            weights, poles, settled = (of[:, left_over] for of in (weights, poles, settled))
+    return Zeros(pole, beyond)
+
+
+def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, ...]:
+    """Nearest pole of each zero; from there its neighbours, bounds, and where to begin."""
+    gaps = np.diff(poles, axis=0)
+    # The sign at the middle of a gap tells which end the zero is nearer to.
+    middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
+    further = middle.below + middle.above > level
+    pole = np.concatenate((np.where(further, poles[1:], poles[:-1]), poles[-1:]))
+    left, right = np.zeros_like(pole), np.full_like(pole, np.inf)
+    left[:-1], right[:-1] = np.where(further, -gaps, 0), np.where(further, 0, gaps)
+    low, high = left.copy(), right.copy()
+    low[:-1], high[:-1] = np.where(further, -0.5 * gaps, 0), np.where(further, 0, 0.5 * gaps)
+    start = 0.5 * (low + high)
+    # No further than the last pole by itself, or all poles at zero, would have the last zero.
+    start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
+    return pole, left, right, low, high, start
+
+
+def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
+    below, below_slope, above, above_slope = np.zeros((4, *at.pole.shape))
+    for j, (weight, pole) in enumerate(zip(weights, poles, strict=True)):
+        distance = at.from_pole(pole)
+        term = weight / distance
+        slope = term / distance
+        below[j:] += term[j:]
+        below_slope[j:] -= slope[j:]
+        above[:j] += term[:j]
+        above_slope[:j] -= slope[:j]
+    return _Sides(below, below_slope, above, above_slope)
+
+
+def _step(value: Array, sides: _Sides, from_left: Array, from_right: Array, level: Array) -> Array:
+    """Step to the zero of what agrees with the function in value and slope."""
+    step = np.empty_like(value)
+    # c + s / (x - left) + r / (x - right), one pole for each side [1]: a quadratic.
+    d, e = from_left[:-1], from_right[:-1]
+    slope, other, height = sides.below_slope[:-1], sides.above_slope[:-1], value[:-1]
+    c = height + slope * d + other * e
+    half = 0.5 * (height * (d + e) + (slope + other) * d * e)
+    last = height * d * e
+    root = np.sqrt(np.maximum(half * half - c * last, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step[:-1] = np.where(half > 0, -last / (half + root), (root - half) / c)
+    # Beyond all poles one over their sum is concave and nearly straight: Newton's method on it.
+    step[-1] = -sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
+    return step
