@@ -105,49 +105,47 @@ class _Sides:
 
 
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
-    pole, *interval = _intervals(weights, poles, level)
-    beyond = np.empty_like(pole)
-    # Of what is still searched for: which functions; from the zero's pole, its neighbours to
-    # the left and right, two bounds and the zero; which zeros have been found.
-    which, search = np.arange(len(level)), np.array([pole, *interval])
+    pole, side, gap, start = _intervals(weights, poles, level)
+    found = np.empty_like(pole)
+    # Of what is still searched for: which functions; for each zero its pole, on which side of it
+    # and how far the next one is; bounds of its distance, and the distance; whether it is found.
+    which = np.arange(len(level))
+    search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start])
     settled = np.zeros(pole.shape, dtype=bool)
     for _ in range(_MOST_SWEEPS):
-        origin, left, right, low, high, at = search
-        sides = _sides(weights, poles, Zeros(origin, at))
+        origin, sign, whole, low, high, at = search
+        sides = _sides(weights, poles, Zeros(origin, sign * at))
         value = sides.below + sides.above - level
         settled |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
-        np.copyto(low, at, where=value > 0)
-        np.copyto(high, at, where=value < 0)
-        moved = at + _step(value, sides, at - left, at - right, level)
+        np.copyto(low, at, where=sign * value > 0)
+        np.copyto(high, at, where=sign * value < 0)
+        moved = _nearer(value, sides, sign, whole, at, level)
         outside = ~((moved > low) & (moved < high))
-        np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * np.abs(at))), where=outside)
+        np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=settled)
-        settled |= np.abs(moved - at) <= _ROUNDING * np.abs(moved)
-        at[:] = beyond[:, which] = moved
+        settled |= np.abs(moved - at) <= _ROUNDING * moved
+        at[:] = found[:, which] = moved
         left_over = ~np.all(settled, axis=0)
         if not np.any(left_over):
             break
         if not np.all(left_over):
             which, level, search = which[left_over], level[left_over], search[..., left_over]
             weights, poles, settled = (of[:, left_over] for of in (weights, poles, settled))
-    return Zeros(pole, beyond)
+    return Zeros(pole, side * found)
 
 
-def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, ...]:
-    """Nearest pole of each zero; from there its neighbours, bounds, and where to begin."""
+def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array, Array, Array]:
+    """Nearest pole of each zero, the side of it, the way to the next, and where to begin."""
     gaps = np.diff(poles, axis=0)
     # The sign at the middle of a gap tells which end the zero is nearer to.
     middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
     further = middle.below + middle.above > level
     pole = np.concatenate((np.where(further, poles[1:], poles[:-1]), poles[-1:]))
-    left, right = np.zeros_like(pole), np.full_like(pole, np.inf)
-    left[:-1], right[:-1] = np.where(further, -gaps, 0), np.where(further, 0, gaps)
-    low, high = left.copy(), right.copy()
-    low[:-1], high[:-1] = np.where(further, -0.5 * gaps, 0), np.where(further, 0, 0.5 * gaps)
-    start = 0.5 * (low + high)
+    side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
+    side[:-1], gap[:-1], start[:-1] = np.where(further, -1.0, 1.0), gaps, 0.25 * gaps
     # No further than the last pole by itself, or all poles at zero, would have the last zero.
     start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
-    return pole, left, right, low, high, start
+    return pole, side, gap, start
 
 
 def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
@@ -163,18 +161,20 @@ def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
     return _Sides(below, below_slope, above, above_slope)
 
 
-def _step(value: Array, sides: _Sides, from_left: Array, from_right: Array, level: Array) -> Array:
-    """Step to the zero of what agrees with the function in value and slope."""
-    step = np.empty_like(value)
-    # c + s / (x - left) + r / (x - right), one pole for each side [1]: a quadratic.
-    d, e = from_left[:-1], from_right[:-1]
-    slope, other, height = sides.below_slope[:-1], sides.above_slope[:-1], value[:-1]
-    c = height + slope * d + other * e
-    half = 0.5 * (height * (d + e) + (slope + other) * d * e)
-    last = height * d * e
-    root = np.sqrt(np.maximum(half * half - c * last, 0))
+def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array) -> Array:
+    """Distance from its pole of the zero of what agrees with the function in value and slope."""
+    found = np.empty_like(value)
+    # c + p/d - q/(g - d), one pole for each side [1], seen from the nearer one: a quadratic.
+    sign, whole, d = side[:-1], gap[:-1], at[:-1]
+    rest = whole - d
+    slopes = sides.below_slope[:-1], sides.above_slope[:-1]
+    p = -np.where(sign > 0, *slopes) * d * d
+    q = -np.where(sign > 0, *slopes[::-1]) * rest * rest
+    c = sign * value[:-1] - p / d + q / rest
+    half = 0.5 * (p + q - c * whole)
+    root = np.sqrt(np.maximum(half * half + c * p * whole, 0))
     with np.errstate(divide="ignore", invalid="ignore"):
-        step[:-1] = np.where(half > 0, -last / (half + root), (root - half) / c)
+        found[:-1] = np.where(half > 0, p * whole / (half + root), (root - half) / c)
     # Beyond all poles one over their sum is concave and nearly straight: Newton's method on it.
-    step[-1] = -sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
-    return step
+    found[-1] = at[-1] - sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
+    return found

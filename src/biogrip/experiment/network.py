@@ -25,4 +25,4 @@ class Network:
 
 
 MOST_BRANCHES = 8
-"""More than these are no model's own, but stand for a power law (`biogrip.experiment.springpot`)."""
+"""More are no model's own, but stand for a power law (`biogrip.experiment.springpot`)."""

@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.network import MOST_BRANCHES, Network
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import (
     StepResponse,
@@ -58,7 +58,7 @@ def jaw_force_response(
         The force takes the place of an arm.
     """
     if network.k.shape[1] > MOST_BRANCHES:
-        return StepResponse(*modes_of_force(gripper, network, symmetric=symmetric))
+        return StepResponse(*modes_of_force(gripper, network, symmetric=symmetric, inertia=inertia))
     denominator = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia
     ).denominator

@@ -26,6 +26,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.network import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.interlacing import Zeros, interlaced_zeros
+from biogrip.response.many_branches_ringing import ringing
 
 # Equal arms differ by this share: their branch does nothing, but has its mode.
 _LEAST_DIFFERENCE = 1e-30
@@ -73,7 +74,7 @@ class Arms:
 
     def __init__(self, gripper: Gripper, *, alike: bool) -> None:
         self._lever_m = gripper.lever_m
-        self._alike = alike
+        self.alike = alike
         arms = gripper.left, gripper.right
         self._c = np.array([arm.damping_Nms_per_rad for arm in arms])
         self._k = np.array([arm.stiffness_Nm_per_rad for arm in arms])
@@ -88,7 +89,7 @@ class Arms:
         b_2, k, c = self._lever_m**2, self._k, self._c
         weights, rates = b_2 * network.k.T, (network.k / network.c).T
         nothing = np.zeros((1, weights.shape[1]))
-        if not self._alike:
+        if not self.alike:
             weights = np.concatenate((weights, nothing + self._chi**2 / k.sum()))
             rates = np.concatenate((rates, nothing + self._rate))
             order = np.argsort(rates.real, axis=0, kind="stable")
@@ -102,7 +103,7 @@ class Arms:
 
     def rotations(self, zeros: Zeros) -> tuple[Array, Array]:
         """N of the rotations of modes, (n_arms, n_drives, n_modes, n), and dN/dx."""
-        if self._alike:
+        if self.alike:
             half = np.full((2, 1, *zeros.pole.shape), 0.5)
             return half, np.zeros_like(half)
         left, right = self._c / self._c.sum()
@@ -121,7 +122,7 @@ class Arms:
     def forces(self, zeros: Zeros) -> Array:
         """N of the jaw force of modes, (1, n_drives, n_modes, n)."""
         (c_2, c_4), b = self._c, self._lever_m
-        if self._alike:
+        if self.alike:
             return 0.5 / b * (c_2 * zeros.values - self._k[0])[None, None]
         away = zeros.from_pole(np.asarray(self._rate))
         z_2, z_4 = -self._chi - c_2 * away, self._chi - c_4 * away
@@ -134,7 +135,7 @@ class Arms:
         sample = self._lever_m**2 * network.k_p
         spring = self._k.prod() / self._k.sum() + sample
         one = np.ones_like(spring)
-        if self._alike:
+        if self.alike:
             return np.array([[0.5 * one]] * 2) / spring
         rows = [[k_4 * one, sample], [k_2 * one, -(k_2 + sample)]]
         return np.array(rows) / self._k.sum() / spring
@@ -143,13 +144,13 @@ class Arms:
         """Final jaw force under unit torques, (1, n_drives, n)."""
         sample = self._lever_m * network.k_p
         spring = self._k.prod() / self._k.sum() + self._lever_m * sample
-        drives = [sample] if self._alike else [sample, -sample * self._k[0] / self._k.sum()]
+        drives = [sample] if self.alike else [sample, -sample * self._k[0] / self._k.sum()]
         return np.array([drives]) / spring
 
 
 def modes_of_rotation(
-    gripper: Gripper, network: Network, *, symmetric: bool
-) -> tuple[Array, Array, Array]:
+    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
+) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     """Step responses of both arms: constants, rates in 1/s and weights.
 
     Parameters
@@ -158,6 +159,8 @@ def modes_of_rotation(
         Arms, and n samples of more than `MOST_BRANCHES` branches.
     symmetric
         Whether both arms are driven alike; decides the drives.
+    inertia
+        Whether the arms have any.
 
     Returns
     -------
@@ -170,28 +173,36 @@ def modes_of_rotation(
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
+    static = arms.rotations_at_rest(network)
+    if inertia:
+        found = ringing(gripper, network, zeros, alike=arms.alike)
+        return _by_sample(static, found.rates.T, found.rotations(), symmetric)
     weights = -arms.rotations(zeros)[0] / impedance.steepness(zeros)
-    return _by_sample(arms.rotations_at_rest(network), zeros, weights, symmetric)
+    return _by_sample(static, -zeros.values, weights, symmetric)
 
 
 def modes_of_force(
-    gripper: Gripper, network: Network, *, symmetric: bool
-) -> tuple[Array, Array, Array]:
+    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
+) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     """Jaw force after unit steps, in N per N m; as of `modes_of_rotation`, with one arm."""
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
+    static = arms.forces_at_rest(network)
+    if inertia:
+        found = ringing(gripper, network, zeros, alike=arms.alike)
+        return _by_sample(static, found.rates.T, found.forces(), symmetric)
     weights = -arms.forces(zeros) / impedance.steepness(zeros)
-    return _by_sample(arms.forces_at_rest(network), zeros, weights, symmetric)
+    return _by_sample(static, -zeros.values, weights, symmetric)
 
 
 def _by_sample(
-    static: Array, zeros: Zeros, weights: Array, symmetric: bool
-) -> tuple[Array, Array, Array]:
+    static: Array, rates: NDArray[Any], weights: NDArray[Any], symmetric: bool
+) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     drives = slice(1 if symmetric else 2)
     return (
         np.ascontiguousarray(np.moveaxis(static[:, drives], 2, 0)),
-        np.ascontiguousarray(-zeros.values.T),
+        np.ascontiguousarray(rates.T),
         np.ascontiguousarray(np.moveaxis(weights[:, drives], 3, 0)),
     )
 

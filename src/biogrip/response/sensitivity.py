@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
-from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.network import MOST_BRANCHES
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import (
@@ -156,15 +156,8 @@ def modes_of(
     tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
     network = model.network(tilted)
     if network.k.shape[1] > MOST_BRANCHES:
-        rates, weights, rate_slopes, weight_slopes = modes_with_slopes(
-            gripper, network, _TILT, count, symmetric=torque.symmetric
-        )
-        return Modes(
-            np.ascontiguousarray(rates.T),
-            np.ascontiguousarray(weights.transpose(2, 0, 1)),
-            np.ascontiguousarray(rate_slopes.transpose(2, 0, 1)),
-            np.ascontiguousarray(weight_slopes.transpose(3, 0, 1, 2)),
-        )
+        parts = modes_with_slopes(gripper, network, _TILT, count, symmetric=torque.symmetric)
+        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
     transfer = transfer_functions(gripper, network, symmetric=torque.symmetric)
     denominator, denominator_slopes = _untilted(transfer.denominator, count)
     rates = poles(denominator, real=True)
