@@ -34,6 +34,14 @@ class SearchRange:
     k_p: Annotated[GeneRange, Key()]
     c: Annotated[GeneRange, Key()]
     c_p: Annotated[GeneRange, Key()]
+    alpha: Annotated[GeneRange, Key()]
+
+    def problems(self) -> Iterator[Problem]:
+        """Find exponents of springpots that are none."""
+        highest = self.alpha.exponent[1]
+        if highest > 0:
+            text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
+            yield ("alpha", "exponent"), f"{text}most 0."
 
 
 @dataclass(frozen=True)
@@ -202,7 +210,8 @@ class CaseBlock(Shared):
             if value is None or vanishes or low <= value <= high:
                 continue
             text = f"found {value:g}, which is not searched for; allowed is {low:g} to {high:g} "
-            yield ("sample", parameter.name), f"{text}{parameter.unit}, or another search_range."
+            text = f"{text}{parameter.unit}".rstrip()
+            yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
