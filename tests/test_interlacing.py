@@ -1,5 +1,8 @@
 """Zeros between poles, against 50 digits."""
 
+from collections.abc import Iterable
+from typing import Any
+
 import numpy as np
 import pytest
 from mpmath import mp, mpf
@@ -16,7 +19,7 @@ def random_functions(count: int, poles: int, seed: int) -> tuple[Array, Array, A
     return 10 ** rng.uniform(-50, 10, (poles, count)), rates, 10 ** rng.uniform(-10, 3, count)
 
 
-def refined(weights: Array, poles: Array, level: float, pole: float, beyond: float) -> mpf:
+def refined(weights: Iterable[Any], poles: Array, level: float, pole: float, beyond: float) -> mpf:
     """The zero next to a point, as its distance from a pole, by Newton's method."""
     with mp.workdps(120):
         at = mpf(beyond)

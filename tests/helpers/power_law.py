@@ -65,15 +65,18 @@ def rotations(
         moment = mpf(arm.inertia_kgm2) * s * s if inertia else 0
         return moment + mpf(arm.damping_Nms_per_rad) * s + mpf(arm.stiffness_Nm_per_rad)
 
-    def both(s: Any, torques: tuple[float, float], which: int) -> Any:
-        # (Z_2 + b^2 G) phi_2 + b^2 G phi_4 = tau_2/s, and the same for the other arm.
-        coupled = b * b * sample(s)
-        left, right = free(gripper.left, s) + coupled, free(gripper.right, s) + coupled
-        determinant = left * right - coupled * coupled
-        loads = [mpf(value) / s for value in torques]
-        first = right * loads[0] - coupled * loads[1]
-        second = left * loads[1] - coupled * loads[0]
-        return (first, second)[which] / determinant
+    def transform(torques: tuple[float, float], which: int) -> Impedance:
+        def both(s: Any) -> Any:
+            # (Z_2 + b^2 G) phi_2 + b^2 G phi_4 = tau_2/s, and the same for the other arm.
+            coupled = b * b * sample(s)
+            left, right = free(gripper.left, s) + coupled, free(gripper.right, s) + coupled
+            determinant = left * right - coupled * coupled
+            loads = [mpf(value) / s for value in torques]
+            first = right * loads[0] - coupled * loads[1]
+            second = left * loads[1] - coupled * loads[0]
+            return (first, second)[which] / determinant
+
+        return both
 
     found = np.zeros((2, len(time_s)))
     steps = zip(torque.time_s, torque.left[:, 0], torque.right[:, 0], strict=True)
@@ -82,7 +85,5 @@ def rotations(
         for i, t in enumerate(time_s):
             if t > start:
                 for which in (0, 1):
-                    found[which, i] += inverted(
-                        lambda s, given=given, which=which: both(s, given, which), t - start
-                    )
+                    found[which, i] += inverted(transform(given, which), t - start)
     return found

@@ -103,7 +103,9 @@ def test_relaxation_between_stiff_arms(model: str, exponent: float) -> None:
     force = jaw_force(*given, nonlinear=False, inertia=False)[0]
     shortening = 2 * stiff.lever_m * TAU / 1e5
     # The arms give way by about 2 b^2 G/k_g, which is at most 5e-8.
-    np.testing.assert_allclose(force / shortening, relaxing, rtol=1e-6)
+    # The error is that of the springpot, where the damper behind it has taken most away, too.
+    alone = modulus * times**-exponent / float(gamma(1 - exponent))
+    assert np.all(np.abs(force / shortening - relaxing) < 1e-6 * np.maximum(relaxing, alone))
 
 
 @pytest.mark.parametrize(("model", "sample"), SAMPLES)
@@ -225,6 +227,11 @@ def test_few_branches_are_solved_like_many(
     np.testing.assert_allclose(decays[0], decays[1], rtol=0, atol=1e-12 * np.abs(decays).max())
 
 
+def of_relaxation(a: float, x: float) -> Callable[[Any], Any]:
+    """Transform of 1 - E_a(-x t^a)."""
+    return lambda s: x / (s * (s**a + x))
+
+
 def test_inversion_of_a_known_transform() -> None:
     """The tests' own tools: t^a/Gamma(1+a), and both ways to a Mittag-Leffler function."""
     for t in (1e-4, 1.0, 300.0):
@@ -232,9 +239,9 @@ def test_inversion_of_a_known_transform() -> None:
     for a in (0.2, 0.5, 0.9):
         for x in (0.01, 1.0, 20.0**a):
             by_series = 1 - mittag_leffler(a, 1.0, x)
-            by_inversion = inverted(lambda s, a=a, x=x: x / (s * (s**a + x)), 1.0)
+            by_inversion = inverted(of_relaxation(a, x), 1.0)
             assert by_inversion == pytest.approx(by_series, 1e-9)
             assert one_minus_mittag_leffler(a, x) == pytest.approx(by_series, 1e-9)
         far = 1e3**a
-        by_inversion = inverted(lambda s, a=a, far=far: far / (s * (s**a + far)), 1.0)
+        by_inversion = inverted(of_relaxation(a, far), 1.0)
         assert one_minus_mittag_leffler(a, far) == pytest.approx(by_inversion, 1e-9)

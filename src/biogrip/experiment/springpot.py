@@ -33,7 +33,7 @@ from biogrip.arrays import Array
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
 """Times between which a springpot is one, to 1e-6 of the response; so are 1/s of its rates."""
 
-_STEP, _WHOLE = 0.65, 41
+_STEP, _WHOLE = 0.6, 45
 _SLOWEST_PER_S = 0.5e-5
 _NODES = 3
 
