@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array
 
 _MOST_SWEEPS = 60
-_ROUNDING = 4e-16
+_ROUNDING, _SHORT = 4e-16, 1e-9
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,8 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         outside = ~((moved > low) & (moved < high))
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=settled)
-        settled |= np.abs(moved - at) <= _ROUNDING * moved
+        # The error is squared by a step, so one that is short takes it below rounding.
+        settled |= np.abs(moved - at) <= _SHORT * moved
         at[:] = found[:, which] = moved
         left_over = ~np.all(settled, axis=0)
         if not np.any(left_over):
@@ -139,10 +140,12 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     gaps = np.diff(poles, axis=0)
     # The sign at the middle of a gap tells which end the zero is nearer to.
     middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
-    further = middle.below + middle.above > level
-    pole = np.concatenate((np.where(further, poles[1:], poles[:-1]), poles[-1:]))
+    value = middle.below + middle.above - level
+    pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
     side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
-    side[:-1], gap[:-1], start[:-1] = np.where(further, -1.0, 1.0), gaps, 0.25 * gaps
+    side[:-1], gap[:-1] = np.where(value > 0, -1.0, 1.0), gaps
+    guess = _between(value, middle.below_slope, middle.above_slope, side[:-1], gaps, 0.5 * gaps)
+    start[:-1] = np.where((guess > 0) & (guess < 0.5 * gaps), guess, 0.25 * gaps)
     # No further than the last pole by itself, or all poles at zero, would have the last zero.
     start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
     return pole, side, gap, start
@@ -150,10 +153,12 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
 
 def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
     below, below_slope, above, above_slope = np.zeros((4, *at.pole.shape))
+    term, slope = np.empty((2, *at.pole.shape))
     for j, (weight, pole) in enumerate(zip(weights, poles, strict=True)):
-        distance = at.from_pole(pole)
-        term = weight / distance
-        slope = term / distance
+        np.subtract(at.pole, pole, out=slope)
+        slope += at.beyond
+        np.divide(weight, slope, out=term)
+        np.divide(term, slope, out=slope)
         below[j:] += term[j:]
         below_slope[j:] -= slope[j:]
         above[:j] += term[:j]
@@ -162,19 +167,28 @@ def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
 
 
 def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array) -> Array:
-    """Distance from its pole of the zero of what agrees with the function in value and slope."""
+    """Distances of zeros from their poles, from a guess that is nearer or further."""
     found = np.empty_like(value)
-    # c + p/d - q/(g - d), one pole for each side [1], seen from the nearer one: a quadratic.
-    sign, whole, d = side[:-1], gap[:-1], at[:-1]
-    rest = whole - d
-    slopes = sides.below_slope[:-1], sides.above_slope[:-1]
-    p = -np.where(sign > 0, *slopes) * d * d
-    q = -np.where(sign > 0, *slopes[::-1]) * rest * rest
-    c = sign * value[:-1] - p / d + q / rest
-    half = 0.5 * (p + q - c * whole)
-    root = np.sqrt(np.maximum(half * half + c * p * whole, 0))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found[:-1] = np.where(half > 0, p * whole / (half + root), (root - half) / c)
+    inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
+    found[:-1] = _between(*(of[:-1] for of in inner))
     # Beyond all poles one over their sum is concave and nearly straight: Newton's method on it.
     found[-1] = at[-1] - sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
+    return found
+
+
+def _between(
+    value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
+) -> Array:
+    """Zero of c + p/d - q/(gap - d), which agrees in value and slopes, one pole a side [1].
+
+    Seen from the nearer pole, so that none of the digits of d is lost.
+    """
+    rest = gap - at
+    p = -np.where(side > 0, below_slope, above_slope) * at * at
+    q = -np.where(side > 0, above_slope, below_slope) * rest * rest
+    c = side * value - p / at + q / rest
+    half = 0.5 * (p + q - c * gap)
+    root = np.sqrt(np.maximum(half * half + c * p * gap, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Array = np.where(half > 0, p * gap / (half + root), (root - half) / c)
     return found
