@@ -109,6 +109,11 @@ class SampleModel:
         return tuple(parameter.name for parameter in self.parameters)
 
     @property
+    def power_law(self) -> bool:
+        """Whether there is a springpot in it, which stands for branches of all times."""
+        return any(parameter.kind == "springpot" for parameter in self.parameters)
+
+    @property
     def quantities(self) -> list[list[Parameter]]:
         """What tables have a row for: every parameter, and the sum of the exchangeable ones."""
         together = [p for p in self.parameters if p.name in self.exchangeable]
