@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpmath import gamma
+from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, held, torque_history
@@ -15,6 +16,7 @@ from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response
 from biogrip.response.linear import LEFT, RIGHT, StepResponse, rotation, step_response
 from biogrip.response.many_branches import modes_of_force, modes_of_rotation
+from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.power_law import (
     inverted,
@@ -245,3 +247,30 @@ def test_inversion_of_a_known_transform() -> None:
         far = 1e3**a
         by_inversion = inverted(of_relaxation(a, far), 1.0)
         assert one_minus_mittag_leffler(a, far) == pytest.approx(by_inversion, 1e-9)
+
+
+def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Gripper) -> None:
+    """Corrected eqs. (1)-(3) with all branches as states, by SciPy; soft, so that angles count."""
+    network = MODELS["fractional_kelvin_voigt"].network([0.02, 0.1, 0.35])
+    k_p, c_p, k, rates = network.k_p[0], network.c_p[0], network.k[0], (network.k / network.c)[0]
+    arm, hat = gripper.left, np.radians(gripper.reference_angle_deg)
+    torque = torque_history((held(200.0, TAU),))
+
+    def slope(_: float, state: Array) -> Array:
+        phi, dampers = state[0], state[1:]
+        u = 2 * gripper.arm_length_m * np.sin(hat - phi / 2) * np.sin(phi / 2)
+        b = gripper.arm_length_m * np.sin(hat - phi)
+        rest = TAU - arm.stiffness_Nm_per_rad * phi - b * (k_p * 2 * u + k @ (2 * u - dampers))
+        phi_rate = rest / (arm.damping_Nms_per_rad + 2 * c_p * b * b)
+        return np.concatenate(([phi_rate], rates * (2 * u - dampers)))
+
+    linear = rotation(step_response(gripper, network), torque, SEEN[:5])[0]
+    scale = 1e-11 * linear.max()
+    atol = np.concatenate(([scale], np.full(len(k), scale * gripper.arm_length_m)))
+    solved = solve_ivp(
+        slope, (0, 200), np.zeros(1 + len(k)), "Radau", SEEN[:5], rtol=1e-8, atol=atol
+    )
+    ours = nonlinear_rotation(gripper, network, torque, SEEN[:5])[0]
+    assert np.max(np.abs(ours - linear)) > 1e-4 * linear.max()
+    # Radau's own error, after some thousand steps of 1e-8 at most.
+    np.testing.assert_allclose(ours, solved.y[0], rtol=1e-6)
