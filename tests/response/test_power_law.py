@@ -9,6 +9,7 @@ from mpmath import gamma
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.experiment.network import Network
 from biogrip.experiment.protocol import TorqueHistory, held, torque_history
 from biogrip.experiment.sample import MODELS, generalized_maxwell
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
@@ -192,7 +193,8 @@ def test_derivatives_against_those_of_mittag_leffler_functions(exponent: float) 
         np.testing.assert_allclose(slopes[index], exact, rtol=0, atol=1e-5 * phi.max())
 
 
-FEW = [5.0, 2.0, 1.0, 0.2, 1e3, 30.0, 0.3, 0.5]
+# Rates in no order.
+FEW = [2.0, 5.0, 1.0, 0.2, 30.0, 1e3, 0.3, 0.5]
 
 
 @pytest.mark.parametrize("symmetric", [True, False])
@@ -227,6 +229,22 @@ def test_few_branches_are_solved_like_many(
         for one in forces
     ]
     np.testing.assert_allclose(decays[0], decays[1], rtol=0, atol=1e-12 * np.abs(decays).max())
+
+
+def test_equal_branches_add_up(gripper: Gripper, steps: TorqueHistory) -> None:
+    """Twelve branches of two rates are two, but for the 1e-6 by which equal rates are moved."""
+    k, c = np.array([1.0, 2.0]), np.array([5.0, 400.0])
+    shares = np.full(6, 1 / 6)
+    many = Network(
+        np.array([0.2]), np.array([0.5]), np.kron(shares, k)[None], np.kron(shares, c)[None]
+    )
+    few = Network(np.array([0.2]), np.array([0.5]), k[None], c[None])
+    for inertia in (False, True):
+        ours, theirs = (
+            rotation(step_response(gripper, network, inertia=inertia), steps, SEEN)[0]
+            for network in (many, few)
+        )
+        np.testing.assert_allclose(ours, theirs, rtol=1e-5)
 
 
 def of_relaxation(a: float, x: float) -> Callable[[Any], Any]:

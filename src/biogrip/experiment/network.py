@@ -14,8 +14,7 @@ class Network:
     k_p, c_p : (n,)
         Parallel spring (N/m) and damper (N s/m).
     k, c : (n, n_branches)
-        Spring and damper of each Maxwell branch; of more than `MOST_BRANCHES`, those that
-        relax the slowest first.
+        Spring and damper of each Maxwell branch.
     """
 
     k_p: Array
@@ -25,4 +24,4 @@ class Network:
 
 
 MOST_BRANCHES = 8
-"""More are no model's own, but stand for a power law (`biogrip.experiment.springpot`)."""
+"""More are too many for polynomials: those of a power law (`biogrip.experiment.springpot`)."""

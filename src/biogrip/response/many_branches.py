@@ -16,7 +16,8 @@ weight -N/S with S = A + sum_j K_j x^2/(x - r_j)^2, a sum of what is positive. E
 that are driven alike need no branch of theirs: then 2 phi = tau/H.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from biogrip.experiment.network import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.interlacing import Zeros, interlaced_zeros
 from biogrip.response.many_branches_ringing import ringing
+from biogrip.response.roots import SMALLEST_GAP
 
 # Equal arms differ by this share: their branch does nothing, but has its mode.
 _LEAST_DIFFERENCE = 1e-30
@@ -85,15 +87,14 @@ class Arms:
         self._chi = (difference if abs(difference) > least else least) / (c_2 + c_4)
 
     def with_sample(self, network: Network) -> Impedance:
-        """Put a sample between the arms."""
+        """Put a sample between the arms, its branches `separated`."""
         b_2, k, c = self._lever_m**2, self._k, self._c
         weights, rates = b_2 * network.k.T, (network.k / network.c).T
         nothing = np.zeros((1, weights.shape[1]))
         if not self.alike:
             weights = np.concatenate((weights, nothing + self._chi**2 / k.sum()))
             rates = np.concatenate((rates, nothing + self._rate))
-            order = np.argsort(rates.real, axis=0, kind="stable")
-            weights, rates = (np.take_along_axis(of, order, axis=0) for of in (weights, rates))
+            weights, rates = _ascending(weights, rates)
         spring = k.prod() / k.sum() + b_2 * network.k_p
         return Impedance(
             np.concatenate((spring[None], weights)),
@@ -148,6 +149,20 @@ class Arms:
         return np.array([drives]) / spring
 
 
+def separated(network: Network) -> Network:
+    """Return the same samples with branches ordered by their rates, equal rates moved apart."""
+    springs, rates = _ascending(network.k.T, (network.k / network.c).T)
+    return replace(network, k=springs.T, c=(springs / rates).T)
+
+
+def _ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    order = np.argsort(rates.real, axis=0, kind="stable")
+    weights, rates = (np.take_along_axis(of, order, axis=0) for of in (weights, rates))
+    for slower, rate in pairwise(rates):
+        rate += np.maximum((1 + SMALLEST_GAP) * slower.real - rate.real, 0)
+    return weights, rates
+
+
 def modes_of_rotation(
     gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
@@ -170,6 +185,7 @@ def modes_of_rotation(
     weights : (n, n_arms, n_drives, n_modes)
         In rad per N m.
     """
+    network = separated(network)
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
@@ -185,6 +201,7 @@ def modes_of_force(
     gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     """Jaw force after unit steps, in N per N m; as of `modes_of_rotation`, with one arm."""
+    network = separated(network)
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
     impedance = arms.with_sample(network)
     zeros = impedance.zeros()
@@ -230,7 +247,7 @@ def modes_with_slopes(
     weight_slopes : (n_parameters, n_drives, n_modes, n)
     """
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    given = arms.with_sample(tilted)
+    given = arms.with_sample(separated(tilted))
     parts = [
         of.reshape(*of.shape[:-1], count + 1, -1)
         for of in (given.weights, given.rates, given.level)
