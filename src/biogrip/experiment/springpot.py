@@ -40,12 +40,24 @@ _NODES = 3
 _RATES = _SLOWEST_PER_S * np.exp(_STEP * np.arange(_WHOLE))
 # The first rate left out is e^-h times the last one kept; the nodes go a little beyond.
 _PLACES = np.exp(-_STEP / 2) * (np.sin(np.pi * np.arange(_NODES + 1) / (2 * _NODES + 1)) ** 2)
-_TO_WEIGHTS = np.linalg.inv(np.vander(_PLACES, increasing=True).T)
 
 BRANCH_RATES_PER_S: Array = np.concatenate(
     (_SLOWEST_PER_S * _PLACES[1:], _RATES, _RATES[-1] / _PLACES[:0:-1])
 )
 """Rates at which the branches of every springpot relax, ascending."""
+
+
+def _interpolation(places: Array) -> Array:
+    """Coefficients, ascending, of the polynomials that are 1 at one place, 0 at the others."""
+    rows = np.zeros((len(places), len(places)))
+    rows[:, 0] = 1.0
+    for row, place in zip(rows, places, strict=True):
+        for other in places[places != place]:
+            row[:] = (np.append(0.0, row[:-1]) - other * row) / (place - other)
+    return rows
+
+
+_TO_WEIGHTS = _interpolation(_PLACES)
 
 
 @dataclass(frozen=True)
