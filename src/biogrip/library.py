@@ -29,6 +29,7 @@ _RANGES = {
     "k_p": GeneRange((-3, 8), (1, 9)),
     "c": GeneRange((-4, 5), (1, 9)),
     "c_p": GeneRange((-4, 5), (1, 9)),
+    "alpha": GeneRange((-1, 0), (1, 9)),
 }
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 

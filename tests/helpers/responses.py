@@ -10,6 +10,7 @@ from mpmath import mp, mpf
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held
+from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 
 SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
@@ -31,6 +32,15 @@ MODEL_PARAMETERS: dict[str, list[float]] = {
     "zener_maxwell": [2.0, 1.0, 50.0],
     "zener_kelvin": [3.0, 2.0, 40.0],
     "burgers": [3.0, 200.0, 2.0, 40.0],
+    "fractional_kelvin_voigt": [0.3, 10.0, 0.4],
+    "fractional_maxwell": [10.0, 0.3, 300.0],
+}
+# Logarithms between which parameters of each kind are searched for, about.
+LOG_RANGES = {
+    "stiffness": (-9.1, 18.4),
+    "springpot": (-9.1, 18.4),
+    "damping": (-11.4, 11.5),
+    "exponent": (-4.5, -0.01),
 }
 SAMPLING_TIMES = {
     "uniform": np.linspace(0.0, 400.0, 4001),
@@ -92,6 +102,12 @@ def _output_50_digits(
                     terms = (amplitudes[j] * mp.exp(rates[j] * elapsed) for j in range(5))
                     found[i] += (seen * rest)[0] + mp.re(mp.fsum(terms))
         return np.array([float(value) for value in found])
+
+
+def log_range(model: SampleModel) -> tuple[Array, Array]:
+    """Logarithms of the ends of a model's search range."""
+    low, high = zip(*(LOG_RANGES[parameter.kind] for parameter in model.parameters), strict=True)
+    return np.array(low), np.array(high)
 
 
 def random_samples(count: int, seed: int) -> Array:

@@ -10,7 +10,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS
+from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
 MANY_BRANCHES = {branches: model_named("generalized_maxwell", branches) for branches in (2, 3, 4)}
@@ -28,9 +28,7 @@ def posed(
 def samples(model: SampleModel, count: int) -> Array:
     """Log-parameters all over the search range."""
     rng = np.random.default_rng(3)
-    kinds = [parameter.kind == "damping" for parameter in model.parameters]
-    low, high = np.where(kinds, -11.4, -9.1), np.where(kinds, 11.5, 18.4)
-    found: Array = rng.uniform(low, high, (count, len(kinds)))
+    found: Array = rng.uniform(*log_range(model), (count, len(model.parameters)))
     return found
 
 
@@ -60,7 +58,7 @@ def test_rows_and_slopes_are_those_of_one_at_a_time(
 def test_every_model(gripper: Gripper, name: str, protocol: str) -> None:
     rng = np.random.default_rng(5)
     middle = np.log(MODEL_PARAMETERS[name])
-    x = middle + rng.normal(size=(20, len(middle)))
+    x = np.clip(middle + rng.normal(size=(20, len(middle))), *log_range(MODELS[name]))
     assert_alike(posed(gripper, MODELS[name], protocol, "few"), x)
 
 

@@ -194,7 +194,7 @@ def test_over_the_whole_search_range_the_jaws_never_pull(
 @pytest.mark.parametrize("name", MODELS)
 def test_every_model(gripper: Gripper, steps: TorqueHistory, name: str) -> None:
     model = MODELS[name]
-    values = {"stiffness": 0.3, "damping": 20.0}
+    values = {"stiffness": 0.3, "damping": 20.0, "springpot": 1.0, "exponent": 0.3}
     network = model.network(np.array([[values[p.kind] for p in model.parameters]]))
     found = unilateral_response(gripper, network, steps, np.linspace(0, 400, 41))
     assert np.all(np.isfinite(found.rotation_rad))

@@ -13,14 +13,23 @@ part carry derivatives through it (`biogrip.response.sensitivity`).
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.arrays import Array, IntArray
+from biogrip.experiment.fractional import fractional_kelvin_voigt, fractional_maxwell
+from biogrip.experiment.network import MOST_BRANCHES as MOST_BRANCHES
+from biogrip.experiment.network import Network as Network
 
-_UNITS = {"stiffness": "N/m", "damping": "N s/m"}
-_SUFFIXES = {"stiffness": "_N_per_m", "damping": "_Ns_per_m"}
+_UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
+_SUFFIXES = {
+    "stiffness": "_N_per_m",
+    "damping": "_Ns_per_m",
+    "springpot": "_N_per_m",
+    "exponent": "",
+}
 
 
 @dataclass(frozen=True)
@@ -32,13 +41,16 @@ class Parameter:
     name
         Identifier in config, columns and code.
     kind
-        ``"stiffness"`` or ``"damping"``; decides the unit.
+        ``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or
+        ``"exponent"``; decides the unit.
     meaning
         A few words for tables.
     range_name
         Which entry of the search range holds for it.
     may_vanish
         Whether zero is a possible value: the element is then not there.
+    below
+        What all its values are below, if anything.
     """
 
     name: str
@@ -46,10 +58,11 @@ class Parameter:
     meaning: str
     range_name: str
     may_vanish: bool = False
+    below: float = inf
 
     @property
     def unit(self) -> str:
-        """SI unit."""
+        """SI unit; empty if it has none."""
         return _UNITS[self.kind]
 
     @property
@@ -60,26 +73,8 @@ class Parameter:
     @property
     def symbol(self) -> str:
         """The symbol as mathtext."""
-        letter, _, index = self.name.partition("_")
+        letter, _, index = self.name.replace("alpha", r"\alpha").partition("_")
         return f"${letter}_{{{index}}}$" if index else f"${letter}$"
-
-
-@dataclass(frozen=True)
-class Network:
-    """The elements of n samples.
-
-    Parameters
-    ----------
-    k_p, c_p : (n,)
-        Parallel spring (N/m) and damper (N s/m).
-    k, c : (n, n_branches)
-        Spring and damper of each Maxwell branch.
-    """
-
-    k_p: Array
-    c_p: Array
-    k: Array
-    c: Array
 
 
 @dataclass(frozen=True)
@@ -112,6 +107,11 @@ class SampleModel:
     def names(self) -> tuple[str, ...]:
         """Parameter names in column order."""
         return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def power_law(self) -> bool:
+        """Whether there is a springpot in it, which stands for branches of all times."""
+        return any(parameter.kind == "springpot" for parameter in self.parameters)
 
     @property
     def quantities(self) -> list[list[Parameter]]:
@@ -171,8 +171,6 @@ C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
 
 SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
 """The paper's parameters, which every file of identifications has columns for."""
-
-MOST_BRANCHES = 8
 
 
 def _columns(parameters: ArrayLike) -> Array:
@@ -313,6 +311,8 @@ _K_S = Parameter("k_s", "stiffness", "series spring", "k")
 _C_S = Parameter("c_s", "damping", "series damper", "c")
 _K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
 _C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")
+_K_ALPHA = Parameter("k_alpha", "springpot", "springpot, modulus at 1 rad/s", "k")
+_ALPHA = Parameter("alpha", "exponent", "exponent of the springpot", "alpha", below=1.0)
 
 MODELS: dict[str, SampleModel] = {
     model.name: model
@@ -344,6 +344,18 @@ MODELS: dict[str, SampleModel] = {
         ),
         SampleModel("zener_kelvin", "Zener solid, Kelvin form", (_K_S, _K_V, _C_V), zener_kelvin),
         SampleModel("burgers", "Burgers fluid", (_K_S, _C_S, _K_V, _C_V), burgers),
+        SampleModel(
+            "fractional_kelvin_voigt",
+            "fractional Kelvin-Voigt solid",
+            (replace(K_P, meaning="parallel spring"), _K_ALPHA, _ALPHA),
+            fractional_kelvin_voigt,
+        ),
+        SampleModel(
+            "fractional_maxwell",
+            "fractional Maxwell liquid",
+            (_K_ALPHA, _ALPHA, replace(C, meaning="series damper")),
+            fractional_maxwell,
+        ),
     )
 }
 

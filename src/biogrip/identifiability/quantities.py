@@ -153,12 +153,15 @@ def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
     """What two parameters may determine together where neither is determined alone.
 
     Of two springs or two dampers the sum (side by side) and the series
-    combination; of a damper and a spring their time c/k.
+    combination; of a damper and a spring their time c/k. Of a springpot nothing: what its
+    modulus trades against depends on its exponent.
     """
     found = []
     ordered = _ordered(model)
     for a, b in combinations(members, 2):
         first, second = model.parameters[a], model.parameters[b]
+        if not {first.kind, second.kind} <= {"stiffness", "damping"}:
+            continue
         if first.kind == second.kind:
             found += [_sum(model, (a, b)), _series(model, (a, b))]
         else:

@@ -79,19 +79,23 @@ class Finding:
     def words(self) -> str:
         """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
-        words = self._limits_in_words() + (f", except {but} {self.quantity.unit}" if but else "")
+        words = self._limits_in_words() + (f", except {but}{self._unit}" if but else "")
         provided = self.quantity.provided
         return f"{words}, provided {provided}" if provided and self.told else words
 
     def _limits_in_words(self) -> str:
-        unit = self.quantity.unit
+        unit = self._unit
         if self.verdict == DETERMINED:
-            return f"determined: {self.value:.3g} {unit} ({self.low:.3g} to {self.high:.3g})"
+            return f"determined: {self.value:.3g}{unit} ({self.low:.3g} to {self.high:.3g})"
         if self.verdict == BOUNDED_BELOW:
-            return f"only bounded below: at least {self.low:.2g} {unit}"
+            return f"only bounded below: at least {self.low:.2g}{unit}"
         if self.verdict == BOUNDED_ABOVE:
-            return f"only bounded above: at most {self.high:.2g} {unit}"
+            return f"only bounded above: at most {self.high:.2g}{unit}"
         return "not determined: the trace fits with any value"
+
+    @property
+    def _unit(self) -> str:
+        return f" {self.quantity.unit}" if self.quantity.unit else ""
 
 
 @dataclass(frozen=True)
@@ -140,7 +144,7 @@ def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding
     for pair in combinations(open_ones, 2):
         candidates = combinations_of(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
-        if min(deviations) < _WORTH_A_LOOK:
+        if min(deviations, default=np.inf) < _WORTH_A_LOOK:
             (finding,) = _findings(likelihood, [candidates[int(np.argmin(deviations))]])
             if finding.verdict == DETERMINED:
                 trades.append(_trade(model, list(pair), finding))

@@ -36,7 +36,10 @@ class GeneRange:
         for gene, (low, high) in (("exponent", self.exponent), ("digit", self.digit)):
             if low > high:
                 yield (gene,), f"found [{low}, {high}], allowed is [lowest, highest]."
-        if self.least == self.most:
+        if self.digit[1] < 1:
+            text = f"found {list(self.digit)}, allowed is a highest digit of at least 1."
+            yield ("digit",), text
+        elif self.least == self.most:
             text = "leaves one value, and nothing to search for; allowed are more. What is known is"
             yield (), f"{text} given under the case's key fixed."
 

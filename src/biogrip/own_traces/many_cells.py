@@ -323,7 +323,7 @@ def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
         if "median" in row:
             spread = row["spread"]
             line += [
-                f"{row['median']:.3g} {row['unit']}",
+                f"{row['median']:.3g} {row['unit']}".rstrip(),
                 f"{row['low']:.3g} to {row['high']:.3g}",
                 f"{exp(spread['log_deviation']):.2f}",
                 f"{exp(spread['low']):.2f} to {exp(spread['high']):.2f}",

@@ -7,6 +7,7 @@ from typing import Any
 
 from tabulate import tabulate
 
+from biogrip.digits import with_unit
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -50,7 +51,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         labels = labels_of(found)
         rows = [[each["trace"], *_cells(each, labels), _doubts(each)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
-        header = ["trace", *(f"{label} ({units[label]})" for label in labels), "doubts"]
+        header = ["trace", *(with_unit(label, units[label]) for label in labels), "doubts"]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]

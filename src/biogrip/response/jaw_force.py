@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
+from biogrip.experiment.network import MOST_BRANCHES, Network
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import (
     StepResponse,
@@ -37,6 +37,7 @@ from biogrip.response.linear import (
     sample_polynomials,
     transfer_functions,
 )
+from biogrip.response.many_branches import modes_of_force
 from biogrip.response.nonlinear import FINE, computed_correction
 
 
@@ -56,6 +57,8 @@ def jaw_force_response(
     StepResponse
         The force takes the place of an arm.
     """
+    if network.k.shape[1] > MOST_BRANCHES:
+        return StepResponse(*modes_of_force(gripper, network, symmetric=symmetric, inertia=inertia))
     denominator = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia
     ).denominator

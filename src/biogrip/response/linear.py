@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
+from biogrip.experiment.network import MOST_BRANCHES, Network
 from biogrip.experiment.protocol import TorqueHistory, drives
-from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.response.many_branches import modes_of_rotation
 from biogrip.response.roots import real_quadratic_roots, roots, separate
 
 LEFT, RIGHT = 0, 1
@@ -97,6 +98,12 @@ def step_response(
     both_arms
         Whether the right arm's rotation is wanted too.
     """
+    if network.k.shape[1] > MOST_BRANCHES:
+        static, rates, weights = modes_of_rotation(
+            gripper, network, symmetric=symmetric, inertia=inertia
+        )
+        arms = slice(2 if both_arms else 1)
+        return StepResponse(static[:, arms], rates, weights[:, arms])
     transfer = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia, both_arms=both_arms
     )

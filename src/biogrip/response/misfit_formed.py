@@ -53,7 +53,8 @@ class FormedMisfit:
         self._rotation_rad = rotation_rad
         self._nonlinear = nonlinear
         self._nuisance = nuisance
-        self._chunk = max(1, _AT_ONCE // len(time_s))
+        # As many modes at once, about.
+        self._chunk = max(1, _AT_ONCE // len(time_s) // (10 if model.power_law else 1))
 
     def __call__(self, parameters: Array) -> Array:
         """Misfit in rad of each individual; infinite where the nonlinear model has no answer.

@@ -92,7 +92,7 @@ class SeriesMisfit:
 
     @cached_property
     def _closed_form(self) -> bool:
-        _, rates, _ = self._modes(np.ones((1, len(self._simulated[1].parameters))))
+        _, rates, _ = self._modes(np.full((1, len(self._simulated[1].parameters)), 0.5))
         return len(rates) <= _CLOSED_FORM
 
     @cached_property

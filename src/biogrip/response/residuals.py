@@ -173,9 +173,11 @@ class Residuals:
 
     def condensed_corrections(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
-        parts = range(0, len(log_parameters), _FEW_AT_ONCE)
+        # As many modes at once, about.
+        few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
+        parts = range(0, len(log_parameters), few)
         return np.concatenate(
-            [self._corrections(log_parameters[start : start + _FEW_AT_ONCE]) for start in parts]
+            [self._corrections(log_parameters[start : start + few]) for start in parts]
         )
 
     def _corrections(self, log_parameters: Array) -> Array:

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
+from biogrip.experiment.network import MOST_BRANCHES
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -34,6 +35,7 @@ from biogrip.response.linear import (
     slope_at_poles,
     transfer_functions,
 )
+from biogrip.response.many_branches import modes_with_slopes
 from biogrip.response.nonlinear import COARSE, Correction, correction
 
 _TILT = 1e-30
@@ -152,7 +154,11 @@ def modes_of(
     """
     count = parameters.shape[1]
     tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
-    transfer = transfer_functions(gripper, model.network(tilted), symmetric=torque.symmetric)
+    network = model.network(tilted)
+    if network.k.shape[1] > MOST_BRANCHES:
+        parts = modes_with_slopes(gripper, network, _TILT, count, symmetric=torque.symmetric)
+        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
+    transfer = transfer_functions(gripper, network, symmetric=torque.symmetric)
     denominator, denominator_slopes = _untilted(transfer.denominator, count)
     rates = poles(denominator, real=True)
     slope = slope_at_poles(denominator, rates)

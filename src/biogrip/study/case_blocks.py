@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
+from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS
@@ -34,6 +35,14 @@ class SearchRange:
     k_p: Annotated[GeneRange, Key()]
     c: Annotated[GeneRange, Key()]
     c_p: Annotated[GeneRange, Key()]
+    alpha: Annotated[GeneRange, Key()]
+
+    def problems(self) -> Iterator[Problem]:
+        """Find exponents of springpots that are none."""
+        highest = self.alpha.exponent[1]
+        if highest > 0:
+            text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
+            yield ("alpha", "exponent"), f"{text}most 0."
 
 
 @dataclass(frozen=True)
@@ -155,6 +164,8 @@ class CaseBlock(Shared):
         yield from self._fixed_problems()
         yield from self._contact_problems()
         yield from self.of_methods.problems_of(self._genes)
+        if self.sample.sample.model.power_law:
+            yield from self._band_problems()
         if not self.recorded:
             yield from self._sampling_problems()
         if isinstance(self.assumed_gripper, str):
@@ -202,7 +213,17 @@ class CaseBlock(Shared):
             if value is None or vanishes or low <= value <= high:
                 continue
             text = f"found {value:g}, which is not searched for; allowed is {low:g} to {high:g} "
-            yield ("sample", parameter.name), f"{text}{parameter.unit}, or another search_range."
+            text = f"{text}{parameter.unit}".rstrip()
+            yield ("sample", parameter.name), f"{text}, or another search_range."
+
+    def _band_problems(self) -> Iterator[Problem]:
+        """Find times at which a springpot is none."""
+        if self.protocol.end_s > LONGEST_S:
+            text = f"found a protocol of {self.protocol.end_s:g} s, allowed are at most"
+            yield ("sample", "model"), f"{text} {LONGEST_S:g} s with {self.sample.model}."
+        if not self.measurement.times_s and self.measurement.rate_Hz * SHORTEST_S > 1:
+            text = f"found {self.measurement.rate_Hz:g}, allowed is at most {1 / SHORTEST_S:g} Hz"
+            yield ("measurement", "rate_Hz"), f"{text} with {self.sample.model}."
 
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s

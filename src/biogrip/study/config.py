@@ -6,6 +6,7 @@ from typing import Annotated, Any
 
 from biogrip.errors import nearest
 from biogrip.experiment.sample import CANDIDATES
+from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Key, Problem
@@ -163,6 +164,7 @@ class StudyConfig(Shared):
             if seeds > _MOST_BATCHES * self.batch_size:
                 text = f"found {self.batch_size}, which makes {seeds} seeds more than "
                 yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
+        yield from self._band_problems()
         for name, case in self.cases.items():
             for path, text in case.contact_problems(self.actuator):
                 yield ("cases", name, *path), text
@@ -173,6 +175,14 @@ class StudyConfig(Shared):
             if name not in self.cases:
                 text = f"found '{name}', allowed are {', '.join(list(self.cases)[:_SHOWN])}."
                 yield ("only", index), text + nearest(name, self.cases)
+
+    def _band_problems(self) -> Iterator[Problem]:
+        """Find sample models that are none for as long as a protocol lasts."""
+        longest = max(case.protocol.end_s for case in self.cases.values())
+        for index, name in enumerate(self.model_selection.models):
+            if CANDIDATES[name].model.power_law and longest > LONGEST_S:
+                text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
+                yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."
 
     @property
     def chosen(self) -> "StudyConfig":

@@ -73,11 +73,14 @@ class SampleBlock:
 
 
 def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
-    """Find parameters that are too small, but for those that may vanish."""
+    """Find parameters that are too small, but for those that may vanish, or too large."""
     there: list[Parameter] = [p for p in model.parameters if p.name in values]
     for parameter in there:
         value = values[parameter.name]
         if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
             zero = "0 or " if parameter.may_vanish else ""
             text = f"found {value}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
-            yield (parameter.name,), f"{text} {parameter.unit}."
+            yield (parameter.name,), f"{text} {parameter.unit}".rstrip() + "."
+        elif not value < parameter.below:
+            text = f"found {value:g}, allowed is above 0 and below {parameter.below:g}."
+            yield (parameter.name,), text

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from biogrip.digits import with_unit
 from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import typical
@@ -60,7 +61,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
             axes.axhline(identified[parameter.name], color=PAPER, linestyle=":")
         if np.any(history[parameter.column] > 0):
             axes.set_yscale("log")
-        axes.set_ylabel(f"{parameter.symbol} ({parameter.unit})")
+        axes.set_ylabel(with_unit(parameter.symbol, parameter.unit))
         if truth.parameters.get(parameter.name, 0) > 0:
             last = history.loc[history["seed"] == shown, parameter.column].iloc[-1]
             ends = _beside(last / truth.parameters[parameter.name])

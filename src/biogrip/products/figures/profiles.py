@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
+from biogrip.digits import with_unit
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.products.files.verdicts import PATH, read_verdicts
@@ -88,7 +89,7 @@ def draw_profiles(
             axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
         axes.set_xlim(low, high)
         axes.set_ylim(0, _HIGHEST)
-        axes.set_xlabel(f"{item['symbol']} ({item['unit']})")
+        axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()

@@ -41,13 +41,6 @@
     return Math.abs(rounded) < 1e-3 && rounded !== 0 ? rounded.toExponential() : String(rounded);
   };
 
-  function sampleWords(item, sample) {
-    return item.elements.map((e) => {
-      const [kind, branch] = e.at;
-      return `${e.name} ${short(branch === null ? sample[kind] : sample[kind][branch])} ${e.unit}`;
-    }).join(", ");
-  }
-
   const sumOf = (item, members) => members.map((i) => item.elements[i].name).join(" + ");
 
   // One trace.
@@ -86,7 +79,7 @@
     const note = item.nonlinear ? " The study's model is nonlinear here; the page draws the linear one." : "";
     element("fit-words").textContent = !item.closed_form
       ? "Arms or torques differ: the page has no closed form for that, and shows traces only."
-      : fit ? `${method.title}, seed ${seed}: ${sampleWords(item, fit.sample)}; misfit ${short(fit.misfit_rad)} rad.${note}` : "";
+      : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit_rad)} rad.${note}` : "";
     element("plot-profile").dataset.ready = "";
     clearTimeout(showTrace.later);
     showTrace.later = setTimeout(() => { if (fit && item.closed_form) showProfile(item, trace, fit); }, 30);
@@ -100,6 +93,11 @@
   }
 
   function showProfile(item, trace, fit) {
+    if (!item.elements.length) {
+      draw("plot-profile", "Power-law samples: see their profiles among the figures", "", "rise of chi²", []);
+      element("plot-profile").dataset.ready = "yes";
+      return;
+    }
     const chosen = element("quantity").value, quantity = chosen === "sum" ? "sum" : Number(chosen);
     const dampers = inference.dampers(item.layout);
     const members = quantity === "sum" ? dampers : [quantity];
@@ -141,7 +139,7 @@
     selector.append("start from");
     const select = document.createElement("select");
     select.id = "try-case";
-    select.append(...cases.map((c, i) => new Option(c.title, i)));
+    cases.forEach((c, i) => { if (c.elements.length) select.append(new Option(c.title, i)); });
     select.value = tried.index;
     select.addEventListener("change", () => { tried.index = Number(select.value); startFrom(); });
     selector.append(select);
@@ -217,7 +215,10 @@
   ["method", "seed", "quantity"].forEach((id) => element(id).addEventListener("change", showTrace));
   if (cases.length) {
     chooseCase();
-    startFrom();
+    // A power law has no few elements that sliders could move.
+    tried.index = cases.findIndex((c) => c.elements.length);
+    if (tried.index >= 0) startFrom();
+    else element("force-words").textContent = "The page has no sliders for power-law samples.";
   }
   window.biogrip = { cases, mechanics, inference, profileOf };
 })();

@@ -139,8 +139,13 @@ def _case(
 
 
 def _elements(problem: CaseProblem) -> list[dict[str, Any]]:
-    """Elements of the network that the model has, and the logarithms of their search ranges."""
+    """Elements of the network that the model has, and the logarithms of their search ranges.
+
+    None of a power-law sample: its branches are no parameters.
+    """
     model, ranges = problem.model, problem.ranges
+    if model.power_law:
+        return []
     network = model.network(np.ones((1, len(model.names))))
     branches = network.k.shape[1]
     found: list[dict[str, Any]] = []
@@ -182,12 +187,18 @@ def _method(
             {
                 "seed": int(row["seed"]),
                 "sample": _network(model, {p.name: row[p.column] for p in model.parameters}),
+                "words": _words(model, row),
                 "misfit_rad": rounded(float(row["misfit_rad"])),
                 "history": _history(by_seed.get(row["seed"])),
             }
             for row in rows
         ],
     }
+
+
+def _words(model: SampleModel, row: Mapping[str, Any]) -> str:
+    """Parameters as the page says them."""
+    return ", ".join(f"{p.name} {row[p.column]:.3g} {p.unit}".rstrip() for p in model.parameters)
 
 
 def _history(rows: "pd.DataFrame | None") -> list[list[Any]]:

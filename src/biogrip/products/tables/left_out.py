@@ -37,7 +37,7 @@ class Settings:
     gripper, actuator, phases
         The study's.
     least_damping_Ns_per_m
-        All dampers of the sample that has least of them, if one has any.
+        All dampers of the sample that has least of them, if one has any; a springpot is none.
     """
 
     gripper: Gripper
@@ -54,7 +54,10 @@ def settings(study: Study) -> Settings:
 
 
 def _damping(case: Case) -> float:
-    network = case.sample.model.sample(case.parameters)
+    model = case.sample.model
+    if model.power_law:
+        return 0.0
+    network = model.sample(case.parameters)
     return float(network.c_p[0] + network.c[0].sum())
 
 

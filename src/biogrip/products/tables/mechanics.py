@@ -98,8 +98,10 @@ def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear)[0, 0])
     force = float(jaw_force(*given, end, nonlinear=case.nonlinear)[0, 0])
     grip = grip_of(*given, nonlinear=case.nonlinear)
-    in_the_end = float(network.k_p[0])
-    at_once = in_the_end + float(network.k[0].sum())
+    # A springpot has no stiffness at once, nor one in the end.
+    power_law = case.sample.model.power_law
+    in_the_end = None if power_law else float(network.k_p[0])
+    at_once = None if power_law else float(network.k_p[0] + network.k[0].sum())
     own = case.gripper.jaw_stiffness_N_per_m
     rows: list[tuple[Cell, ...]] = []
     for size in (SMALLEST_M, LARGEST_M) if case.size_m is None else (case.size_m,):
@@ -116,7 +118,7 @@ def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
                 at_once,
                 in_the_end,
                 own,
-                at_once / own,
+                None if at_once is None else at_once / own,
                 None if modulus is None else 1e-3 * modulus,
             )
         )

@@ -1,0 +1,194 @@
+"""Zeros of sums of simple poles, which interlace with the poles: relaxation rates of networks.
+
+A network of springs and dampers that has Maxwell branches side by side has as many
+modes as branches, or one more, and with the branches' rates p_0 < p_1 < ... theirs
+are the zeros of
+
+    f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
+
+one in each interval between neighbouring rates and one beyond the last. However
+many branches there are, each zero is sought on its own, as its distance from the
+nearer pole: none of the digits of a zero close to a pole is lost, and no polynomial
+is formed, whose coefficients would span hundreds of decades.
+
+References
+----------
+.. [1] R.-C. Li, Solving secular equations stably and efficiently, LAPACK Working Note 89
+   (1994): both neighbouring poles matched in value and slope, the middle way.
+.. [2] J. R. Bunch, C. P. Nielsen and D. C. Sorensen, Rank-one modification of the symmetric
+   eigenproblem, Numerische Mathematik 31 (1978), 31-48.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array
+
+_MOST_SWEEPS = 60
+_ROUNDING, _SHORT = 4e-16, 1e-9
+
+
+@dataclass(frozen=True)
+class Zeros:
+    """Zeros of n functions, as distances from poles.
+
+    Parameters
+    ----------
+    pole : (n_zeros, n)
+        The pole that each zero is counted from.
+    beyond : (n_zeros, n)
+        How far beyond it the zero is; complex where the weights were, with the derivative
+        in its imaginary part.
+    """
+
+    pole: Array
+    beyond: NDArray[Any]
+
+    @property
+    def values(self) -> NDArray[Any]:
+        """The zeros themselves, (n_zeros, n), ascending."""
+        return self.pole + self.beyond
+
+    def from_pole(self, pole: Array) -> NDArray[Any]:
+        """Distances of the zeros from a pole of each function, (n,), without cancellation."""
+        return (self.pole - pole) + self.beyond
+
+
+def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
+    """Find the zeros of sum_j w_j / (x - p_j) - b.
+
+    What is found for a function does not depend, to the last bit, on the others.
+
+    Parameters
+    ----------
+    weights : (n_poles, n)
+        Positive; an imaginary part, far smaller than the real one, carries a derivative.
+    poles : (n_poles, n)
+        Ascending and real.
+    level : (n,)
+        b, positive, or complex like the weights.
+
+    Returns
+    -------
+    Zeros
+        As many as poles, each above its own pole and below the next.
+    """
+    if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
+        return _real_zeros(weights, poles, level)
+    # Samples that are tilted in one parameter or another have the same real parts.
+    real = np.concatenate((weights.real, poles, level.real[None]))
+    _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
+    of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
+    found = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
+    # One step of Newton's method takes an infinitesimal change of the weights all the way.
+    change = -np.imag(level) * np.ones_like(found.pole)
+    slope = np.zeros_like(found.pole)
+    for pole, weight in zip(poles, weights, strict=True):
+        distance = found.from_pole(pole)
+        term = weight / distance
+        change += term.imag
+        slope -= term.real / distance
+    return Zeros(found.pole, found.beyond - 1j * change / slope)
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """Sums over the poles below some points and over those above, and their derivatives."""
+
+    below: Array
+    below_slope: Array
+    above: Array
+    above_slope: Array
+
+
+def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
+    pole, side, gap, start = _intervals(weights, poles, level)
+    found = np.empty_like(pole)
+    # Of what is still searched for: which functions; for each zero its pole, on which side of it
+    # and how far the next one is; bounds of its distance, and the distance; whether it is found.
+    which = np.arange(len(level))
+    search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start])
+    settled = np.zeros(pole.shape, dtype=bool)
+    for _ in range(_MOST_SWEEPS):
+        origin, sign, whole, low, high, at = search
+        sides = _sides(weights, poles, Zeros(origin, sign * at))
+        value = sides.below + sides.above - level
+        settled |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
+        np.copyto(low, at, where=sign * value > 0)
+        np.copyto(high, at, where=sign * value < 0)
+        moved = _nearer(value, sides, sign, whole, at, level)
+        outside = ~((moved > low) & (moved < high))
+        np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
+        np.copyto(moved, at, where=settled)
+        # The error is squared by a step, so one that is short takes it below rounding.
+        settled |= np.abs(moved - at) <= _SHORT * moved
+        at[:] = found[:, which] = moved
+        left_over = ~np.all(settled, axis=0)
+        if not np.any(left_over):
+            break
+        if not np.all(left_over):
+            which, level, search = which[left_over], level[left_over], search[..., left_over]
+            weights, poles, settled = (of[:, left_over] for of in (weights, poles, settled))
+    return Zeros(pole, side * found)
+
+
+def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array, Array, Array]:
+    """Nearest pole of each zero, the side of it, the way to the next, and where to begin."""
+    gaps = np.diff(poles, axis=0)
+    # The sign at the middle of a gap tells which end the zero is nearer to.
+    middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
+    value = middle.below + middle.above - level
+    pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
+    side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
+    side[:-1], gap[:-1] = np.where(value > 0, -1.0, 1.0), gaps
+    guess = _between(value, middle.below_slope, middle.above_slope, side[:-1], gaps, 0.5 * gaps)
+    start[:-1] = np.where((guess > 0) & (guess < 0.5 * gaps), guess, 0.25 * gaps)
+    # No further than the last pole by itself, or all poles at zero, would have the last zero.
+    start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
+    return pole, side, gap, start
+
+
+def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
+    below, below_slope, above, above_slope = np.zeros((4, *at.pole.shape))
+    term, slope = np.empty((2, *at.pole.shape))
+    for j, (weight, pole) in enumerate(zip(weights, poles, strict=True)):
+        np.subtract(at.pole, pole, out=slope)
+        slope += at.beyond
+        np.divide(weight, slope, out=term)
+        np.divide(term, slope, out=slope)
+        below[j:] += term[j:]
+        below_slope[j:] -= slope[j:]
+        above[:j] += term[:j]
+        above_slope[:j] -= slope[:j]
+    return _Sides(below, below_slope, above, above_slope)
+
+
+def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array) -> Array:
+    """Distances of zeros from their poles, from a guess that is nearer or further."""
+    found = np.empty_like(value)
+    inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
+    found[:-1] = _between(*(of[:-1] for of in inner))
+    # Beyond all poles one over their sum is concave and nearly straight: Newton's method on it.
+    found[-1] = at[-1] - sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
+    return found
+
+
+def _between(
+    value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
+) -> Array:
+    """Zero of c + p/d - q/(gap - d), which agrees in value and slopes, one pole a side [1].
+
+    Seen from the nearer pole, so that none of the digits of d is lost.
+    """
+    rest = gap - at
+    p = -np.where(side > 0, below_slope, above_slope) * at * at
+    q = -np.where(side > 0, above_slope, below_slope) * rest * rest
+    c = side * value - p / at + q / rest
+    half = 0.5 * (p + q - c * gap)
+    root = np.sqrt(np.maximum(half * half + c * p * gap, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found: Array = np.where(half > 0, p * gap / (half + root), (root - half) / c)
+    return found

@@ -1,0 +1,191 @@
+"""The linear model with inertia, for samples of dozens of Maxwell branches.
+
+With inertia the denominator of both rotations is
+
+    E = Z + 2 b^2 G    or    E = Z_2 Z_4 + (Z_2 + Z_4) b^2 G
+
+for arms that move alike, or do not. Times the product of all s + r_j it is a polynomial,
+whose roots the iteration of `biogrip.response.roots` finds. It only ever asks for the
+quotient of the polynomial and its derivative, which a sum over the branches gives; and
+since a root is kept as its distance from the nearest branch, none of its digits is lost
+where a branch is weak. To begin with there are the rates without inertia, and the ring
+of arms on a sample whose dampers hold.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array, ComplexArray
+from biogrip.experiment.network import Network
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.interlacing import Zeros
+from biogrip.response.roots import roots
+
+_SWEEPS = 80
+# Off the real axis, which nothing that begins on it would leave.
+_ASIDE = 1 + 1e-3j
+
+
+@dataclass(frozen=True)
+class Ringing:
+    """Roots of E, and what the numerators over s E' are made of, (n, n_modes) each.
+
+    Parameters
+    ----------
+    rates
+        In 1/s.
+    sample
+        G, in N/m.
+    left, right
+        Z_2 and Z_4, in N m/rad.
+    slope
+        dE/ds.
+    lever_m
+        b.
+    alike
+        Whether both arms are equal, and driven alike.
+    """
+
+    rates: ComplexArray
+    sample: ComplexArray
+    left: ComplexArray
+    right: ComplexArray
+    slope: ComplexArray
+    lever_m: float
+    alike: bool
+
+    def rotations(self) -> ComplexArray:
+        """Weights of the rotations, (n_arms, n_drives, n_modes, n)."""
+        if self.alike:
+            return self._weights([[np.ones_like(self.rates)]] * 2)
+        sample = self.lever_m**2 * self.sample
+        return self._weights([[self.right, sample], [self.left, -(self.left + sample)]])
+
+    def forces(self) -> ComplexArray:
+        """Weights of the jaw force, (1, n_drives, n_modes, n)."""
+        force = self.lever_m * self.sample
+        if self.alike:
+            return self._weights([[2 * force]])
+        return self._weights([[force * (self.left + self.right), -force * self.left]])
+
+    def _weights(self, numerators: list[list[ComplexArray]]) -> ComplexArray:
+        weights: ComplexArray = np.array(numerators) / (self.rates * self.slope)
+        return weights.swapaxes(2, 3)
+
+
+def ringing(gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> Ringing:
+    """Find the modes of arms with inertia.
+
+    Parameters
+    ----------
+    gripper, network
+        Arms, and n samples with any number of branches.
+    zeros
+        Rates without inertia.
+    alike
+        Whether both arms are equal, and driven alike.
+    """
+    system = _System(gripper, network, alike=alike)
+    origin, beyond = system.begin(zeros)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        settled = resting = np.zeros((len(origin), 1), dtype=bool)
+        others = ~np.eye(origin.shape[1], dtype=bool)
+        for _ in range(_SWEEPS):
+            newton = system.newton_step(origin, beyond)
+            apart = (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
+            repulsion = np.where(others, 1 / apart, 0).sum(axis=2)
+            step = newton / (1 - newton * repulsion)
+            step = np.where(np.isfinite(step) & ~resting, step, 0)
+            beyond = beyond - step
+            if np.all(settled):
+                break
+            # The error is cubed in a sweep, so one more takes it below rounding.
+            resting = settled
+            settled = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
+    return system.at(origin, beyond)
+
+
+class _System:
+    """E of n samples, at points -origin + beyond, (n, n_points)."""
+
+    def __init__(self, gripper: Gripper, network: Network, *, alike: bool) -> None:
+        self._lever_m, self._b_2, self._alike = gripper.lever_m, gripper.lever_m**2, alike
+        self._arms = gripper.left, gripper.right
+        self._k_p, self._c_p = network.k_p[:, None], network.c_p[:, None]
+        self._k, self._rates = network.k[:, None], (network.k / network.c)[:, None]
+
+    def begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
+        """Where to begin."""
+        branches = self._k.shape[2]
+        ring = roots(self._ring()) * _ASIDE
+        origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
+        slow = -zeros.beyond[:branches].T * _ASIDE
+        return origin, np.concatenate((slow, ring), axis=1)
+
+    def _ring(self) -> Array:
+        """E with a spring and a damper for the sample, ascending powers, (n, terms)."""
+        held = self._b_2 * np.concatenate((self._k_p + self._k.sum(axis=2), self._c_p), axis=1)
+        z_2, z_4 = (_polynomial(arm) for arm in self._arms)
+        arms, factor = (z_2, np.array([2.0])) if self._alike else (np.convolve(z_2, z_4), z_2 + z_4)
+        return np.array(
+            [
+                arms + np.pad(product, (0, len(arms) - len(product)))
+                for product in (np.convolve(factor, of_one) for of_one in held)
+            ]
+        )
+
+    def newton_step(self, origin: Array, beyond: ComplexArray) -> ComplexArray:
+        """E times all s + r_j, over its derivative."""
+        s = beyond - origin
+        away = (self._rates - origin[..., None]) + beyond[..., None]
+        own = self._rates == origin[..., None]
+        inverse = np.where(own, 0, 1 / away)
+        arms, arms_slope, factor, factor_slope = self._of_arms(s)
+        others = self._b_2 * (self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s)
+        others_slope = self._b_2 * (self._c_p + (self._k * self._rates * inverse**2).sum(axis=2))
+        value = arms + factor * others
+        slope = arms_slope + factor_slope * others + factor * others_slope
+        # With a branch of its own: both sides times s + r.
+        spring = self._b_2 * np.where(own, self._k, 0).sum(axis=2)
+        has_own = np.any(own, axis=2)
+        slope = np.where(
+            has_own, value + beyond * slope + spring * (factor_slope * s + factor), slope
+        )
+        value = np.where(has_own, beyond * value + spring * factor * s, value)
+        return value / (slope + value * inverse.sum(axis=2))
+
+    def at(self, origin: Array, beyond: ComplexArray) -> Ringing:
+        """What weights follow from."""
+        s = beyond - origin
+        inverse = 1 / ((self._rates - origin[..., None]) + beyond[..., None])
+        sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
+        sample_slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)
+        _, arms_slope, factor, factor_slope = self._of_arms(s)
+        slope = arms_slope + self._b_2 * (factor_slope * sample + factor * sample_slope)
+        left, right = (_value(arm, s) for arm in self._arms)
+        return Ringing(s, sample, left, right, slope, self._lever_m, self._alike)
+
+    def _of_arms(
+        self, s: ComplexArray
+    ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
+        """What is added to b^2 G, what it is multiplied by, each with its derivative."""
+        (left, left_slope), (right, right_slope) = (
+            (_value(arm, s), 2 * arm.inertia_kgm2 * s + arm.damping_Nms_per_rad)
+            for arm in self._arms
+        )
+        if self._alike:
+            return left, left_slope, np.full_like(s, 2), np.zeros_like(s)
+        product_slope = left_slope * right + left * right_slope
+        return left * right, product_slope, left + right, left_slope + right_slope
+
+
+def _polynomial(arm: Arm) -> Array:
+    return np.array([arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2])
+
+
+def _value(arm: Arm, s: ComplexArray) -> ComplexArray:
+    """Impedance of a free arm."""
+    k, c, inertia = _polynomial(arm)
+    value: ComplexArray = k + s * (c + s * inertia)
+    return value

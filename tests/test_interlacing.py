@@ -1,0 +1,80 @@
+"""Zeros between poles, against 50 digits."""
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import pytest
+from mpmath import mp, mpf
+
+from biogrip.arrays import Array
+from biogrip.interlacing import interlaced_zeros
+
+
+def random_functions(count: int, poles: int, seed: int) -> tuple[Array, Array, Array]:
+    """Weights over 60 decades, poles over ten and zero: far wilder than networks are."""
+    rng = np.random.default_rng(seed)
+    rates = np.sort(10 ** rng.uniform(-5, 5, (poles, count)), axis=0)
+    rates[0] = 0.0
+    return 10 ** rng.uniform(-50, 10, (poles, count)), rates, 10 ** rng.uniform(-10, 3, count)
+
+
+def refined(weights: Iterable[Any], poles: Array, level: float, pole: float, beyond: float) -> mpf:
+    """The zero next to a point, as its distance from a pole, by Newton's method."""
+    with mp.workdps(120):
+        at = mpf(beyond)
+        for _ in range(8):
+            terms = [(mpf(w), mpf(pole) - mpf(p) + at) for w, p in zip(weights, poles, strict=True)]
+            value = mp.fsum(w / d for w, d in terms) - mpf(level)
+            at += value / mp.fsum(w / d**2 for w, d in terms)
+        return at
+
+
+@pytest.mark.parametrize("poles", [1, 2, 5, 46])
+def test_zeros_have_all_digits(poles: int) -> None:
+    """One beyond each pole; of the zero 2e-15, of its distance from a pole far more than needed."""
+    weights, rates, level = random_functions(12, poles, poles)
+    found = interlaced_zeros(weights, rates, level)
+    for n in range(12):
+        for i in range(poles):
+            pole, beyond = float(found.pole[i, n]), float(found.beyond[i, n])
+            exact = refined(weights[:, n], rates[:, n], level[n], pole, beyond)
+            above = rates[i + 1, n] if i + 1 < poles else np.inf
+            assert rates[i, n] - pole < exact < above - pole
+            assert abs(mpf(beyond) - exact) <= 2e-15 * (abs(pole + exact) + abs(exact))
+            assert abs(mpf(beyond) - exact) <= 1e-9 * abs(exact)
+
+
+def test_zeros_do_not_depend_on_the_other_functions() -> None:
+    weights, rates, level = random_functions(40, 20, 0)
+    together = interlaced_zeros(weights, rates, level)
+    for n in (0, 17, 39):
+        alone = interlaced_zeros(weights[:, [n]], rates[:, [n]], level[[n]])
+        np.testing.assert_array_equal(alone.beyond[:, 0], together.beyond[:, n])
+        np.testing.assert_array_equal(alone.pole[:, 0], together.pole[:, n])
+
+
+def test_an_infinitesimal_imaginary_part_carries_the_derivative() -> None:
+    weights, rates, level = random_functions(6, 12, 3)
+    weights = np.maximum(weights, 1e-8)
+    along = np.random.default_rng(4).normal(size=weights.shape) * weights
+    tilted = interlaced_zeros(weights + 1e-30j * along, rates, level + 0j)
+    for n in range(6):
+        for i in range(12):
+            pole, beyond = float(tilted.pole[i, n]), float(tilted.beyond[i, n].real)
+            with mp.workdps(60):
+                step = mpf(10) ** -15
+                ends = [
+                    refined_along(weights[:, n], along[:, n], sign * step, rates[:, n], level[n],
+                                  pole, beyond)
+                    for sign in (1, -1)
+                ]  # fmt: skip
+                exact = (ends[0] - ends[1]) / (2 * step)
+            assert float(tilted.beyond[i, n].imag) / 1e-30 == pytest.approx(float(exact), rel=1e-8)
+
+
+def refined_along(
+    weights: Array, along: Array, by: mpf, poles: Array, level: float, pole: float, beyond: float
+) -> mpf:
+    moved = [mpf(w) + by * mpf(a) for w, a in zip(weights, along, strict=True)]
+    return refined(moved, poles, level, pole, beyond)
