@@ -93,7 +93,9 @@ def advice(tried: Sequence[Tried], chosen: str) -> str:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
     more, fewer = len(best.model.names), len(own.model.names)
     lead = f"{best.model.title} is preferred, with a BIC lower by {own.delta_bic:.3g}."
-    if more > fewer:
+    # By how much it fits worse, parameters left aside.
+    worse = own.delta_aic - best.delta_aic - 2 * (fewer - more)
+    if more > fewer or (more < fewer and worse > WORTH_A_MENTION):
         return f"{title} is not adequate: {lead}"
     if more < fewer:
         return f"{title} is richer than the trace asks for: {lead}"

@@ -4,7 +4,8 @@ from typing import Any
 
 from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES
+from biogrip.experiment.sample import CANDIDATES, MODELS
+from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identify.answer import Progress
 from biogrip.identify.methods import best_fit
 from biogrip.identify.model_choice import advice, ranked
@@ -20,7 +21,8 @@ def models_tried(
 
     With parameters that are known, or where a fit takes minutes, there is nothing to say.
     """
-    posed, candidates = case.problem, study.models_of(case)
+    posed = case.problem
+    candidates = tuple(dict.fromkeys((*study.models_of(case), *_power_laws(posed.torque.end_s))))
     if posed.nonlinear or posed.fixed:
         return {"models": [], "advice": None}
     least_squares = case.method("least_squares")
@@ -43,3 +45,8 @@ def models_tried(
         for each in tried
     ]
     return {"models": rows, "advice": advice(tried, case.sample.candidate)}
+
+
+def _power_laws(duration_s: float) -> list[str]:
+    """Power laws, which cells creep by, where an experiment is no longer than they hold for."""
+    return [name for name, model in MODELS.items() if model.power_law and duration_s <= LONGEST_S]
