@@ -11,10 +11,11 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.identify.problem import Problem, problem_of, rows_of
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.every_sample import EverySample
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class CaseProblem:
 
     Parameters
     ----------
-    gripper, ranges, nonlinear, offset, drift, noise_rad
+    gripper, ranges, nonlinear, inertia, offset, drift, noise_rad
         As of `problem_of`.
     phases
         The protocol.
@@ -39,10 +40,13 @@ class CaseProblem:
     sample: Sample
     fixed: Mapping[str, float]
     nonlinear: bool = False
+    inertia: bool = False
     offset: bool = False
     drift: bool = False
     noise_rad: float | None = None
-    _condensed: dict[bytes, Condensed] = field(default_factory=dict, init=False, compare=False)
+    _condensed: dict[bytes, Condensed | EverySample] = field(
+        default_factory=dict, init=False, compare=False
+    )
 
     @cached_property
     def torque(self) -> TorqueHistory:
@@ -87,22 +91,24 @@ class CaseProblem:
             rotation_rad,
             dict(self.ranges),
             nonlinear=self.nonlinear,
+            inertia=self.inertia,
             offset=self.offset,
             drift=self.drift,
             noise_rad=noise_rad or self.noise_rad,
             condensed=self._condensed_at(time_s),
         )
 
-    def _condensed_at(self, time_s: Array) -> Condensed:
+    def _condensed_at(self, time_s: Array) -> Condensed | EverySample:
         # Once for all traces of a case: it takes as long as some fifty responses.
         sampled = time_s.tobytes()
         if sampled not in self._condensed:
-            self._condensed[sampled] = condensed_of(
+            self._condensed[sampled] = rows_of(
                 self.torque,
                 time_s,
                 offset=self.offset,
                 drift=self.drift,
                 nonlinear=self.nonlinear,
+                inertia=self.inertia,
             )
         return self._condensed[sampled]
 

@@ -48,6 +48,15 @@ class Equations:
         ),
     ]
     identification: Annotated[str, Key("The same for the model that is fitted.", choices=EQUATIONS)]
+    inertia: Annotated[
+        bool,
+        Key(
+            "Whether the model that is fitted has the arms' inertia, too, as targets always have: "
+            "the arms then ring for milliseconds after every change of the torque. Needed where "
+            "samples come that soon, see docs/design.md; it takes several times as long. By "
+            "default no."
+        ),
+    ] = False
 
 
 @dataclass(frozen=True)

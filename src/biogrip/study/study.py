@@ -185,6 +185,7 @@ class Case:
             self.sample,
             self.fixed,
             nonlinear=self.block.models.identification == "nonlinear",
+            inertia=self.block.models.inertia,
             offset=measurement.offset,
             drift=measurement.drift,
             noise_rad=measurement.noise_rad,
