@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Annotated, Any
 
+from biogrip.design.settings import DesignSettings
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Published
@@ -93,6 +94,7 @@ class Shared:
         ),
     ]
     identifiability: Annotated[Identifiability, Key()]
+    design: Annotated[DesignSettings | None, Key()] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,6 +165,7 @@ class CaseBlock(Shared):
             yield from self._unreachable_problems()
         yield from self._fixed_problems()
         yield from self._contact_problems()
+        yield from self._design_problems()
         yield from self.of_methods.problems_of(self._genes)
         if not self.recorded:
             yield from self._sampling_problems()
@@ -188,6 +191,25 @@ class CaseBlock(Shared):
         elif self.contact == "unilateral" and self.models.target != "linear":
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
+
+    def _design_problems(self) -> Iterator[Problem]:
+        if self.design is None:
+            return
+        searched = [p.name for p in self._searched]
+        named: list[tuple[tuple[str, str | int], str]] = [
+            (("quantities", i), name) for i, name in enumerate(self.design.quantities)
+        ]
+        named += [(("ranges", name), name) for name in self.design.ranges or {}]
+        for path, name in named:
+            if name not in searched:
+                text = f"found '{name}', allowed are {', '.join(searched)}."
+                yield ("design", *path), text + nearest(name, searched)
+        if not self.recorded:
+            return
+        missing = set(searched) - set(self.design.ranges or {})
+        if missing:
+            text = f"has none for {', '.join(sorted(missing))}, of which nothing else is known."
+            yield ("design", "ranges"), text
 
     def _fixed_problems(self) -> Iterator[Problem]:
         model = self.sample.sample.model
@@ -216,6 +238,9 @@ class CaseBlock(Shared):
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
         needed = len(self._searched) + measured.offset + measured.drift + 1
+        if measured.bursts:
+            yield from self._burst_problems(needed)
+            return
         times = measured.times_s
         if not times:
             samples = end * measured.rate_Hz + 1
@@ -232,6 +257,23 @@ class CaseBlock(Shared):
                 text = f"found {after}, allowed is later than {before} and at most {end} s."
                 yield ("measurement", "times_s", index), text
                 break
+
+    def _burst_problems(self, needed: int) -> Iterator[Problem]:
+        bursts = self.measurement.bursts
+        samples = sum(burst.samples for burst in bursts)
+        if not needed <= samples <= _MOST_SAMPLES:
+            text = f"found {samples} samples, allowed are {needed} to {_MOST_SAMPLES}."
+            yield ("measurement", "bursts"), text
+            return
+        last = -1.0
+        for index, burst in enumerate(bursts):
+            ends = burst.from_s + (burst.samples - 1) / burst.rate_Hz
+            if not last < burst.from_s <= ends <= self.protocol.end_s:
+                text = f"found one from {burst.from_s} to {ends} s, allowed is after {max(last, 0)}"
+                text += f" and at most until {self.protocol.end_s} s."
+                yield ("measurement", "bursts", index), text
+                return
+            last = ends
 
     def _calibration_problems(self) -> Iterator[Problem]:
         """A free arm must be seen ringing: sampled fast enough, for long enough."""

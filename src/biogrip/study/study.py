@@ -125,7 +125,8 @@ class Case:
     @property
     def sampling(self) -> Sampling:
         """When the rotation is sampled."""
-        return Sampling(self.block.measurement.rate_Hz, self.block.measurement.times_s)
+        block = self.block.measurement
+        return Sampling(block.rate_Hz, block.times_s, block.bursts)
 
     @property
     def samples(self) -> int:
