@@ -98,7 +98,7 @@ class Criterion:
             Z: the derivative of the criterion, D, or of what it is the largest of.
         """
         if self.name == "D":
-            z = np.linalg.inv(covariances)
+            z = np.linalg.inv(covariances).astype(float)
         elif self.name == "A":
             z = np.broadcast_to(np.eye(len(self.asked)) / len(self.asked), covariances.shape)
         elif self.name == "largest":

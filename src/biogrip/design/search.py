@@ -65,11 +65,12 @@ class TorqueSearch:
     def torque(self, shares: Array) -> Torque:
         """Return the torque of so many shares, as large as torque and stroke allow."""
         steps = train(shares, self._wanted.limits)
-        return self._scaled(steps, self._views.under(steps).rotation)
+        return self._scaled(steps, self._views.under(steps))
 
-    def _scaled(self, steps: Steps, rotation: Array) -> Torque:
+    def _scaled(self, steps: Steps, view: View) -> Torque:
         seen = self._elapsed_s < steps.durations_s[:, None]
-        turned = float(np.max(np.abs(rotation), where=seen, initial=0.0))
+        turned = float(np.max(np.abs(view.rotation), where=seen, initial=0.0))
+        turned = max(turned, float(np.max(np.abs(view.last_rotation))))
         stroke, highest = self._wanted.stroke_rad, float(steps.levels.max())
         allowed = min(self._wanted.largest_Nm / highest if highest else 0.0, stroke / turned)
         return Torque(Steps(steps.durations_s, steps.levels / highest), allowed * highest)
@@ -86,7 +87,7 @@ class TorqueSearch:
         pull = _pull(view, seen)
         if pull > 0:
             return _LOST * (1 + pull)
-        torque = self._scaled(steps, view.rotation)
+        torque = self._scaled(steps, view)
         scale = torque.largest_Nm / float(steps.levels.max()) / wanted.noise_rad
         capacity = np.clip(slots - self._cells.first, 0, self._cells.slots) * seen
         told = scale * view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)

@@ -30,13 +30,14 @@ class View:
         In rad.
     force : (n, n_steps, n_times)
         Jaw force in N.
-    last_force : (n, n_steps)
+    last_rotation, last_force : (n, n_steps)
         At the end of each step.
     """
 
     sensitivity: Array
     rotation: Array
     force: Array
+    last_rotation: Array
     last_force: Array
 
 
@@ -74,9 +75,10 @@ class Views:
         reached, slanted = _carried(steps, growing)
         amplitude = reached + steps.levels[:, None, None]
         last = amplitude * growing
-        pushing = self._stiffness * self._weights * (reached + last)
-        pushing += self._inert * (amplitude + last)
-        last_force = (steps.levels[:, None] - pushing.sum(axis=2).real).T / self._lever_m
+        last_rotation = np.sum(self._weights * (reached + last), axis=2).real
+        inert = np.sum(self._inert * (amplitude + last), axis=2).real
+        pushing = steps.levels[:, None] - inert - self._stiffness * last_rotation
+        last_force = pushing.T / self._lever_m
         # (n, rows, n_steps, 3 m): of e^(r e) - 1, e^(r e) and e e^(r e).
         n, p, m = self._by_growth.shape
         count = len(steps.levels)
@@ -99,7 +101,7 @@ class Views:
         parts = np.concatenate((mixing.real, mixing.imag), axis=-1)
         rows = parts.reshape(n, -1, 6 * m) @ self._functions
         seen = rows.reshape(n, p + 2, count, -1) + rest[..., None]
-        return View(seen[:, :p], seen[:, p], seen[:, p + 1], last_force)
+        return View(seen[:, :p], seen[:, p], seen[:, p + 1], last_rotation.T, last_force)
 
 
 def _carried(steps: Steps, growing: ComplexArray) -> tuple[ComplexArray, ComplexArray]:

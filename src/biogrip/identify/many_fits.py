@@ -21,7 +21,7 @@ from biogrip.identify.problem import Problem
 from biogrip.identify.refreshed_fits import minimized_with_refreshes
 
 # Numbers in the rows that are formed at once, where every sample has one.
-_AT_ONCE = 10_000_000
+_AT_ONCE = 2_000_000
 
 
 class Held(Constraint, Protocol):
