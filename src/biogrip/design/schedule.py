@@ -13,14 +13,16 @@ from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.sample import Network
 from biogrip.experiment.sampling import Burst, Sampling
+from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.ringing import ringing_responses
 
 _GROWTH, _GAP, _FILLINGS = 1.12, 0.005, 200
 _DIGITS = 4
 # Instants after a step at which the force is looked at, and what of the largest is rounding.
-_INSTANTS, _NOTHING = 400, 1e-9
+_INSTANTS, _EARLIEST_S, _NOTHING = 400, 1e-8, 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,8 @@ def _set(wanted: Wanted, torque: Torque) -> tuple[tuple[Phase, ...], IntArray]:
 
 def presses(wanted: Wanted, history: TorqueHistory) -> bool:
     """Whether the jaws press plausible samples at all instants that are looked at."""
-    _, force = forces(wanted, history)
+    network = wanted.model.network(wanted.parameters)
+    _, force = forces(wanted.gripper, network, history)
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
@@ -112,21 +115,22 @@ def _sampled(wanted: Wanted, phases: tuple[Phase, ...], slots: IntArray) -> Plan
     return Plan(phases, bursts, seen @ seen.swapaxes(1, 2), best.gap)
 
 
-def forces(wanted: Wanted, history: TorqueHistory) -> tuple[Array, Array]:
-    """Jaw force in N of the plausible samples, (n, n_times), at instants dense after each step.
+def forces(gripper: Gripper, network: Network, history: TorqueHistory) -> tuple[Array, Array]:
+    """Jaw force of samples, with inertia, at instants dense after each step.
 
     Returns
     -------
     time_s : (n_times,)
+        In s.
     force : (n, n_times)
+        In N.
     """
     lengths = np.diff(np.append(history.time_s, history.end_s))
-    after = np.geomspace(1e-3 / wanted.fastest_Hz, lengths, _INSTANTS, axis=1)
+    after = np.geomspace(_EARLIEST_S, lengths, _INSTANTS, axis=1)
     # At the very end of a step the next begins.
     after[:, -1] *= 1 - 1e-9
     time_s = np.unique(history.time_s[:, None] + after)
-    network = wanted.model.network(wanted.parameters)
-    return time_s, jaw_force(wanted.gripper, network, history, time_s, nonlinear=False)
+    return time_s, jaw_force(gripper, network, history, time_s, nonlinear=False)
 
 
 def _late(each: list[Cells]) -> Array:

@@ -75,7 +75,8 @@ def designed(case: Case, study_seed: int, progress: Callable[[int, float], None]
         wanted.parameters,
     )[:, 1:]
     before = relative_bounds(told @ told.swapaxes(1, 2) / wanted.noise_rad**2)
-    time_s, force_N = forces(wanted, plan.torque)
+    network = wanted.model.network(wanted.parameters)
+    time_s, force_N = forces(wanted.gripper, network, plan.torque)
     return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
 
 
