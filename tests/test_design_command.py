@@ -101,9 +101,34 @@ def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
     assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
 
 
+def test_after_a_trace(tmp_path: Path) -> None:
+    """A trace as the paper's tells c + c_p and k_p; the next experiment tells them all.
+
+    The same again would leave k, c and c_p without a bound.
+    """
+    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    case = study_of(ASKED).cases["liquid_drop_2"]
+    times = np.arange(4001) / 10.0
+    network = case.sample.model.sample(case.parameters)
+    clean = simulated_rotation(case.gripper, network, case.problem.torque, times, nonlinear=False)
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
+    columns = np.column_stack((times, clean[0] + noise))
+    trace = tmp_path / "trace.csv"
+    head = "time_s,rotation_rad"
+    np.savetxt(trace, columns, "%.12g", ",", header=head, comments="")
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path, "--after", str(trace)) == 0
+    bounds = dict(re.findall(r"^  (k|k_p|c|c_p) .* \| (\S+)", said.getvalue(), re.MULTILINE))
+    assert set(bounds) == {"k", "k_p", "c", "c_p"}
+    assert "none" not in bounds.values()
+    assert re.search(r"^  c_p +none", said.getvalue(), re.MULTILINE)
+
+
 @pytest.mark.parametrize(
     ("config", "more", "said"),
     [
+        (ASKED, ["--after", "no.csv"], "no.csv"),
         ("seeds: 2\n", [], "no case has a block `design`"),
         (ASKED, ["--case", "liquid_drop_3"], "found no case 'liquid_drop_3'"),
         (ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""), [], "found neither, allowed is one of"),

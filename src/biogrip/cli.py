@@ -188,6 +188,12 @@ def _design_parser(stages: Any) -> None:
         "--case", action="append", default=[], help="for which case [all with such a block]"
     )
     design.add_argument(
+        "--after",
+        type=Path,
+        metavar="TRACE",
+        help="CSV file with time_s and rotation_rad, recorded as the config says: what to do next",
+    )
+    design.add_argument(
         "--output",
         type=Path,
         default=Path("designed.yaml"),
@@ -256,7 +262,7 @@ def _groups(options: argparse.Namespace) -> None:
 def _design(options: argparse.Namespace) -> None:
     from biogrip.own_design.command import design
 
-    design(options.configs, options.case, options.output, force=options.force)
+    design(options.configs, options.case, options.output, after=options.after, force=options.force)
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":

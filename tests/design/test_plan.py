@@ -33,6 +33,7 @@ DROP = Wanted(
     largest_Nm=8e-9,
     stroke_rad=0.0785,
     criterion=Criterion("largest", "worst", (0, 1, 2, 3)),
+    before=np.zeros((4, 4)),
 )
 
 
@@ -100,6 +101,19 @@ def test_the_search_repeats_itself_and_looking_longer_is_no_worse() -> None:
     longer = relative_bounds(_plan(512).information).max()
     # The search looks at coarser cells than the plan.
     assert longer < 1.05 * relative_bounds(again.information).max()
+
+
+def test_what_is_known_already_is_not_asked_again() -> None:
+    """With k, k_p and c known far better, every reading in which c_p shows is made."""
+    steps = Torque(Steps(np.array([1.0, 1.0]), np.array([0.5, 1.0])), 8e-9)
+    wanted = replace(DROP, before=np.diag([1e12, 1e12, 1e12, 0.0]))
+    plan = planned(wanted, [steps])
+    after = plan.time_s - plan.torque.time_s[plan.torque.time_s.searchsorted(plan.time_s) - 1]
+    # The drop's ring decays with 2.1e4/s; twenty slots after each of two steps.
+    assert np.sum(after < 2.05e-4) == 40
+    alone = planned(DROP, [steps])
+    bounds = [relative_bounds(one.information)[0, 3] for one in (plan, alone)]
+    assert bounds[0] < bounds[1]
 
 
 def test_where_jaws_would_pull_it_says_so() -> None:

@@ -89,6 +89,25 @@ def test_nothing_else_is_better_than_the_gap_says(name: str, over: str) -> None:
         assert ours <= bound(tried) * (1 + found.gap)
 
 
+def test_information_from_before_counts() -> None:
+    """What is there already is as good as readings that had to be made."""
+    told, capacity = _random(5, 1)
+    there = np.where(np.arange(40) < 10, capacity, 0.0)
+    before = ((told * there) @ told.swapaxes(1, 2))[0]
+    criterion = Criterion("A", "worst", ALL)
+    found = best_sampling(told, capacity, 30, criterion, gap=1e-3, most=300, before=before)
+    assert found.gap < 1e-3
+    whole = inverted((told * (found.samples + there)) @ told.swapaxes(1, 2))
+    # Inverses lose what their condition number is, 1e10 here.
+    np.testing.assert_allclose(found.covariances, whole, rtol=1e-5)
+    rng = np.random.default_rng(6)
+    for _ in range(200):
+        tried = capacity * rng.random(40) ** rng.uniform(0.2, 5)
+        tried *= min(30 / tried.sum(), (capacity / np.maximum(tried, 1e-300)).min())
+        other = inverted((told * (tried + there)) @ told.swapaxes(1, 2))
+        assert criterion.typical_bound(whole) <= criterion.typical_bound(other) * (1 + found.gap)
+
+
 def test_with_less_room_than_samples_all_cells_are_full() -> None:
     told, capacity = _random(3, 1)
     found = best_sampling(told, capacity, 10_000, Criterion("D", "worst", ALL), gap=GAP, most=5)

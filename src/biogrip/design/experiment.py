@@ -35,6 +35,8 @@ class Wanted:
         How far the arms may turn.
     criterion
         What is to be small.
+    before : (n_parameters, n_parameters)
+        Information on the log-parameters that earlier experiments gave.
     """
 
     gripper: Gripper
@@ -47,6 +49,7 @@ class Wanted:
     largest_Nm: float
     stroke_rad: float
     criterion: Criterion
+    before: Array
 
 
 def relative_bounds(information: Array) -> Array:

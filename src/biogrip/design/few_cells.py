@@ -18,7 +18,9 @@ from biogrip.arrays import Array
 _AS_GOOD = 1e-3
 
 
-def in_few_cells(told: Array, samples: Array, capacity: Array, cost: Array) -> Array:
+def in_few_cells(
+    told: Array, samples: Array, capacity: Array, cost: Array, before: Array | float = 0.0
+) -> Array:
     """Spread samples over few cells, without telling less.
 
     Parameters
@@ -31,6 +33,8 @@ def in_few_cells(told: Array, samples: Array, capacity: Array, cost: Array) -> A
         How many a cell has room for.
     cost : (n_cells,)
         What a sample costs there.
+    before : (n_parameters, n_parameters)
+        Information that is there already.
 
     Returns
     -------
@@ -39,13 +43,13 @@ def in_few_cells(told: Array, samples: Array, capacity: Array, cost: Array) -> A
     """
     from scipy.optimize import linprog
 
-    information = (told * samples) @ told.swapaxes(1, 2)
+    information = (told * samples) @ told.swapaxes(1, 2) + before
     size = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     root = np.linalg.cholesky(information / (size[:, :, None] * size[:, None, :]))
     white = np.linalg.solve(root, told / size[:, :, None])
     first, second = np.triu_indices(told.shape[1])
     rows = (white[:, first] * white[:, second]).reshape(-1, told.shape[2])
-    wanted = np.tile((first == second).astype(float), len(told))
+    wanted = rows @ samples
     # In units of all samples, that numbers are near one.
     total = samples.sum()
     upper = np.minimum(capacity / total, 1.0)

@@ -55,7 +55,14 @@ class Optimum:
 
 
 def best_sampling(
-    told: Array, capacity: Array, samples: int, criterion: Criterion, *, gap: float, most: int
+    told: Array,
+    capacity: Array,
+    samples: int,
+    criterion: Criterion,
+    *,
+    gap: float,
+    most: int,
+    before: Array | float = 0.0,
 ) -> Optimum:
     """Spread samples over cells.
 
@@ -73,6 +80,8 @@ def best_sampling(
         Small enough.
     most
         Fillings that are tried at most.
+    before : (n_parameters, n_parameters)
+        Information that is there already, from other experiments.
     """
     room = min(float(samples), float(capacity.sum()))
     first = _even(capacity, room)
@@ -82,7 +91,7 @@ def best_sampling(
     for round_ in range(most):
         sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
         information = np.tensordot(shares, known, 1)
-        inverse = inverted(information)
+        inverse = inverted(information + before)
         covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
         worth = np.einsum("n,npq,npc,nqc->c", of_samples, sensitivity, told, told, optimize=True)
         filling = _filled(worth, capacity, room)
@@ -97,7 +106,7 @@ def best_sampling(
         fillings.append(filling)
         known = np.concatenate((known, _information(told, filling)[None]))
         shares = np.append(shares * (1 - 1 / len(fillings)), 1 / len(fillings))
-        shares = _mixed(known, shares, criterion, sharpness)
+        shares = _mixed(known, before, shares, criterion, sharpness)
         kept = shares > _DROPPED
         fillings = [one for one, keep in zip(fillings, kept, strict=True) if keep]
         known, shares = known[kept], shares[kept] / shares[kept].sum()
@@ -157,11 +166,13 @@ def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float
     return float(np.sqrt(now / lowest) - 1) if lowest > 0 else np.inf
 
 
-def _mixed(known: Array, shares: Array, criterion: Criterion, sharpness: float) -> Array:
+def _mixed(
+    known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
+) -> Array:
     """Improve a mixture of fillings, whose information is known, (n_fillings, n, p, p)."""
 
     def at(shares: Array) -> tuple[float, Array]:
-        inverse = inverted(np.tensordot(shares, known, 1))
+        inverse = inverted(np.tensordot(shares, known, 1) + before)
         covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
         worth = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
         return criterion.smooth(covariances, sharpness), worth

@@ -36,7 +36,8 @@ class Plan:
     bursts
         When the rotation is read.
     information : (n, n_parameters, n_parameters)
-        Fisher information of the log-parameters of the plausible samples.
+        Fisher information of the log-parameters of the plausible samples, with what earlier
+        experiments gave.
     gap
         By what share the typical relative bound may exceed that of the best sampling of this
         torque.
@@ -108,11 +109,20 @@ def _sampled(wanted: Wanted, phases: tuple[Phase, ...], slots: IntArray) -> Plan
     middle = np.concatenate([start + own.middle for start, own in zip(starts, each, strict=True)])
     capacity = np.concatenate([own.slots for own in each]).astype(float)
     told = _told(wanted, history, middle / wanted.fastest_Hz)
-    best = best_sampling(told, capacity, wanted.samples, wanted.criterion, gap=_GAP, most=_FILLINGS)
-    counts = _whole(in_few_cells(told, best.samples, capacity, _late(each)), capacity)
+    best = best_sampling(
+        told,
+        capacity,
+        wanted.samples,
+        wanted.criterion,
+        gap=_GAP,
+        most=_FILLINGS,
+        before=wanted.before,
+    )
+    few = in_few_cells(told, best.samples, capacity, _late(each), wanted.before)
+    counts = _whole(few, capacity)
     bursts = _bursts(wanted, starts, each, counts)
     seen = _told(wanted, history, Sampling(bursts=bursts).over(history.end_s))
-    return Plan(phases, bursts, seen @ seen.swapaxes(1, 2), best.gap)
+    return Plan(phases, bursts, seen @ seen.swapaxes(1, 2) + wanted.before, best.gap)
 
 
 def forces(gripper: Gripper, network: Network, history: TorqueHistory) -> tuple[Array, Array]:

@@ -100,6 +100,7 @@ class TorqueSearch:
             wanted.criterion,
             gap=_GAP,
             most=_FILLINGS,
+            before=wanted.before,
         )
         bound = wanted.criterion.typical_bound(best.covariances)
         return round(float(np.log(bound)), _DECIMALS) if bound > 0 else _LOST

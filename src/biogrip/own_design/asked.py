@@ -11,16 +11,19 @@ from biogrip.design.settings import DesignSettings
 from biogrip.design.steps import Limits
 from biogrip.errors import BiogripError
 from biogrip.instrument.actuator import torque
+from biogrip.own_design.earlier import Earlier
 from biogrip.study.study import Case
 
 
-def wanted_of(case: Case) -> Wanted:
+def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
     """Put together what is to be designed for a case.
 
     Parameters
     ----------
     case
         With a block `design`.
+    earlier
+        What an earlier trace told; its samples then are the plausible ones.
 
     Raises
     ------
@@ -34,7 +37,7 @@ def wanted_of(case: Case) -> Wanted:
     return Wanted(
         gripper=case.gripper,
         model=model,
-        parameters=plausible(case, asked),
+        parameters=earlier.parameters if earlier else plausible(case, asked),
         noise_rad=asked.noise_rad,
         samples=asked.samples,
         fastest_Hz=asked.fastest_Hz,
@@ -46,6 +49,7 @@ def wanted_of(case: Case) -> Wanted:
             asked.over,
             tuple(model.names.index(name) for name in asked.quantities or model.names),
         ),
+        before=earlier.information if earlier else np.zeros(2 * (len(model.names),)),
     )
 
 

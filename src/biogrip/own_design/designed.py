@@ -12,6 +12,7 @@ from biogrip.design.search import best_torques
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.own_design.asked import wanted_of
+from biogrip.own_design.earlier import Earlier
 from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Case
 
@@ -44,7 +45,12 @@ class Designed:
     force_N: Array
 
 
-def designed(case: Case, study_seed: int, progress: Callable[[int, float], None]) -> Designed:
+def designed(
+    case: Case,
+    study_seed: int,
+    progress: Callable[[int, float], None],
+    earlier: Earlier | None = None,
+) -> Designed:
     """Design the experiment of a case.
 
     Parameters
@@ -55,13 +61,16 @@ def designed(case: Case, study_seed: int, progress: Callable[[int, float], None]
         Of the search.
     progress
         Is told how many torques were tried, and the lowest typical relative bound.
+    earlier
+        What an earlier trace told. All bounds are then with it: the first, of its experiment done
+        again as the config has it.
 
     Raises
     ------
     BiogripError
         If nothing was found with which the jaws press throughout.
     """
-    wanted = wanted_of(case)
+    wanted = wanted_of(case, earlier)
     asked = case.block.design
     assert asked is not None
     rng = stream(study_seed, case.name, 0, "design")
@@ -74,7 +83,8 @@ def designed(case: Case, study_seed: int, progress: Callable[[int, float], None]
         case.sampling.over(history.end_s),
         wanted.parameters,
     )[:, 1:]
-    before = relative_bounds(told @ told.swapaxes(1, 2) / wanted.noise_rad**2)
+    again = told @ told.swapaxes(1, 2) / wanted.noise_rad**2
+    before = relative_bounds(again + wanted.before)
     network = wanted.model.network(wanted.parameters)
     time_s, force_N = forces(wanted.gripper, network, plan.torque)
     return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
