@@ -13,7 +13,8 @@ from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.own_design.asked import plausible
+from biogrip.instrument.actuator import torque
+from biogrip.own_design.asked import plausible, wanted_of
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
@@ -159,6 +160,20 @@ def test_others_files_are_left_alone(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert design(tmp_path) == 1
     assert "biogrip did not write it" in capsys.readouterr().err
     assert (tmp_path / "out.yaml").read_text() == "mine\n"
+
+
+def test_what_is_asked_is_what_is_wanted() -> None:
+    more = "largest_voltage_V: 20.0, quantities: [c_p, k], criterion: A, over: mean"
+    text = ASKED.replace("largest_torque_Nm: 8.0e-9", more)
+    case = study_of(text).cases["liquid_drop_2"]
+    wanted = wanted_of(case)
+    assert wanted.largest_Nm == pytest.approx(float(torque(case.actuator, 20.0)))
+    assert (wanted.criterion.name, wanted.criterion.over) == ("A", "mean")
+    assert wanted.criterion.asked == (3, 0)
+    assert wanted.stroke_rad == pytest.approx(np.radians(4.5))
+    # A sample that is touched leaves less of the stroke.
+    sized = study_of(f"{text}cases: {{liquid_drop_2: {{sample: {{size_m: 1.0e-4}}}}}}\n")
+    assert wanted_of(sized.cases["liquid_drop_2"]).stroke_rad < 0.9 * wanted.stroke_rad
 
 
 def test_plausible_samples_fill_their_ranges() -> None:
