@@ -9,6 +9,7 @@ from biogrip.experiment.sample import MODELS, SampleModel, model_named
 from biogrip.identify.problem import problem_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import poles, rotation, step_response, transfer_functions
+from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.ringing import ringing_responses
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.problems import RANGES
@@ -164,3 +165,35 @@ def test_a_trace_that_is_seen_ringing_tells_all_four(gripper: Gripper) -> None:
         residual, slopes = problem.residuals(x)
         x = x - np.linalg.lstsq(slopes.T, residual, rcond=None)[0]
     np.testing.assert_allclose(np.exp(x), CELL, rtol=1e-6)
+
+
+def test_the_nonlinear_model_rings_too(gripper: Gripper) -> None:
+    """What it has over the linear model is quasi-static, in targets as in what is fitted."""
+    torque = torque_history((held(5.0, 1.6e-9), held(5.0, 0.8e-9)))
+    times = np.unique(np.concatenate([start + np.geomspace(1e-5, 4.9, 40) for start in (0.0, 5.0)]))
+    sample = np.array([1.0, 0.05, 10.0, 0.5])
+    problem = problem_of(
+        gripper,
+        MODEL,
+        torque,
+        times,
+        np.zeros_like(times),
+        RANGES,
+        nonlinear=True,
+        inertia=True,
+        noise_rad=3e-6,
+    )
+    exact = nonlinear_rotation(gripper, MODEL.network(sample), torque, times)[0]
+    phi, slopes = problem.residuals(np.log(sample))
+    # The population's mesh is coarse: 1e-6 of the peak (see test_nonlinear).
+    assert np.max(np.abs(phi - exact)) < 3e-6 * exact.max()
+    rows = problem.residuals.condensed_responses(np.log(sample)[None])[0]
+    np.testing.assert_allclose(rows[0], phi, atol=1e-9 * exact.max())
+    np.testing.assert_allclose(rows[1:], slopes, atol=1e-9 * exact.max())
+    for index in range(4):
+        h = 1e-4 * np.eye(4)[index]
+        ahead, behind = (
+            nonlinear_rotation(gripper, MODEL.network(sample * np.exp(s)), torque, times)[0]
+            for s in (h, -h)
+        )
+        assert np.max(np.abs(slopes[index] - (ahead - behind) / 2e-4)) < 1e-4 * exact.max()

@@ -114,8 +114,8 @@ def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Tab
         "Cramér-Rao bounds, one standard deviation, with all parameters free and the arms' "
         "inertia in the model, at the same noise: with the protocol and the sampling of the study, "
         "and with the case's own. Without a number: no finite bound. Beside it the standard "
-        "deviation of what least squares finds in many seeds, and how often 95 % intervals hold "
-        "the truth."
+        "deviation of what least squares finds in many seeds, and how often its intervals, of the "
+        "study's confidence, hold the truth."
     )
     return Table(caption, _COLUMNS, rows)
 
