@@ -17,7 +17,7 @@ from biogrip.identify.problem import condensed_of
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.mode_rows import ModeRows
-from biogrip.response.sensitivity import Modes
+from biogrip.response.modes import Modes
 
 _ROUNDS = 15
 _SEEDS, _NONLINEAR_SEEDS, _FITTED = 15, 3, 5

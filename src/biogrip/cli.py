@@ -94,6 +94,7 @@ def _parser() -> argparse.ArgumentParser:
 
     _identify_parser(commands)
     _groups_parser(commands)
+    _design_parser(commands)
 
     text = "make something of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
@@ -166,6 +167,37 @@ def _groups_parser(stages: Any) -> None:
     groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
 
 
+def _design_parser(stages: Any) -> None:
+    text = "find the torque, and when to look, with which every parameter shows"
+    design = stages.add_parser("design", help=text, description=text)
+    design.set_defaults(command=_design)
+    design.add_argument(
+        "configs",
+        type=Path,
+        nargs="+",
+        metavar="CONFIG",
+        help="YAML file with a block `design`, laid over the default study",
+    )
+    design.add_argument(
+        "--case", action="append", default=[], help="for which case [all with such a block]"
+    )
+    design.add_argument(
+        "--after",
+        type=Path,
+        metavar="TRACE",
+        help="CSV file with time_s and rotation_rad, recorded as the config says: what to do next",
+    )
+    design.add_argument(
+        "--output",
+        type=Path,
+        default=Path("designed.yaml"),
+        help="YAML file that a study takes; a page is written beside it [%(default)s]",
+    )
+    design.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
+
+
 def _trace_options(command: argparse.ArgumentParser) -> None:
     """Add what tells how recorded traces are to be read and identified."""
     command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
@@ -225,6 +257,12 @@ def _groups(options: argparse.Namespace) -> None:
         output=options.output,
         force=options.force,
     )
+
+
+def _design(options: argparse.Namespace) -> None:
+    from biogrip.own_design.command import design
+
+    design(options.configs, options.case, options.output, after=options.after, force=options.force)
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":

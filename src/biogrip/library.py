@@ -42,6 +42,7 @@ def set_up(
     ranges: Mapping[str, GeneRange] | None = None,
     fixed: Mapping[str, float] | None = None,
     nonlinear: bool = False,
+    inertia: bool = False,
 ) -> CaseProblem:
     """Describe an experiment.
 
@@ -57,9 +58,17 @@ def set_up(
         Parameters that are known, by name, SI units.
     nonlinear
         Whether the nonlinear model is solved.
+    inertia
+        Whether the model that is fitted has the arms' inertia, as what is simulated always has.
     """
     return CaseProblem(
-        gripper, protocol, ranges or _RANGES, sample, dict(fixed or {}), nonlinear=nonlinear
+        gripper,
+        protocol,
+        ranges or _RANGES,
+        sample,
+        dict(fixed or {}),
+        nonlinear=nonlinear,
+        inertia=inertia,
     )
 
 

@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.response.dense_samples import DenseSamples
-from biogrip.response.sensitivity import responses_of_modes
+from biogrip.response.mode_growth import responses_of_modes
 from tests.helpers.responses import PROTOCOLS
 
 _RNG = np.random.default_rng(4)

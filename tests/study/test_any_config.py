@@ -30,7 +30,9 @@ MOST = {"seeds": 300, "coverage_seeds": 300}
 SINGLE = {
     path: shape
     for path, shape in leaves(StudyConfig).items()
-    if not shape.block and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
+    if not shape.block
+    and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
+    and not path.startswith("measurement.bursts.")
 }
 OF_A_CASE = sorted(path for path in leaves(Shared) if path in SINGLE)
 

@@ -2,12 +2,14 @@
 
 PUBLISHED = Path(workflow.basedir) / "results" / "published"
 
-# What is published beside the default study's results, by the name of its config: the rule
-# that makes it, and its names.
+# What is published beside the default study's results, by the name of its folder: its configs,
+# the rule that makes it, and its names.
 OVERLAYS = {
-    "robustness": ("all_maps", "robustness_*"),
-    "readings": ("readings", "readings"),
+    "robustness": (["robustness"], "all_maps", "robustness_*"),
+    "readings": (["readings"], "readings", "readings"),
+    "design": (["design", "designed"], "designed", "designed"),
 }
+CONFIGS = Path(workflow.basedir) / "config"
 
 # The default study, whatever this run was configured with; nothing of it is kept.
 RUN_AFRESH = (
@@ -51,7 +53,7 @@ rule publish:
         'biogrip publish "$scratch/results" {params.published:q} 2>> {log:q} | tee -a {log:q}'
 
 
-for overlay, (target, only) in OVERLAYS.items():
+for overlay, (configs, target, only) in OVERLAYS.items():
 
     rule:
         name:
@@ -61,12 +63,12 @@ for overlay, (target, only) in OVERLAYS.items():
         threads: workflow.cores
         params:
             snakefile=workflow.main_snakefile,
-            config=f"--configfile {Path(workflow.basedir) / 'config' / overlay}.yaml",
+            config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",
             targets=target,
             published=PUBLISHED / overlay,
             only=only,
         message:
-            f"Running config/{overlay}.yaml afresh and publishing its tables and figures"
+            f"Running {' and '.join(configs)} afresh and publishing its tables and figures"
         shell:
             f"{RUN_AFRESH}; "
             'biogrip publish "$scratch/results" {params.published:q} --only {params.only:q} '

@@ -11,10 +11,11 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.identify.problem import Problem, problem_of, rows_of
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.every_sample import EverySample
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
 from biogrip.response.whitening import Colour, Whitening
 
@@ -25,7 +26,7 @@ class CaseProblem:
 
     Parameters
     ----------
-    gripper, ranges, nonlinear, offset, drift, noise_rad
+    gripper, ranges, nonlinear, inertia, offset, drift, noise_rad
         As of `problem_of`.
     coloured
         Whether the noise of a trace may be other than white, see `trace_fit`.
@@ -45,12 +46,15 @@ class CaseProblem:
     sample: Sample
     fixed: Mapping[str, float]
     nonlinear: bool = False
+    inertia: bool = False
     offset: bool = False
     drift: bool = False
     noise_rad: float | None = None
     coloured: bool = False
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    _condensed: dict[bytes, Condensed] = field(default_factory=dict, init=False, compare=False)
+    _condensed: dict[bytes, Condensed | EverySample] = field(
+        default_factory=dict, init=False, compare=False
+    )
 
     @cached_property
     def torque(self) -> TorqueHistory:
@@ -92,7 +96,7 @@ class CaseProblem:
         rotation_rad: Array,
         model: SampleModel | None = None,
         noise_rad: float | None = None,
-        condensed: Condensed | None = None,
+        condensed: Condensed | EverySample | None = None,
     ) -> Problem:
         """Pose the problem for a trace.
 
@@ -106,6 +110,7 @@ class CaseProblem:
             rotation_rad,
             dict(self.ranges),
             nonlinear=self.nonlinear,
+            inertia=self.inertia,
             offset=self.offset,
             drift=self.drift,
             noise_rad=noise_rad or self.noise_rad,
@@ -118,7 +123,7 @@ class CaseProblem:
 
     def in_noise(
         self, time_s: Array, colour: Colour | None, uncertain: Array, freedom: float
-    ) -> Condensed:
+    ) -> Condensed | EverySample:
         """Condense for noise that is not just white.
 
         Parameters
@@ -135,7 +140,9 @@ class CaseProblem:
         nuisance, whitening = self.nuisance(time_s), None
         if colour is not None:
             whitening = Whitening(time_s, colour, nuisance, uncertain)
-        nuisance = with_uncertain(nuisance, uncertain)
+        nuisance = with_uncertain(nuisance, uncertain) if whitening is None else whitening.nuisance
+        if self.inertia:
+            return EverySample(time_s, nuisance, whitening, freedom)
         return Condensed(
             self.torque,
             time_s,
@@ -145,16 +152,17 @@ class CaseProblem:
             freedom=freedom,
         )
 
-    def _condensed_at(self, time_s: Array) -> Condensed:
+    def _condensed_at(self, time_s: Array) -> Condensed | EverySample:
         # Once for all traces of a case: it takes as long as some fifty responses.
         sampled = time_s.tobytes()
         if sampled not in self._condensed:
-            self._condensed[sampled] = condensed_of(
+            self._condensed[sampled] = rows_of(
                 self.torque,
                 time_s,
                 offset=self.offset,
                 drift=self.drift,
                 nonlinear=self.nonlinear,
+                inertia=self.inertia,
             )
         return self._condensed[sampled]
 

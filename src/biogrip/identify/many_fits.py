@@ -4,7 +4,7 @@
 array. To the last bit, a fit does not depend on which others are made with it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,9 @@ from biogrip.identify.levenberg_marquardt import (
 from biogrip.identify.local_fit import FINE, PRIOR_WIDTH
 from biogrip.identify.problem import Problem
 from biogrip.identify.refreshed_fits import minimized_with_refreshes
+
+# Numbers in the rows that are formed at once, where every sample has one.
+_AT_ONCE = 2_000_000
 
 
 class Held(Constraint, Protocol):
@@ -70,7 +73,21 @@ class ManyFits:
         trace : (n,)
             Which trace each is compared with.
         """
-        return self._normal_of(self._residuals.condensed_responses(x), x, trace)
+        return self._in_parts(self._residuals.condensed_responses, x, trace)
+
+    def _in_parts(
+        self, rows_of: Callable[..., Array], x: Array, trace: IntArray, *beside: Array
+    ) -> Normal:
+        """Normal equations, with rows of so many fits at once as memory has room for."""
+        size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
+        if len(x) <= size:
+            return self._normal_of(rows_of(x, *beside), x, trace)
+        parts = [
+            self._normal_of(rows_of(x[some], *(row[some] for row in beside)), x[some], trace[some])
+            for some in (slice(start, start + size) for start in range(0, len(x), size))
+        ]
+        found = zip(*(part.parts for part in parts), strict=True)
+        return Normal(*(np.concatenate(part) for part in found))
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
         """Normal equations, given rows of the responses; infinitely bad where these are none."""
@@ -123,11 +140,15 @@ class ManyFits:
         if held is not None:
             starts = held.started(starts)
 
-        def objective(x: Array, fit: IntArray, correction: Array | None = None) -> Normal:
+        def rows_of(x: Array, correction: Array | None = None) -> Array:
             rows = self._residuals.condensed_linear(x)
             if correction is not None:
                 rows += correction
-            normal = self._normal_of(rows, x, trace[fit])
+            return rows
+
+        def objective(x: Array, fit: IntArray, correction: Array | None = None) -> Normal:
+            beside = () if correction is None else (correction,)
+            normal = self._in_parts(rows_of, x, trace[fit], *beside)
             return normal if held is None else held.added(normal, x, fit)
 
         if self._residuals.nonlinear:

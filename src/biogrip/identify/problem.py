@@ -11,6 +11,7 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.every_sample import EverySample
 from biogrip.response.misfit import misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.nuisance import nuisance_basis
@@ -52,32 +53,35 @@ def problem_of(
     ranges: dict[str, GeneRange],
     *,
     nonlinear: bool = False,
+    inertia: bool = False,
     offset: bool = False,
     drift: bool = False,
     noise_rad: float | None = None,
-    condensed: Condensed | None = None,
+    condensed: Condensed | EverySample | None = None,
 ) -> Problem:
     """Pose the identification of one trace.
 
     Parameters
     ----------
     gripper, model, torque
-        What is simulated, without inertia.
+        What is simulated.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     ranges
         Gene ranges by the name of the range, see `Parameter.range_name`.
     nonlinear
         Whether to simulate the nonlinear model.
+    inertia
+        Whether the arms have any, and ring after every change of the torque.
     offset, drift
         Whether the instrument may have added a constant, and a drift linear in time.
     noise_rad
         Standard deviation of the noise, if it is known.
     condensed
-        What `condensed_of` gives for the same times, if there is one already.
+        What `rows_of` gives for the same times, if there is one already.
     """
-    condensed = condensed or condensed_of(
-        torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear
+    condensed = condensed or rows_of(
+        torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear, inertia=inertia
     )
     chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     residuals = Residuals(
@@ -97,10 +101,11 @@ def problem_of(
         time_s,
         rotation_rad,
         nonlinear=nonlinear,
+        inertia=inertia,
         nuisance=condensed.nuisance,
     )
     many = isinstance(misfit, FormedMisfit) and len(time_s) > _MANY_SAMPLES
-    if condensed.coloured or (many and residuals.condensable):
+    if condensed.coloured or (many and not inertia and residuals.condensable):
         misfit = residuals.condensed_misfit
     return Problem(
         misfit,
@@ -109,6 +114,24 @@ def problem_of(
         np.log([genes.low for genes in chosen]),
         np.log([genes.high for genes in chosen]),
     )
+
+
+def rows_of(
+    torque: TorqueHistory,
+    time_s: Array,
+    *,
+    offset: bool,
+    drift: bool,
+    nonlinear: bool,
+    inertia: bool,
+) -> Condensed | EverySample:
+    """Find what stands for the samples of all traces that are sampled at the same times.
+
+    Where arms ring, every sample stands for itself.
+    """
+    if inertia:
+        return EverySample(time_s, nuisance_basis(time_s, offset=offset, drift=drift))
+    return condensed_of(torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear)
 
 
 def condensed_of(

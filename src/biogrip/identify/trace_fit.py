@@ -22,6 +22,7 @@ from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
 from biogrip.response.condensed import Condensed
+from biogrip.response.every_sample import EverySample
 from biogrip.response.whitening import Colour
 
 MOST_SAMPLES = 50_000
@@ -60,7 +61,7 @@ class TraceFit:
     found: Identification
     colour: Colour | None
     outliers: BoolArray
-    condensed: Condensed | None = None
+    condensed: Condensed | EverySample | None = None
 
     def problem_of(
         self, posed: CaseProblem, time_s: Array, rotation_rad: Array, model: SampleModel
@@ -160,7 +161,7 @@ def _without_outliers(
 
 def _in_turn(
     posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
-) -> tuple[Problem, Identification, Colour | None, Condensed | None]:
+) -> tuple[Problem, Identification, Colour | None, Condensed | EverySample | None]:
     """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
     problem, colour, condensed, freedom = plain, None, None, np.inf
     for _ in range(_ROUNDS):

@@ -22,7 +22,9 @@ def models_tried(
     With parameters that are known, or where a fit takes minutes, there is nothing to say.
     """
     posed = case.problem
-    candidates = tuple(dict.fromkeys((*study.models_of(case), *_power_laws(posed.torque.end_s))))
+    # Beside arms that ring there is no springpot yet.
+    power_laws = [] if posed.inertia else _power_laws(posed.torque.end_s)
+    candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
     if posed.nonlinear or posed.fixed:
         return {"models": [], "advice": None}
     least_squares = case.method("least_squares")

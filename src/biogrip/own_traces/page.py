@@ -33,7 +33,7 @@ class Page:
         """Draw what is said of a trace."""
         data = identified.data
         with styled():
-            figures = [(title, _embedded(drawn)) for title, drawn in _figures(identified).items()]
+            figures = [(title, embedded(drawn)) for title, drawn in _figures(identified).items()]
         self._traces.append(
             {
                 **data,
@@ -69,7 +69,8 @@ def _figures(identified: Identified) -> dict[str, Figure]:
     }
 
 
-def _embedded(drawn: Figure) -> str:
+def embedded(drawn: Figure) -> str:
+    """Return a figure as the source of an image on a page."""
     content = io.BytesIO()
     drawn.savefig(content, format="png", metadata={"Software": None})
     return png_address(content.getvalue())

@@ -24,10 +24,10 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.dense_samples import DenseSamples
+from biogrip.response.mode_growth import responses_of_modes
 from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
-from biogrip.response.sensitivity import responses_of_modes
 from biogrip.response.whitening import Whitening
 
 MOST_NODES = 50_000

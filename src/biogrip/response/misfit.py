@@ -26,6 +26,7 @@ def misfit_of(
     rotation_rad: Array,
     *,
     nonlinear: bool = False,
+    inertia: bool = False,
     nuisance: Array | None = None,
 ) -> Misfit:
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
@@ -33,18 +34,20 @@ def misfit_of(
     Parameters
     ----------
     gripper, model, torque
-        What is simulated, without inertia.
+        What is simulated.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     nonlinear
         Whether to simulate the nonlinear model.
+    inertia
+        Whether the arms have any.
     nuisance : (n_functions, n_samples)
         Functions that the instrument may have added, see `nuisance_basis`; none by default.
     """
-    plain = nuisance is None or len(nuisance) == 0
+    plain = not (nonlinear or inertia) and (nuisance is None or len(nuisance) == 0)
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
-    if is_uniform and torque.only_steps and not nonlinear and plain:
+    if is_uniform and torque.only_steps and plain:
         interval_s = float(time_s[-1]) / (len(time_s) - 1)
         return SeriesMisfit(gripper, model, torque, interval_s, rotation_rad)
     return FormedMisfit(
@@ -54,6 +57,7 @@ def misfit_of(
         time_s,
         rotation_rad,
         nonlinear=nonlinear,
+        inertia=inertia,
         nuisance=np.zeros((0, len(time_s))) if nuisance is None else nuisance,
     )
 

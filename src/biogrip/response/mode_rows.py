@@ -18,7 +18,8 @@ from numpy.polynomial import chebyshev
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.decay_table import DEGREE, WIDTH
-from biogrip.response.sensitivity import Modes, responses_of_modes
+from biogrip.response.mode_growth import responses_of_modes
+from biogrip.response.modes import Modes
 
 # As in `decay_table`, wide pieces of high degree need the fewest rates, short ones of low degree
 # are the fastest to look up: the latter's error is 3e-15 of what is tabulated.

@@ -10,13 +10,15 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.every_sample import EverySample
 from biogrip.response.grip import Grip, grip_of
 from biogrip.response.linear import LEFT
+from biogrip.response.modes import modes_of
 from biogrip.response.nuisance import taken_out
+from biogrip.response.ringing import ringing_responses
 from biogrip.response.sensitivity import (
     corrections,
     differences,
-    modes_of,
     rotation_and_sensitivity,
 )
 
@@ -30,12 +32,13 @@ class Residuals:
     Parameters
     ----------
     gripper, model, torque
-        What is simulated, without inertia.
+        What is simulated.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
         Of the protocol and the sampling times; knows what the instrument may have added, and
-        the colour of the noise. Residuals are white.
+        the colour of the noise. Residuals are white. Where every sample is a row, the arms'
+        inertia is simulated, too.
     nonlinear
         Whether to simulate the nonlinear model.
     noise_rad
@@ -49,7 +52,7 @@ class Residuals:
         torque: TorqueHistory,
         time_s: Array,
         rotation_rad: Array,
-        condensed: Condensed,
+        condensed: Condensed | EverySample,
         *,
         nonlinear: bool,
         noise_rad: float | None = None,
@@ -59,6 +62,7 @@ class Residuals:
         self._torque = torque
         self._time_s = time_s
         self.nonlinear = nonlinear
+        self._inertia = isinstance(condensed, EverySample)
         self._condensed = condensed
         self._rotation_rad = condensed.cleared(rotation_rad)
         self.samples = len(time_s)
@@ -119,7 +123,7 @@ class Residuals:
         slopes : (n_parameters, n_rows)
             In rad.
         """
-        if not self.condensable:
+        if isinstance(self._condensed, EverySample) or not self.condensable:
             return self(log_parameters)
         if self.nonlinear:
             found = self.condensed_responses(log_parameters[None])[0]
@@ -140,8 +144,10 @@ class Residuals:
 
     @property
     def condensable(self) -> bool:
-        """Whether few rows may stand for all samples."""
+        """Whether few rows may stand for all samples, or every sample has one."""
         condensed = self._condensed
+        if isinstance(condensed, EverySample):
+            return True
         return condensed.possible and (condensed.nonlinear or not self.nonlinear)
 
     @cached_property
@@ -168,8 +174,14 @@ class Residuals:
 
     def condensed_linear(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
-        modes = modes_of(self._gripper, self.model, self._torque, np.exp(log_parameters))
-        return self._condensed.of_modes(modes)
+        parameters, condensed = np.exp(log_parameters), self._condensed
+        if isinstance(condensed, EverySample):
+            rows = ringing_responses(
+                self._gripper, self.model, self._torque, self._time_s, parameters
+            )
+            return condensed.cleared(rows)
+        modes = modes_of(self._gripper, self.model, parameters, symmetric=self._torque.symmetric)
+        return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
@@ -182,10 +194,15 @@ class Residuals:
 
     def _corrections(self, log_parameters: Array) -> Array:
         found = corrections(self._gripper, self.model, self._torque, np.exp(log_parameters))
+        condensed = self._condensed
+        if isinstance(condensed, EverySample):
+            values = np.where(found.converged[:, None], found.at(self._time_s), np.nan)
+            values = values.reshape(len(log_parameters), -1, self.samples)
+            return condensed.cleared(differences(values))
         values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
         # One product a sample: the order of its sums does not depend on how many there are.
-        shape = len(log_parameters), -1, len(self._condensed.of_corrections)
-        rows: Array = differences(values.reshape(shape)) @ self._condensed.of_corrections
+        shape = len(log_parameters), -1, len(condensed.of_corrections)
+        rows: Array = differences(values.reshape(shape)) @ condensed.of_corrections
         return rows
 
     def condensed_misfit(self, parameters: Array) -> Array:
@@ -223,6 +240,7 @@ class Residuals:
             time_s,
             np.exp(log_parameters),
             nonlinear=self.nonlinear,
+            inertia=self._inertia,
         )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Annotated, Any
 
+from biogrip.design.settings import DesignSettings
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
@@ -57,6 +58,15 @@ class Equations:
         ),
     ]
     identification: Annotated[str, Key("The same for the model that is fitted.", choices=EQUATIONS)]
+    inertia: Annotated[
+        bool,
+        Key(
+            "Whether the model that is fitted has the arms' inertia, too, as targets always have: "
+            "the arms then ring for milliseconds after every change of the torque. Needed where "
+            "samples come that soon, see docs/design.md; it takes several times as long. By "
+            "default no."
+        ),
+    ] = False
 
 
 @dataclass(frozen=True)
@@ -93,6 +103,7 @@ class Shared:
         ),
     ]
     identifiability: Annotated[Identifiability, Key()]
+    design: Annotated[DesignSettings | None, Key()] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,6 +174,7 @@ class CaseBlock(Shared):
             yield from self._unreachable_problems()
         yield from self._fixed_problems()
         yield from self._contact_problems()
+        yield from self._design_problems()
         yield from self.of_methods.problems_of(self._genes)
         if self.sample.sample.model.power_law:
             yield from self._band_problems()
@@ -191,6 +203,25 @@ class CaseBlock(Shared):
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
 
+    def _design_problems(self) -> Iterator[Problem]:
+        if self.design is None:
+            return
+        searched = [p.name for p in self._searched]
+        named: list[tuple[tuple[str, str | int], str]] = [
+            (("quantities", i), name) for i, name in enumerate(self.design.quantities)
+        ]
+        named += [(("ranges", name), name) for name in self.design.ranges or {}]
+        for path, name in named:
+            if name not in searched:
+                text = f"found '{name}', allowed are {', '.join(searched)}."
+                yield ("design", *path), text + nearest(name, searched)
+        if not self.recorded:
+            return
+        missing = set(searched) - set(self.design.ranges or {})
+        if missing:
+            text = f"has none for {', '.join(sorted(missing))}, of which nothing else is known."
+            yield ("design", "ranges"), text
+
     def _fixed_problems(self) -> Iterator[Problem]:
         model = self.sample.sample.model
         for name in self.known:
@@ -217,7 +248,10 @@ class CaseBlock(Shared):
             yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _band_problems(self) -> Iterator[Problem]:
-        """Find times at which a springpot is none."""
+        """Find times at which a springpot is none, and arms that ring beside one."""
+        if self.models.inertia:
+            text = f"does not go with {self.sample.model}; allowed are samples without a springpot."
+            yield ("models", "inertia"), text
         if self.protocol.end_s > LONGEST_S:
             text = f"found a protocol of {self.protocol.end_s:g} s, allowed are at most"
             yield ("sample", "model"), f"{text} {LONGEST_S:g} s with {self.sample.model}."
@@ -228,6 +262,9 @@ class CaseBlock(Shared):
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
         needed = len(self._searched) + measured.offset + measured.drift + 1
+        if measured.bursts:
+            yield from self._burst_problems(needed)
+            return
         times = measured.times_s
         if not times:
             samples = end * measured.rate_Hz + 1
@@ -244,6 +281,23 @@ class CaseBlock(Shared):
                 text = f"found {after}, allowed is later than {before} and at most {end} s."
                 yield ("measurement", "times_s", index), text
                 break
+
+    def _burst_problems(self, needed: int) -> Iterator[Problem]:
+        bursts = self.measurement.bursts
+        samples = sum(burst.samples for burst in bursts)
+        if not needed <= samples <= _MOST_SAMPLES:
+            text = f"found {samples} samples, allowed are {needed} to {_MOST_SAMPLES}."
+            yield ("measurement", "bursts"), text
+            return
+        last = -1.0
+        for index, burst in enumerate(bursts):
+            ends = burst.from_s + (burst.samples - 1) / burst.rate_Hz
+            if not last < burst.from_s <= ends <= self.protocol.end_s:
+                text = f"found one from {burst.from_s} to {ends} s, allowed is after {max(last, 0)}"
+                text += f" and at most until {self.protocol.end_s} s."
+                yield ("measurement", "bursts", index), text
+                return
+            last = ends
 
     def _calibration_problems(self) -> Iterator[Problem]:
         """A free arm must be seen ringing: sampled fast enough, for long enough."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from biogrip.experiment.noise import Noise
+from biogrip.experiment.sampling import Burst
 from biogrip.keys import Key, Problem
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
@@ -28,6 +29,15 @@ class MeasurementBlock:
             "s",
             fewest=2,
             most=5000,
+        ),
+    ] = ()
+    bursts: Annotated[
+        tuple[Burst, ...],
+        Key(
+            "Samples in bursts that follow one another, instead of a uniform rate: a camera that "
+            "is fast after every step. See docs/design.md.",
+            fewest=1,
+            most=20_000,
         ),
     ] = ()
     file: Annotated[
@@ -111,6 +121,8 @@ class MeasurementBlock:
         if self.coloured and self.noise_rad is not None:
             text = "is that of white noise; leave it out where noise_model is coloured."
             yield ("noise_rad",), text
+        if self.bursts and self.times_s:
+            yield ("bursts",), "does not go with times_s; allowed is one of them."
         if self.file is None:
             for key in ("time", "rotation", "time_unit", "rotation_unit", "noise_rad"):
                 if getattr(self, key) is not None:

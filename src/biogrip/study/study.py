@@ -125,7 +125,8 @@ class Case:
     @property
     def sampling(self) -> Sampling:
         """When the rotation is sampled."""
-        return Sampling(self.block.measurement.rate_Hz, self.block.measurement.times_s)
+        block = self.block.measurement
+        return Sampling(block.rate_Hz, block.times_s, block.bursts)
 
     @property
     def samples(self) -> int:
@@ -185,6 +186,7 @@ class Case:
             self.sample,
             self.fixed,
             nonlinear=self.block.models.identification == "nonlinear",
+            inertia=self.block.models.inertia,
             offset=measurement.offset or measurement.coloured,
             drift=measurement.drift or measurement.coloured,
             noise_rad=measurement.noise_rad,

@@ -57,8 +57,9 @@ class ExploredCase:
 
     @property
     def closed_form(self) -> bool:
-        """Whether the page can compute responses: arms and torques are alike."""
-        return is_symmetric(self.problem.gripper, self.problem.torque)
+        """Whether the page can compute responses: arms and torques are alike, and do not ring."""
+        alike = is_symmetric(self.problem.gripper, self.problem.torque)
+        return alike and not self.problem.inertia
 
 
 @dataclass(frozen=True)

@@ -33,6 +33,9 @@ from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
 
+# Digits of what is found, and of what is known to within less than a thousandth.
+_DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -221,9 +224,12 @@ def _optima(
 
 def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:
     """Estimate, limits and estimate with the rest known, of every quantity; some are empty."""
-    lines = [[_text(quantity.log(best)), "", "", ""] for quantity in chosen.every]
+    lines = [[_text(quantity.log(best), _DIGITS), "", "", ""] for quantity in chosen.every]
     for which, index in enumerate(chosen.wanted):
-        lines[index][1:] = [_text(u) for u in (*limits[which], chosen.every[index].log(known))]
+        quantity, (low, high) = chosen.every[index], limits[which]
+        digits = _MORE_DIGITS if high - low < _NARROW else _DIGITS
+        found = quantity.log(best), low, high, quantity.log(known)
+        lines[index] = [_text(logarithm, digits) for logarithm in found]
     return lines
 
 
@@ -242,8 +248,8 @@ def _of_seeds(
                 yield case, quantity.label, seed, *line, shown.verdict if shown else "", *texts
 
 
-def _text(logarithm: float) -> str:
-    return "" if math.isnan(logarithm) else f"{math.exp(logarithm):.5g}"
+def _text(logarithm: float, digits: int) -> str:
+    return "" if math.isnan(logarithm) else f"{math.exp(logarithm):.{digits}g}"
 
 
 def _determined(expected: Path) -> set[str]:

@@ -1,0 +1,1 @@
+"""Which torque to apply and when to look, so that every parameter shows."""

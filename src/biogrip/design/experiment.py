@@ -1,0 +1,79 @@
+"""What an experiment may be, and which samples it is for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.design.criteria import Criterion
+from biogrip.design.steps import Limits
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """What is to be designed.
+
+    Parameters
+    ----------
+    gripper, model
+        What is simulated, both arms driven alike.
+    parameters : (n, n_parameters)
+        Of the plausible samples.
+    noise_rad
+        Standard deviation of the sensor's noise.
+    samples
+        How often the rotation is read.
+    fastest_Hz
+        How often at most in a second.
+    limits
+        Of the steps.
+    largest_Nm
+        Torque.
+    stroke_rad
+        How far the arms may turn.
+    criterion
+        What is to be small.
+    before : (n_parameters, n_parameters)
+        Information on the log-parameters that earlier experiments gave.
+    """
+
+    gripper: Gripper
+    model: SampleModel
+    parameters: Array
+    noise_rad: float
+    samples: int
+    fastest_Hz: float
+    limits: Limits
+    largest_Nm: float
+    stroke_rad: float
+    criterion: Criterion
+    before: Array
+
+
+def relative_bounds(information: Array) -> Array:
+    """Cramer-Rao bounds of log-parameters, none of them taken as known.
+
+    Parameters
+    ----------
+    information : (n, n_parameters, n_parameters)
+        Fisher information.
+
+    Returns
+    -------
+    (n, n_parameters)
+        Standard deviations; infinite where a parameter, and what it trades against, is lost in
+        rounding.
+    """
+    length = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
+    bounds = np.full(length.shape, np.inf)
+    for row, (one, size) in enumerate(zip(information, length, strict=True)):
+        if np.any(size == 0):
+            continue
+        eigenvalues, vectors = np.linalg.eigh(one / np.outer(size, size))
+        lost = eigenvalues <= len(size) * np.finfo(float).eps * eigenvalues[-1]
+        shares = vectors**2 / np.where(lost, np.inf, eigenvalues)
+        known = ~np.any(lost & (vectors**2 > 1e-6), axis=1)
+        bounds[row, known] = np.sqrt(shares.sum(axis=1))[known] / size[known]
+    return bounds

@@ -1,0 +1,191 @@
+"""When to look: the best sampling of a given experiment, with a proof of how good it is.
+
+Times are taken in cells, stretches in which sensitivities hardly change; of the samples a share
+w_i falls into each, at most as many as the sampling is fast. The information is linear in w and
+the criterion convex in the information, so the best w is a convex problem. It is solved by
+simplicial decomposition [1]_: the linear problem of filling the cells that tell most is solved by
+sorting, and of all fillings so far the best mixture is found by a multiplicative algorithm [2]_.
+
+The equivalence theorem for designs with bounded weights [3]_ says that w is optimal if no other
+filling tells more at its gradient. How much more it tells is the gap: the criterion exceeds its
+optimum by no more.
+
+References
+----------
+.. [1] B. von Hohenbalken, Simplicial decomposition in nonlinear programming algorithms,
+   Mathematical Programming 13 (1977), 49-68.
+.. [2] S. D. Silvey, D. M. Titterington and B. Torsney, An algorithm for optimal designs on a
+   finite design space, Communications in Statistics A 7 (1978), 1379-1389.
+.. [3] H. P. Wynn, Optimum submeasures with applications to finite population sampling, in
+   Statistical Decision Theory and Related Topics III, vol. 2 (1982), 485-495.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.design.criteria import Criterion, inverted
+
+# Mixtures are improved so often before a filling is added.
+_MIXED = 15
+# How sharply a largest value is singled out: at first, by how much more each time, in the end.
+_BLUNT, _SHARPER, _SHARP = 10.0, 1.5, 1000.0
+# A filling with less than this share of a mixture is dropped.
+_DROPPED = 1e-9
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best sampling.
+
+    Parameters
+    ----------
+    samples : (n_cells,)
+        How many samples each cell has; not whole.
+    covariances : (n, n_asked, n_asked)
+        Of the logarithms of the parameters asked for, of each plausible sample.
+    gap
+        By what share the typical relative bound may exceed that of the best sampling.
+    """
+
+    samples: Array
+    covariances: Array
+    gap: float
+
+
+def best_sampling(
+    told: Array,
+    capacity: Array,
+    samples: int,
+    criterion: Criterion,
+    *,
+    gap: float,
+    most: int,
+    before: Array | float = 0.0,
+) -> Optimum:
+    """Spread samples over cells.
+
+    Parameters
+    ----------
+    told : (n, n_parameters, n_cells)
+        Sensitivities of n plausible samples to their log-parameters, in units of the noise.
+    capacity : (n_cells,)
+        How many samples a cell has room for.
+    samples
+        How many there are; with less room, as many as there is room for.
+    criterion
+        What is to be small.
+    gap
+        Small enough.
+    most
+        Fillings that are tried at most.
+    before : (n_parameters, n_parameters)
+        Information that is there already, from other experiments.
+    """
+    room = min(float(samples), float(capacity.sum()))
+    first = _even(capacity, room)
+    fillings, shares = [first], np.ones(1)
+    known = _information(told, first)[None]
+    best: Optimum | None = None
+    for round_ in range(most):
+        sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
+        information = np.tensordot(shares, known, 1)
+        inverse = inverted(information + before)
+        covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
+        worth = np.einsum("n,npq,npc,nqc->c", of_samples, sensitivity, told, told, optimize=True)
+        filling = _filled(worth, capacity, room)
+        reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
+        gain = float(worth @ filling) - reached
+        missing = _gap(criterion, covariances, gain, sharpness)
+        if best is None or missing < best.gap:
+            held = np.tensordot(shares, np.array(fillings), 1)
+            best = Optimum(held, covariances, missing)
+        if missing < gap:
+            break
+        fillings.append(filling)
+        known = np.concatenate((known, _information(told, filling)[None]))
+        shares = np.append(shares * (1 - 1 / len(fillings)), 1 / len(fillings))
+        shares = _mixed(known, before, shares, criterion, sharpness)
+        kept = shares > _DROPPED
+        fillings = [one for one, keep in zip(fillings, kept, strict=True) if keep]
+        known, shares = known[kept], shares[kept] / shares[kept].sum()
+    assert best is not None
+    return best
+
+
+def _even(capacity: Array, room: float) -> Array:
+    """As many samples in every cell, as far as there is room."""
+    level = room / np.count_nonzero(capacity)
+    for _ in range(20):
+        filled = np.minimum(capacity, level)
+        free = np.count_nonzero(capacity > level)
+        if free == 0:
+            break
+        level += (room - filled.sum()) / free
+    return np.minimum(capacity, level)
+
+
+def _filled(worth: Array, capacity: Array, room: float) -> Array:
+    """Fill the cells that are worth most."""
+    order = np.argsort(-worth, kind="stable")
+    before = np.cumsum(capacity[order]) - capacity[order]
+    filling = np.zeros_like(capacity)
+    filling[order] = np.clip(room - before, 0.0, capacity[order])
+    return filling
+
+
+def _information(told: Array, samples: Array) -> Array:
+    """Fisher information, (n, n_parameters, n_parameters)."""
+    return (told * samples) @ told.swapaxes(1, 2)
+
+
+def _seen(inverse: Array, criterion: Criterion, sharpness: float) -> tuple[Array, Array, Array]:
+    """Covariances of what is asked for, weights of the samples, and of their information."""
+    asked = np.array(criterion.asked)
+    covariances = inverse[:, asked[:, None], asked]
+    of_samples, z = criterion.weights(covariances, sharpness)
+    columns = inverse[:, :, asked]
+    return covariances, of_samples, columns @ z @ columns.swapaxes(1, 2)
+
+
+def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float) -> float:
+    """Share by which the typical relative bound may exceed the best, from what a step gains.
+
+    With weights pi and Z, sum pi tr(Z C) is convex, and nowhere larger than the criterion.
+    """
+    values = criterion.values(covariances)
+    of_samples, z = criterion.weights(covariances, sharpness)
+    count = len(criterion.asked)
+    if criterion.name == "D":
+        above = values.max() - of_samples @ values if criterion.over == "worst" else 0.0
+        return float(np.expm1(0.5 * (gain + above) / count))
+    now = float(values.max() if criterion.over == "worst" else values.mean())
+    weighed = float(np.einsum("n,nab,nab->", of_samples, z, covariances))
+    lowest = weighed - gain
+    return float(np.sqrt(now / lowest) - 1) if lowest > 0 else np.inf
+
+
+def _mixed(
+    known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
+) -> Array:
+    """Improve a mixture of fillings, whose information is known, (n_fillings, n, p, p)."""
+
+    def at(shares: Array) -> tuple[float, Array]:
+        inverse = inverted(np.tensordot(shares, known, 1) + before)
+        covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
+        worth = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
+        return criterion.smooth(covariances, sharpness), worth
+
+    power = 1.0 if criterion.name == "D" else 0.5
+    value, worth = at(shares)
+    for _ in range(_MIXED):
+        tried = shares * (worth / worth.max()) ** power
+        tried /= tried.sum()
+        new_value, new_worth = at(tried)
+        if new_value <= value:
+            shares, value, worth = tried, new_value, new_worth
+            power *= 1.2
+        else:
+            power *= 0.4
+    return shares

@@ -1,0 +1,98 @@
+"""What is asked of a design, as the config says it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.keys import Key, Problem
+
+_Value = Annotated[float, Key(above=0, high=1e12)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DesignSettings:
+    """The experiment that `biogrip design` looks for: torque, and when to look."""
+
+    noise_rad: Annotated[
+        float, Key("Standard deviation of the sensor's noise.", "rad", low=1e-15, high=1.0)
+    ]
+    samples: Annotated[int, Key("How often the rotation is read, in all.", low=10, high=1_000_000)]
+    fastest_Hz: Annotated[float, Key("How often at most in a second.", "Hz", low=1e-3, high=1e9)]
+    longest_s: Annotated[float, Key("How long the experiment lasts.", "s", low=1e-6, high=1e6)]
+    largest_torque_Nm: Annotated[
+        float | None,
+        Key(
+            "Largest torque, as an increment on what closes the jaws onto the sample.",
+            "N m",
+            above=0,
+            high=1.0,
+        ),
+    ] = None
+    largest_voltage_V: Annotated[
+        float | None,
+        Key("Largest voltage, instead; counted like a protocol's.", "V", above=0, high=1e4),
+    ] = None
+    shortest_step_s: Annotated[
+        float,
+        Key("All steps last whole multiples of this. By default 0.01 s.", "s", low=1e-6, high=1e6),
+    ] = 0.01
+    most_steps: Annotated[
+        int, Key("How many steps there are at most. By default 40.", low=2, high=1000)
+    ] = 40
+    criterion: Annotated[
+        str,
+        Key(
+            "What is to be small, of the covariance of the logarithms asked for: `largest`, the "
+            "largest relative bound (the default); `D`, its determinant; `A`, the mean of the "
+            "squared bounds; `E`, its largest eigenvalue.",
+            choices=CRITERIA,
+        ),
+    ] = "largest"
+    over: Annotated[
+        str,
+        Key(
+            "Of several plausible samples: the `worst` (the default), or their `mean`.",
+            choices=OVER,
+        ),
+    ] = "worst"
+    quantities: Annotated[
+        tuple[str, ...],
+        Key(
+            "Parameters that are asked for; the others are free all the same. By default all that "
+            "are not fixed.",
+            fewest=1,
+            most=40,
+            unique=True,
+        ),
+    ] = ()
+    ranges: Annotated[
+        Mapping[str, tuple[_Value, _Value]] | None,
+        Key(
+            "Lowest and highest plausible value of parameters, in SI units. Those without one are "
+            "as in the case's sample. By default, that sample alone is plausible."
+        ),
+    ] = None
+    drawn: Annotated[
+        int,
+        Key("Plausible samples, spread evenly over these ranges. By default 8.", low=2, high=256),
+    ] = 8
+    tried: Annotated[
+        int, Key("Torques that the search tries, about. By default 2000.", low=128, high=1_000_000)
+    ] = 2000
+
+    def problems(self) -> Iterator[Problem]:
+        """Find keys that do not go together."""
+        given = [key for key in ("largest_torque_Nm", "largest_voltage_V") if getattr(self, key)]
+        if len(given) != 1:
+            text = f"found {' and '.join(given) or 'neither'}, allowed is one of largest_torque_Nm "
+            yield (), f"{text}and largest_voltage_V."
+        if self.shortest_step_s * self.fastest_Hz < 2:
+            text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
+            yield ("shortest_step_s",), f"{text}{2 / self.fastest_Hz:g} s."
+        if 2 * self.shortest_step_s > self.longest_s:
+            text = f"found {self.longest_s}, allowed is at least two steps, "
+            yield ("longest_s",), f"{text}{2 * self.shortest_step_s:g} s."
+        for name, (low, high) in (self.ranges or {}).items():
+            if not low <= high:
+                yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."

@@ -1,0 +1,87 @@
+"""What a case's config asks of a design."""
+
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.design.criteria import Criterion
+from biogrip.design.experiment import Wanted
+from biogrip.design.settings import DesignSettings
+from biogrip.design.steps import Limits
+from biogrip.errors import BiogripError
+from biogrip.instrument.actuator import torque
+from biogrip.own_design.earlier import Earlier
+from biogrip.study.study import Case
+
+
+def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
+    """Put together what is to be designed for a case.
+
+    Parameters
+    ----------
+    case
+        With a block `design`.
+    earlier
+        What an earlier trace told; its samples then are the plausible ones.
+
+    Raises
+    ------
+    BiogripError
+        If one of its parameters is zero, so that its logarithm cannot be asked for.
+    """
+    asked = case.block.design
+    assert asked is not None
+    model = case.problem.searched
+    slots = round(asked.shortest_step_s * asked.fastest_Hz)
+    return Wanted(
+        gripper=case.gripper,
+        model=model,
+        parameters=earlier.parameters if earlier else plausible(case, asked),
+        noise_rad=asked.noise_rad,
+        samples=asked.samples,
+        fastest_Hz=asked.fastest_Hz,
+        limits=Limits(asked.longest_s, slots / asked.fastest_Hz, asked.most_steps),
+        largest_Nm=_largest(case, asked),
+        stroke_rad=case.stroke_rad,
+        criterion=Criterion(
+            asked.criterion,
+            asked.over,
+            tuple(model.names.index(name) for name in asked.quantities or model.names),
+        ),
+        before=earlier.information if earlier else np.zeros(2 * (len(model.names),)),
+    )
+
+
+def plausible(case: Case, asked: DesignSettings) -> Array:
+    """Parameters of plausible samples, (n, n_parameters): the case's, or drawn from ranges.
+
+    Raises
+    ------
+    BiogripError
+        If one of them is zero.
+    """
+    names = case.problem.searched.names
+    ranges: dict[str, Any] = {name: (v, v) for name, v in case.parameters.items()}
+    ranges |= asked.ranges or {}
+    for name in names:
+        if ranges[name][0] == 0:
+            raise BiogripError(
+                f"design: {case.name}: found {name} = 0, allowed is a range of it in "
+                "design.ranges, or to have it under `fixed`."
+            )
+    low, high = np.log([ranges[name] for name in names]).T
+    if not asked.ranges:
+        return np.exp(low)[None]
+    # Not needed by any other command, and slow to start.
+    from scipy.stats import qmc
+
+    spread = qmc.Halton(len(names), scramble=False).random(asked.drawn + 1)[1:]
+    drawn: Array = np.exp(low + (high - low) * spread)
+    return drawn
+
+
+def _largest(case: Case, asked: DesignSettings) -> float:
+    if asked.largest_torque_Nm is not None:
+        return asked.largest_torque_Nm
+    return float(torque(case.actuator, asked.largest_voltage_V or 0.0))

@@ -1,0 +1,124 @@
+"""A case's experiment, designed, beside the one that its config has."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.design.experiment import Wanted, relative_bounds
+from biogrip.design.schedule import Plan, forces, planned
+from biogrip.design.search import best_torques
+from biogrip.experiment.protocol import torque_history
+from biogrip.experiment.random_streams import stream
+from biogrip.own_design.asked import wanted_of
+from biogrip.own_design.earlier import Earlier
+from biogrip.response.ringing import ringing_responses
+from biogrip.study.study import Case
+
+
+@dataclass(frozen=True)
+class Designed:
+    """A designed experiment.
+
+    Parameters
+    ----------
+    case
+        For which sample.
+    wanted
+        What was asked.
+    plan
+        The experiment.
+    before, after : (n, n_parameters)
+        Relative bounds of the plausible samples with the protocol and the sampling of the config,
+        and with the plan, at the same noise and with the arms' inertia.
+    force_time_s, force_N : (n_times,), (n, n_times)
+        Jaw force with the plan.
+    """
+
+    case: Case
+    wanted: Wanted
+    plan: Plan
+    before: Array
+    after: Array
+    force_time_s: Array
+    force_N: Array
+
+
+def designed(
+    case: Case,
+    study_seed: int,
+    progress: Callable[[int, float], None],
+    earlier: Earlier | None = None,
+) -> Designed:
+    """Design the experiment of a case.
+
+    Parameters
+    ----------
+    case
+        With a block `design`.
+    study_seed
+        Of the search.
+    progress
+        Is told how many torques were tried, and the lowest typical relative bound.
+    earlier
+        What an earlier trace told. All bounds are then with it: the first, of its experiment done
+        again as the config has it.
+
+    Raises
+    ------
+    BiogripError
+        If nothing was found with which the jaws press throughout.
+    """
+    wanted = wanted_of(case, earlier)
+    asked = case.block.design
+    assert asked is not None
+    rng = stream(study_seed, case.name, 0, "design")
+    plan = planned(wanted, best_torques(wanted, asked.tried, rng, progress))
+    history = torque_history(case.phases)
+    told = ringing_responses(
+        wanted.gripper,
+        wanted.model,
+        history,
+        case.sampling.over(history.end_s),
+        wanted.parameters,
+    )[:, 1:]
+    again = told @ told.swapaxes(1, 2) / wanted.noise_rad**2
+    before = relative_bounds(again + wanted.before)
+    network = wanted.model.network(wanted.parameters)
+    time_s, force_N = forces(wanted.gripper, network, plan.torque)
+    return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
+
+
+def in_words(found: Designed) -> str:
+    """Print a design: bounds before and after, and what is to be set."""
+    plan, model = found.plan, found.wanted.model
+    lines = [f"{found.case.title}: {_setting(found)}."]
+    worst = [np.max(bounds, axis=0) for bounds in (found.before, found.after)]
+    several = f", worst of {len(found.after)} plausible samples" if len(found.after) > 1 else ""
+    lines.append(f"  bound (1 standard deviation{several}): as configured | designed")
+    for name, before, after in zip(model.names, *worst, strict=True):
+        lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
+    lines.append(
+        f"  no other sampling of this torque is better by more than {100 * plan.gap:.2g} %; the "
+        f"jaws press throughout, with at most {1e6 * found.force_N.max():.3g} µN"
+    )
+    return "\n".join(lines)
+
+
+def _setting(found: Designed) -> str:
+    plan = found.plan
+    torques = [phase.left.value_Nm for phase in plan.phases]
+    return (
+        f"{len(torques)} steps of up to {1e9 * max(torques):.4g} nN m over "
+        f"{plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
+    )
+
+
+def percent(bound: float) -> str:
+    """Print a relative bound."""
+    return "none" if bound > _NO_BOUND else f"{100 * bound:.2g} %"
+
+
+# Of which nobody would say that it is known: a factor of e to the tenth.
+_NO_BOUND = 10.0

@@ -1,0 +1,194 @@
+"""What a mode of unit weight does under a protocol, and how that changes with its rate."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array, ComplexArray, IntArray
+from biogrip.experiment.protocol import TorqueHistory, drives
+from biogrip.response.linear import phi_function
+
+# exp(-40) is lost in rounding.
+_DECAYED = 40.0
+
+
+def responses_of_modes(
+    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Superpose what every jump and sinusoid of the torque sets off in modes of unit weight.
+
+    Parameters
+    ----------
+    rates : (n_modes,)
+        In 1/s, real or complex.
+    torque
+        The protocol; decides the drives, see `drives`.
+    time_s : (n_times,)
+        Ascending times.
+
+    Returns
+    -------
+    growth, slope : (n_drives, n_modes, n_times)
+        The responses in N m, and their derivatives by the rate.
+    """
+    rate = rates[:, None]
+    shape = 2, 1 if torque.symmetric else 2, len(rates), len(time_s)
+    growth, slope = np.zeros(shape, dtype=rates.dtype)
+    for start, order, heights in torque.jumps:
+        first = time_s.searchsorted(start)
+        grown, slanted = _growth(order, rate, time_s[first:] - start)
+        height = heights[:, None, None]
+        growth[..., first:] += height * grown
+        slope[..., first:] += height * slanted
+    for start, omega, amplitudes in torque.swings:
+        first = time_s.searchsorted(start)
+        phasor = amplitudes[:, None, None]
+        swung = _swing(omega, rate, time_s[first:] - start, phasor)
+        growth[..., first:] += swung[0]
+        slope[..., first:] += swung[1]
+    return growth, slope
+
+
+def growth_of_modes(
+    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """As `responses_of_modes`, of the modes of n samples, at a cost that steps hardly add to.
+
+    From step to step a mode is carried on: with G what it has done at the last step, T the
+    torque since, and e the time since,
+
+        g(e) = G + (G + T) (e^(r e) - 1)    dg/dr = [G' + (G + T) e] e^(r e)
+
+    Parameters
+    ----------
+    rates : (n, n_modes)
+        In 1/s, with negative real parts; those in a column alike, for what has decayed in
+        all of a column is not computed.
+    torque
+        The protocol.
+    time_s : (n_times,)
+        Ascending, from 0.
+
+    Returns
+    -------
+    growth, slope : (n, n_drives, n_modes, n_times)
+    """
+    n, m = rates.shape
+    if not torque.only_steps:
+        both = responses_of_modes(rates.ravel(), torque, time_s)
+        growth, slope = (rows.reshape(-1, n, m, len(time_s)).swapaxes(0, 1) for rows in both)
+        return growth, slope
+    levels = np.cumsum(drives(torque.left, torque.right, torque.symmetric)[..., 0], axis=1)
+    reached, slanted = _at_steps(rates, torque.time_s, levels)
+    firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
+    phase = np.repeat(np.arange(len(levels[0])), np.diff(firsts))
+    elapsed = time_s - torque.time_s[phase]
+    growth = np.empty((n, len(levels), m, len(time_s)), dtype=rates.dtype)
+    slope = np.empty_like(growth)
+    for j, slowest in enumerate(-np.max(rates.real, axis=0, initial=-np.inf)):
+        live = elapsed < _DECAYED / slowest
+        if live.all():
+            growth[:, :, j], slope[:, :, j] = _carried_on(
+                rates[:, j], reached[..., j], slanted[..., j], levels, phase, elapsed
+            )
+            continue
+        # In the order in which it is computed elsewhere, so that it has the same bits.
+        decayed = reached[..., j] - (reached[..., j] + levels)
+        growth[:, :, j], slope[:, :, j] = decayed.take(phase, axis=2), 0.0
+        seen = np.flatnonzero(live)
+        growth[:, :, j, seen], slope[:, :, j, seen] = _carried_on(
+            rates[:, j], reached[..., j], slanted[..., j], levels, phase[seen], elapsed[seen]
+        )
+    return growth, slope
+
+
+def _carried_on(
+    rates: NDArray[Any],
+    reached: NDArray[Any],
+    slanted: NDArray[Any],
+    levels: Array,
+    phase: IntArray,
+    elapsed: Array,
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """One mode of each sample, (n, n_drives, n_times), from what it has done at each step."""
+    growing = _expm1(rates[:, None] * elapsed)[:, None]
+    growth = (reached + levels).take(phase, axis=2)
+    slope = growth * elapsed
+    growth *= growing
+    growth += reached.take(phase, axis=2)
+    slope += slanted.take(phase, axis=2)
+    slope *= 1 + growing
+    return growth, slope
+
+
+def _at_steps(
+    rates: NDArray[Any], starts_s: Array, levels: Array
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """What modes have done when a step comes, and its derivative, (n, n_drives, n_steps, m)."""
+    gaps = np.diff(starts_s)
+    growing = _expm1(rates * gaps[:, None, None])
+    reached = np.zeros((len(gaps) + 1, len(rates), len(levels), rates.shape[1]), rates.dtype)
+    slanted = np.zeros_like(reached)
+    for k, gap in enumerate(gaps):
+        grown = growing[k][:, None]
+        amplitude = reached[k] + levels[:, k, None]
+        reached[k + 1] = reached[k] + amplitude * grown
+        slanted[k + 1] = (slanted[k] + amplitude * gap) * (1 + grown)
+    return np.moveaxis(reached, 0, 2), np.moveaxis(slanted, 0, 2)
+
+
+def _expm1(z: NDArray[Any]) -> NDArray[Any]:
+    """e^z - 1; of complex z by real functions, which are faster."""
+    if not np.iscomplexobj(z):
+        return np.expm1(z)
+    grown, half = np.expm1(z.real), 0.5 * z.imag
+    sine = np.sin(half)
+    value = np.empty_like(z)
+    value.real = grown - 2 * (grown + 1) * sine**2
+    value.imag = 2 * (grown + 1) * sine * np.cos(half)
+    return value
+
+
+def _growth(order: int, rate: NDArray[Any], elapsed: Array) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Response of a mode to t^order/order!, over its weight, and its derivative by the rate.
+
+    With z = r t these are r t^(n+1) phi_(n+1)(z) and t^(n+1) [phi_n(z) - n phi_(n+1)(z)],
+    for z phi_n'(z) = phi_(n-1)(z) - n phi_n(z).
+    """
+    z = rate * elapsed
+    if order == 0:
+        growth = np.expm1(z)
+        return growth, elapsed * (growth + 1)
+    power = elapsed ** (order + 1)
+    this, before = phi_function(order + 1, z), phi_function(order, z)
+    return rate * power * this, power * (before - order * this)
+
+
+def _swing(
+    omega: float, rate: NDArray[Any], elapsed: Array, phasor: ComplexArray
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Response of a mode to Re(a e^(i omega t)), over its weight, and its derivative by the rate.
+
+    Of a real mode that is the real part of the response to a e^(i omega t); of a complex
+    one, half of it and of the response to what is conjugate to the drive.
+    """
+    ahead = _rotating(omega, rate, elapsed)
+    if not np.iscomplexobj(rate):
+        return (phasor * ahead[0]).real, (phasor * ahead[1]).real
+    back = _rotating(-omega, rate, elapsed)
+    growth, slope = (
+        0.5 * (phasor * one + phasor.conj() * other) for one, other in zip(ahead, back, strict=True)
+    )
+    return growth, slope
+
+
+def _rotating(
+    omega: float, rate: NDArray[Any], elapsed: Array
+) -> tuple[ComplexArray, ComplexArray]:
+    """Response of a mode to e^(i omega t), over its weight, and its derivative by the rate."""
+    decay = np.exp(rate * elapsed)
+    difference = np.exp(1j * omega * elapsed) - decay
+    share = rate / (1j * omega - rate)
+    slope = 1j * omega / (1j * omega - rate) ** 2
+    return share * difference, slope * difference - share * elapsed * decay

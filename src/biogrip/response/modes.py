@@ -1,0 +1,171 @@
+"""Poles and weights of the linear model, and how they change with the sample's parameters.
+
+A parameter with a relative imaginary part of 1e-30 carries its derivative through
+the arithmetic of the transfer function without touching the real part (complex
+step). Poles and weights are differentiated by hand, with no cancellation at either
+end. What is found for a sample does not depend, to the last bit, on which others
+are looked at with it.
+
+References
+----------
+.. [1] W. Squire and G. Trapp, Using complex variables to estimate derivatives of real
+   functions, SIAM Review 40 (1998), 110-112.
+.. [2] J. R. R. A. Martins, P. Sturdza and J. J. Alonso, The complex-step derivative
+   approximation, ACM Transactions on Mathematical Software 29 (2003), 245-262.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from biogrip.arrays import Array, ComplexArray
+from biogrip.experiment.network import MOST_BRANCHES
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.linear import LEFT, evaluate, poles, slope_at_poles, transfer_functions
+from biogrip.response.many_branches import modes_with_slopes
+
+_TILT = 1e-30
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Step responses of n samples' left arm, and their derivatives by the log-parameters.
+
+    Parameters
+    ----------
+    rates : (n, n_modes)
+        In 1/s; real and negative, or complex with a negative real part.
+    weights : (n, n_drives, n_modes)
+        In rad per N m.
+    rate_slopes : (n, n_parameters, n_modes)
+    weight_slopes : (n, n_parameters, n_drives, n_modes)
+    """
+
+    rates: NDArray[Any]
+    weights: NDArray[Any]
+    rate_slopes: NDArray[Any]
+    weight_slopes: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Polynomials:
+    """Rotation of the left arm over torque of n samples, with derivatives by log-parameters.
+
+    Parameters
+    ----------
+    denominator : (n, terms)
+        In ascending powers of s.
+    denominator_slopes : (n_parameters, n, terms)
+    numerators : [n_drives] of (n, terms)
+    numerator_slopes : [n_drives] of (n_parameters, n, terms)
+    """
+
+    denominator: Array
+    denominator_slopes: Array
+    numerators: list[Array]
+    numerator_slopes: list[Array]
+
+    def of(self, rows: NDArray[Any]) -> "Polynomials":
+        """Those of some of the samples."""
+        return Polynomials(
+            self.denominator[rows],
+            self.denominator_slopes[:, rows],
+            [numerator[rows] for numerator in self.numerators],
+            [slopes[:, rows] for slopes in self.numerator_slopes],
+        )
+
+
+def polynomials_of(
+    gripper: Gripper,
+    model: SampleModel,
+    parameters: Array,
+    *,
+    symmetric: bool,
+    inertia: bool,
+    slopes: bool = True,
+) -> Polynomials:
+    """Transfer functions of samples, and their derivatives.
+
+    Parameters
+    ----------
+    gripper, model
+        What is simulated.
+    parameters : (n, n_parameters)
+        All positive.
+    symmetric
+        Whether both arms are driven alike; decides the drives.
+    inertia
+        Whether the arms have any.
+    slopes
+        Whether derivatives are wanted; without, there are those of no parameter.
+    """
+    count = parameters.shape[1]
+    tilts = _tilts(count) if slopes else np.ones((1, count))
+    tilted = (parameters * tilts[:, None]).reshape(-1, count)
+    transfer = transfer_functions(
+        gripper, model.network(tilted), symmetric=symmetric, inertia=inertia
+    )
+    denominator, denominator_slopes = _untilted(transfer.denominator, len(tilts) - 1)
+    rows = [_untilted(row, len(tilts) - 1) for row in transfer.numerators[LEFT]]
+    return Polynomials(
+        denominator, denominator_slopes, [row for row, _ in rows], [slope for _, slope in rows]
+    )
+
+
+def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
+    """Modes of given poles, all of a denominator's, no two of them too close."""
+    denominator, denominator_slopes = polynomials.denominator, polynomials.denominator_slopes
+    slope = slope_at_poles(denominator, rates)
+    # A pole stays where the denominator is zero.
+    rate_slopes = -evaluate(denominator_slopes, rates) / slope
+    # Of log(p_j D'(p_j)), with D'(p_j) the leading coefficient times all p_j - p_i.
+    steepening = rate_slopes / rates + (denominator_slopes[..., -1] / denominator[:, -1])[..., None]
+    for i, j in permutations(range(rates.shape[1]), 2):
+        approach = rate_slopes[..., i] - rate_slopes[..., j]
+        steepening[..., i] += approach / (rates[:, i] - rates[:, j])
+    weights, weight_slopes = [], []
+    for numerator, numerator_slopes in zip(
+        polynomials.numerators, polynomials.numerator_slopes, strict=True
+    ):
+        weight = evaluate(numerator, rates) / (rates * slope)
+        along = evaluate(numerator[:, 1:] * np.arange(1, numerator.shape[1]), rates)
+        change = evaluate(numerator_slopes, rates) + along * rate_slopes
+        weights.append(weight)
+        weight_slopes.append(change / (rates * slope) - weight * steepening)
+    return Modes(
+        rates,
+        np.array(weights).swapaxes(0, 1),
+        rate_slopes.swapaxes(0, 1),
+        np.array(weight_slopes).transpose(2, 1, 0, 3),
+    )
+
+
+def modes_of(gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool) -> Modes:
+    """Modes of samples without inertia, all real; arguments as of `polynomials_of`."""
+    network = model.network(parameters[:1])
+    if network.k.shape[1] > MOST_BRANCHES:
+        count = parameters.shape[1]
+        tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
+        parts = modes_with_slopes(gripper, model.network(tilted), _TILT, count, symmetric=symmetric)
+        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
+    polynomials = polynomials_of(gripper, model, parameters, symmetric=symmetric, inertia=False)
+    return modes_at(polynomials, poles(polynomials.denominator, real=True))
+
+
+def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
+    """Polynomials of n samples, (n, terms), and their derivatives, (n_parameters, n, terms)."""
+    of_tilts = coefficients.reshape(count + 1, -1, coefficients.shape[1])
+    return of_tilts[0].real, of_tilts[1:].imag / _TILT
+
+
+@cache
+def _tilts(count: int) -> ComplexArray:
+    """Factors with the sample itself in the first row, and one parameter tilted in each other."""
+    tilts = np.ones((count + 1, count), dtype=np.complex128)
+    tilts[1:].imag = _TILT * np.eye(count)
+    return tilts

@@ -1,0 +1,254 @@
+"""Responses with the arms' inertia: rotations of whole populations, and exact derivatives.
+
+With inertia poles may be complex. Of two that are conjugate one is kept, its weight
+doubled, and the real part taken at the end. At critical damping two poles meet, and
+their weights and slopes grow beyond all bounds while the response does not. There the
+sum of the residues of those that are close is taken by the trapezoidal rule along a
+circle C around them,
+
+    sum_j Res_j = (1 / 2 pi i) integral over C of N(s) (e^(s t) - 1) / (s D(s)) ds
+
+which converges geometrically [1]_: its nodes are rates that do not move with the
+parameters, and have weights that do.
+
+References
+----------
+.. [1] L. N. Trefethen and J. A. C. Weideman, The exponentially convergent trapezoidal rule,
+   SIAM Review 56 (2014), 385-458.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from biogrip.arrays import Array, ComplexArray, IntArray
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.experiment.sample import SampleModel
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.linear import evaluate
+from biogrip.response.mode_growth import growth_of_modes
+from biogrip.response.modes import Modes, Polynomials, modes_at, polynomials_of
+from biogrip.response.roots import roots
+
+# Weights of poles a relative gap g apart lose eps/g^2, their slopes eps/g^3.
+_CLOSE = 0.05
+# The rule's error falls with the ratio of radius and distance to that power.
+_NODES = 48
+# Of a circle that has room, radius over room.
+_WIDE = 0.4
+# Of a circle's radius, to the distance of its centre from growing rates.
+_DECAYING = 0.7
+# A root's imaginary part below this is rounding.
+_REAL = 1e-9
+# Numbers formed at once: what fits a processor's cache is faster than all at once.
+_AT_ONCE = 400_000
+
+
+def ringing_responses(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    parameters: Array,
+    *,
+    slopes: bool = True,
+) -> Array:
+    """Rotation of the left arm with inertia, and its derivatives d phi / d log p.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated; the linear model (corrected eqs. 4-6).
+    time_s : (n_times,)
+        Ascending, from 0.
+    parameters : (n, n_parameters)
+        All positive.
+    slopes
+        Whether the derivatives are wanted.
+
+    Returns
+    -------
+    (n, 1 + n_parameters, n_times)
+        In rad; without `slopes`, (n, 1, n_times).
+    """
+    count = parameters.shape[1] if slopes else 0
+    rows = np.empty((len(parameters), 1 + count, len(time_s)))
+    for where, modes in ringing_modes(
+        gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes
+    ):
+        rows[where] = sum(
+            responses_of(part, torque, time_s) for part in modes if part.rates.shape[1]
+        )
+    return rows
+
+
+def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
+    """Weigh what modes do under a protocol, and what that changes with the log-parameters.
+
+    Returns
+    -------
+    (n, 1 + n_parameters, n_times)
+        Real parts: d(w g) = dw g + w dr dg/dr.
+    """
+    n, count, m = modes.rate_slopes.shape
+    drives = modes.weights.shape[1]
+    by_growth = np.concatenate((modes.weights[:, None], modes.weight_slopes), axis=1)
+    by_slope = np.zeros_like(by_growth)
+    by_slope[:, 1:] = modes.weights[:, None] * modes.rate_slopes[:, :, None]
+    mixing = np.concatenate((by_growth, by_slope), axis=2).reshape(n, 1 + count, -1)
+    if np.iscomplexobj(mixing):
+        mixing = np.concatenate((mixing.real, -mixing.imag), axis=2)
+    rows = np.empty((n, 1 + count, len(time_s)))
+    at_once = max(1, _AT_ONCE // (m * len(time_s)))
+    for start in range(0, n, at_once):
+        some = slice(start, start + at_once)
+        both = np.concatenate(growth_of_modes(modes.rates[some], torque, time_s), axis=1)
+        both = both.reshape(-1, 2 * drives * m, len(time_s))
+        if np.iscomplexobj(both):
+            both = np.concatenate((both.real, both.imag), axis=1)
+        # One product a sample: the order of its sums does not depend on how many there are.
+        rows[some] = mixing[some] @ both
+    return rows
+
+
+def ringing_modes(
+    gripper: Gripper,
+    model: SampleModel,
+    parameters: Array,
+    *,
+    symmetric: bool,
+    slopes: bool = True,
+) -> Iterator[tuple[IntArray, tuple[Modes, ...]]]:
+    """Modes with inertia, of samples that have as many complex ones together.
+
+    Parameters
+    ----------
+    gripper, model, parameters, symmetric, slopes
+        As of `polynomials_of`.
+
+    Yields
+    ------
+    rows : (n_rows,)
+        Which samples.
+    modes
+        Real ones, and complex ones with weights of which the real part is meant.
+    """
+    polynomials = polynomials_of(
+        gripper, model, parameters, symmetric=symmetric, inertia=True, slopes=slopes
+    )
+    rates = roots(polynomials.denominator)
+    size = np.abs(rates)
+    close = _closest(rates, size) < _CLOSE
+    for row in np.flatnonzero(close):
+        yield np.array([row]), (_circled(polynomials.of(np.array([row])), rates[row]),)
+    # Real ones first, then those above the real axis, then below.
+    side = np.where(np.abs(rates.imag) < _REAL * size, 0, np.where(rates.imag > 0, 1, 2))
+    rates = np.take_along_axis(rates, np.argsort(side, axis=1, kind="stable"), axis=1)
+    pairs = np.where(close, -1, np.sum(side == 1, axis=1))
+    for count in sorted({*pairs.tolist()} - {-1}):
+        rows = np.flatnonzero(pairs == count)
+        # Of one row, numpy multiplies complex numbers by other instructions, with other last bits.
+        some = rows if len(rows) > 1 else rows.repeat(2)
+        reals = rates.shape[1] - 2 * count
+        rates[rows, :reals] = rates[rows, :reals].real
+        if count == 0:
+            modes = modes_at(polynomials.of(some), rates[some].real)
+            yield rows, (_part(modes, len(rows), slice(None)),)
+            continue
+        modes = modes_at(polynomials.of(some), rates[some])
+        above = _part(modes, len(rows), slice(reals, reals + count))
+        yield rows, (_real(_part(modes, len(rows), slice(reals))), _scaled(above, 2.0))
+
+
+def _part(modes: Modes, rows: int, which: slice) -> Modes:
+    """Some of the modes of the first samples."""
+    return Modes(
+        modes.rates[:rows, which],
+        modes.weights[:rows, ..., which],
+        modes.rate_slopes[:rows, ..., which],
+        modes.weight_slopes[:rows, ..., which],
+    )
+
+
+def _real(modes: Modes) -> Modes:
+    """Modes that are real, as real numbers."""
+    return Modes(
+        modes.rates.real, modes.weights.real, modes.rate_slopes.real, modes.weight_slopes.real
+    )
+
+
+def _scaled(modes: Modes, times: float) -> Modes:
+    return Modes(modes.rates, times * modes.weights, modes.rate_slopes, times * modes.weight_slopes)
+
+
+def _closest(rates: ComplexArray, size: Array) -> Array:
+    """Smallest distance between two poles of each sample, over their size, (n,)."""
+    distance = np.abs(rates[:, :, None] - rates[:, None, :]) / size[:, None, :]
+    distance[:, range(rates.shape[1]), range(rates.shape[1])] = np.inf
+    nearest: Array = distance.min(axis=(1, 2))
+    return nearest
+
+
+def _circled(polynomials: Polynomials, rates: ComplexArray) -> Modes:
+    """Modes of one sample, of which some are so close that nodes stand for them."""
+    plain = modes_at(polynomials, rates[None])
+    left, parts = list(range(len(rates))), []
+    while left:
+        first = min(left, key=lambda j: _next(rates, j))
+        inside, centre, radius = _circle(rates, first)
+        if inside:
+            parts.append(_nodes(polynomials, centre, radius))
+        else:
+            inside = [first]
+            parts.append(_part(plain, 1, slice(first, first + 1)))
+        left = [j for j in left if j not in inside]
+    return Modes(
+        *(
+            np.concatenate([getattr(part, name) for part in parts], axis=-1)
+            for name in ("rates", "weights", "rate_slopes", "weight_slopes")
+        )
+    )
+
+
+def _next(rates: ComplexArray, j: int) -> float:
+    """Relative distance of a pole to its nearest neighbour."""
+    return float(np.min(np.abs(np.delete(rates, j) - rates[j]), initial=np.inf) / abs(rates[j]))
+
+
+def _circle(rates: ComplexArray, j: int) -> tuple[list[int], complex, float]:
+    """Poles that are close to one, centre and radius of a circle with no others near it.
+
+    None if no circle has twice the radius of theirs and half the distance of all others.
+    """
+    near = np.argsort(np.abs(rates - rates[j]), kind="stable")
+    best: tuple[float, list[int], complex, float] = (4.0, [], 0j, 0.0)
+    for count in range(2, len(rates) + 1):
+        inside = near[:count]
+        centre = complex(np.mean(rates[inside]))
+        if abs(centre.imag) < _CLOSE * abs(centre.real):
+            centre = complex(centre.real, 0.0)
+        extent = float(np.max(np.abs(rates[inside] - centre)))
+        others = np.abs(np.delete(rates, inside) - centre)
+        room = min(float(np.min(others, initial=np.inf)), abs(centre), -centre.real * _DECAYING)
+        # On a small circle the denominator is a difference of what is much larger.
+        extent = max(extent, _WIDE**2 * room)
+        if room / extent > best[0]:
+            best = room / extent, inside.tolist(), centre, float(np.sqrt(room * extent))
+    return best[1:]
+
+
+def _nodes(polynomials: Polynomials, centre: complex, radius: float) -> Modes:
+    """Nodes of a circle as modes that do not move, of weights N(s) (s - centre) / (n s D(s))."""
+    turn = radius * np.exp(2j * np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+    s = (centre + turn)[None]
+    denominator = evaluate(polynomials.denominator, s)
+    steepening = evaluate(polynomials.denominator_slopes, s) / denominator
+    share = turn / (_NODES * s * denominator)
+    weights = [share * evaluate(numerator, s) for numerator in polynomials.numerators]
+    slopes = [
+        share * evaluate(changes, s) - weight * steepening
+        for weight, changes in zip(weights, polynomials.numerator_slopes, strict=True)
+    ]
+    weight_slopes = np.array(slopes).transpose(2, 1, 0, 3)
+    rate_slopes = np.zeros((1, weight_slopes.shape[1], _NODES), dtype=complex)
+    return Modes(s, np.array(weights).swapaxes(0, 1), rate_slopes, weight_slopes)

@@ -1,0 +1,212 @@
+"""`biogrip design`: from a config to an experiment that a study takes, and bad configs."""
+
+import re
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.cli import main
+from biogrip.experiment.random_streams import stream
+from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.identify.answer import silent
+from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
+from biogrip.instrument.actuator import torque
+from biogrip.own_design.asked import plausible, wanted_of
+from biogrip.response.simulation import simulated_rotation
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import Case
+from tests.helpers.default import study_of
+from tests.helpers.places import CONFIG
+
+ASKED = """
+search_range:
+  k_p: {exponent: [-5, 8]}
+design:
+  {noise_rad: 3.0e-6, samples: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
+   largest_torque_Nm: 8.0e-9, most_steps: 8, tried: 128}
+only: [liquid_drop_2]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder with a config and its design, and what the command said."""
+    place = tmp_path_factory.mktemp("design")
+    (place / "asked.yaml").write_text(ASKED)
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(place, "--case", "liquid_drop_2") == 0
+    return place, said.getvalue()
+
+
+def design(place: Path, *more: str) -> int:
+    return main(["design", str(place / "asked.yaml"), "--output", str(place / "out.yaml"), *more])
+
+
+def designed_case(place: Path) -> Case:
+    files = [CONFIG, place / "asked.yaml", place / "out.yaml"]
+    return load_study(read_configs(files), files).cases["liquid_drop_2"]
+
+
+def test_a_study_takes_it_and_has_the_bounds_that_were_promised(folder: tuple[Path, str]) -> None:
+    place, said = folder
+    case = designed_case(place)
+    assert case.problem.inertia
+    assert case.samples == 400
+    assert case.noise.level_rad == 3e-6
+    torque = case.problem.torque
+    assert torque.end_s == pytest.approx(60.0)
+    times = case.sampling.over(torque.end_s)
+    for quantity, bound in bounds_percent(case.problem, case.noise, case.parameters, times)[:4]:
+        promised = re.search(rf"^  {quantity.label} .*\| (\S+) %$", said, re.MULTILINE)
+        assert promised
+        # In print it has two digits.
+        assert float(promised[1]) == pytest.approx(bound, rel=0.06)
+        assert bound < 50
+
+
+def test_seeds_on_it_come_as_close_as_promised(folder: tuple[Path, str]) -> None:
+    """Twelve traces: a standard deviation of them is within a factor 2 with 99.8 %."""
+    case = designed_case(folder[0])
+    times = case.sampling.over(case.problem.torque.end_s)
+    network = case.sample.model.sample(case.parameters)
+    clean = simulated_rotation(case.gripper, network, case.problem.torque, times, nonlinear=False)
+    problems = [
+        case.problem.of(times, clean[0] + 3e-6 * stream(1, "d", s, "n").standard_normal(400))
+        for s in range(12)
+    ]
+    rngs = [np.random.default_rng(seed) for seed in range(12)]
+    found = identify_many(problems, LeastSquaresSettings(1000, 20), rngs, silent)
+    names = case.problem.searched.names
+    truth = np.array([case.parameters[name] for name in names])
+    logs = np.log([each.parameters / truth for each in found])
+    bounds = bounds_percent(case.problem, case.noise, case.parameters, times)[:4]
+    for spread, (_, bound) in zip(np.sqrt(np.mean(logs**2, axis=0)), bounds, strict=True):
+        assert 0.5 < 100 * spread / bound < 2
+
+
+def test_the_page_needs_nothing_else(folder: tuple[Path, str]) -> None:
+    page = (folder[0] / "out.html").read_text()
+    assert "Liquid drop, case 2" in page
+    assert not re.search(r'(src|href)="(?!data:|#)', page)
+    assert page.count("<img") == 2
+
+
+def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
+    (tmp_path / "asked.yaml").write_text(ASKED)
+    with redirect_stdout(StringIO()):
+        assert design(tmp_path) == 0
+    assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
+
+
+def test_after_a_trace(tmp_path: Path) -> None:
+    """A trace as the paper's tells c + c_p and k_p; the next experiment tells them all.
+
+    The same again would leave k, c and c_p without a bound.
+    """
+    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    case = study_of(ASKED).cases["liquid_drop_2"]
+    times = np.arange(4001) / 10.0
+    network = case.sample.model.sample(case.parameters)
+    clean = simulated_rotation(case.gripper, network, case.problem.torque, times, nonlinear=False)
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
+    columns = np.column_stack((times, clean[0] + noise))
+    trace = tmp_path / "trace.csv"
+    head = "time_s,rotation_rad"
+    np.savetxt(trace, columns, "%.12g", ",", header=head, comments="")
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path, "--after", str(trace)) == 0
+    bounds = dict(re.findall(r"^  (k|k_p|c|c_p) .* \| (\S+)", said.getvalue(), re.MULTILINE))
+    assert set(bounds) == {"k", "k_p", "c", "c_p"}
+    assert "none" not in bounds.values()
+    assert re.search(r"^  c_p +none", said.getvalue(), re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    ("config", "more", "said"),
+    [
+        (ASKED, ["--after", "no.csv"], "no.csv"),
+        ("seeds: 2\n", [], "no case has a block `design`"),
+        (ASKED, ["--case", "liquid_drop_3"], "found no case 'liquid_drop_3'"),
+        (ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""), [], "found neither, allowed is one of"),
+        (ASKED.replace("tried: 128", "quantities: [k, q]"), [], "found 'q', allowed are k, k_p"),
+        (ASKED.replace("tried: 128", "ranges: {c: [2.0, 1.0]}"), [], "the lower one first"),
+        (ASKED.replace("tried: 128", "shortest_step_s: 1.0e-6"), [], "at least two samples long"),
+        (
+            f"{ASKED}cases: {{liquid_drop_2: {{sample: {{c_p: 0.0}}}}}}\n",
+            [],
+            "found c_p = 0, allowed is a range of it",
+        ),
+    ],
+)
+def test_what_cannot_be_designed(
+    config: str, more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "asked.yaml").write_text(config)
+    assert design(tmp_path, *more) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "Traceback" not in error
+    assert not (tmp_path / "out.yaml").exists()
+
+
+def test_others_files_are_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "asked.yaml").write_text(ASKED)
+    (tmp_path / "out.yaml").write_text("mine\n")
+    assert design(tmp_path) == 1
+    assert "biogrip did not write it" in capsys.readouterr().err
+    assert (tmp_path / "out.yaml").read_text() == "mine\n"
+
+
+def test_what_is_asked_is_what_is_wanted() -> None:
+    more = "largest_voltage_V: 20.0, quantities: [c_p, k], criterion: A, over: mean"
+    text = ASKED.replace("largest_torque_Nm: 8.0e-9", more)
+    case = study_of(text).cases["liquid_drop_2"]
+    wanted = wanted_of(case)
+    assert wanted.largest_Nm == pytest.approx(float(torque(case.actuator, 20.0)))
+    assert (wanted.criterion.name, wanted.criterion.over) == ("A", "mean")
+    assert wanted.criterion.asked == (3, 0)
+    assert wanted.stroke_rad == pytest.approx(np.radians(4.5))
+    # A sample that is touched leaves less of the stroke.
+    sized = study_of(f"{text}cases: {{liquid_drop_2: {{sample: {{size_m: 1.0e-4}}}}}}\n")
+    assert wanted_of(sized.cases["liquid_drop_2"]).stroke_rad < 0.9 * wanted.stroke_rad
+
+
+def test_plausible_samples_fill_their_ranges() -> None:
+    ranges = "{k: [1.0, 100.0], c: [10.0, 20.0]}"
+    text = ASKED.replace("tried: 128", f"tried: 128, drawn: 20, ranges: {ranges}")
+    case = study_of(text).cases["liquid_drop_2"]
+    asked = case.block.design
+    assert asked is not None
+    drawn = plausible(case, asked)
+    assert drawn.shape == (20, 4)
+    np.testing.assert_allclose(drawn[:, 1], 1e-4)
+    for column, low, high in ((0, 1.0, 100.0), (2, 10.0, 20.0)):
+        place = np.log(drawn[:, column] / low) / np.log(high / low)
+        assert np.all((place > 0) & (place < 1))
+        # Halton's sequence has one in nearly every tenth.
+        assert len(np.unique(np.floor(10 * place))) >= 9
+
+
+@pytest.mark.parametrize(
+    ("bursts", "said"),
+    [
+        (
+            "[{from_s: 1.0, rate_Hz: 10.0, samples: 20}, {from_s: 2.0, rate_Hz: 1.0, samples: 5}]",
+            "allowed is after 2.9",
+        ),
+        ("[{from_s: 399.0, rate_Hz: 10.0, samples: 20}]", "at most until 400.0 s"),
+        ("[{from_s: 1.0, rate_Hz: 10.0, samples: 2}]", "found 2 samples"),
+    ],
+)
+def test_bursts_that_cannot_be(
+    bursts: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = ASKED.replace("only:", f"measurement: {{bursts: {bursts}}}\nonly:")
+    (tmp_path / "asked.yaml").write_text(text)
+    assert design(tmp_path) == 1
+    assert said in capsys.readouterr().err
