@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Published
+from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
@@ -84,6 +85,13 @@ class Shared:
         ),
     ]
     identifiability: Annotated[Identifiability, Key()]
+    posterior: Annotated[
+        PosteriorSettings | None,
+        Key(
+            "The posterior of the first trace, sampled if this block is there, even an empty one, "
+            "`{}`."
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +163,7 @@ class CaseBlock(Shared):
         yield from self._fixed_problems()
         yield from self._contact_problems()
         yield from self.of_methods.problems_of(self._genes)
+        yield from self._posterior_problems()
         if not self.recorded:
             yield from self._sampling_problems()
         if isinstance(self.assumed_gripper, str):
@@ -179,6 +188,16 @@ class CaseBlock(Shared):
         elif self.contact == "unilateral" and self.models.target != "linear":
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
+
+    def _posterior_problems(self) -> Iterator[Problem]:
+        if self.posterior is None:
+            return
+        if self.models.identification != "linear":
+            text = "is sampled with hundreds of thousands of responses; allowed with it is "
+            yield ("posterior",), f"{text}models.identification: linear."
+        model = self.sample.sample.model
+        for path, text in self.posterior.problems_of(model, list(self.known)):
+            yield ("posterior", *path), text
 
     def _fixed_problems(self) -> Iterator[Problem]:
         model = self.sample.sample.model
