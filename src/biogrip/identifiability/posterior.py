@@ -53,7 +53,7 @@ class Posterior:
         density = self.prior.log_density(log_parameters)
         allowed = np.flatnonzero(np.isfinite(density))
         if len(allowed):
-            misfit_rad = self._misfit(np.exp(log_parameters[allowed]))
+            misfit_rad = self.misfit(np.exp(log_parameters[allowed]))
             density[allowed] += power * self.log_likelihood(misfit_rad)
         return np.where(np.isnan(density), -np.inf, density)
 
@@ -75,7 +75,8 @@ class Posterior:
         return lgamma(half) - log(2) - half * np.log(pi * square_sum)
 
     @cached_property
-    def _misfit(self) -> Callable[[Array], Array]:
+    def misfit(self) -> Callable[[Array], Array]:
+        """RMS misfit in rad of parameters of shape (n, n_parameters)."""
         # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
         # loses, the rarer it is that two processors disagree about one.
         residuals = self.problem.residuals

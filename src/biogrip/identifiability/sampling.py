@@ -206,7 +206,8 @@ class _Ensemble:
         chain = sampler.get_chain()
         self.recent = chain[steps // 2 :: _KEPT].reshape(-1, size)
         self._evaluations += count * steps
-        self._progress(self._evaluations, float(np.max(self._state.log_prob)))
+        best = self._state.coords[[np.argmax(self._state.log_prob)]]
+        self._progress(self._evaluations, float(self._posterior.misfit(np.exp(best))[0]))
         return chain, sampler.get_log_prob(), float(np.mean(sampler.acceptance_fraction))
 
 

@@ -107,10 +107,15 @@ def thinned(log_parameters: Array) -> Array:
     return log_parameters[::every].reshape(-1, size)
 
 
-def write_samples(path: Path, model: SampleModel, log_parameters: Array) -> None:
-    """Write samples (n, n_parameters) as Parquet, a column a parameter in SI units."""
+def write_samples(
+    path: Path, model: SampleModel, log_parameters: Array, words: Mapping[str, str] | None = None
+) -> None:
+    """Write samples (n, n_parameters) as Parquet, a column a parameter in SI units, and words."""
     values = np.exp(log_parameters)
-    columns = {p.column: values[:, index] for index, p in enumerate(model.parameters)}
+    columns: dict[str, Array | str] = {
+        p.column: values[:, index] for index, p in enumerate(model.parameters)
+    }
+    columns |= words or {}
     write_tables(path, [table_of(columns, len(values))], dictionary=False)
 
 
