@@ -7,6 +7,7 @@ PUBLISHED = Path(workflow.basedir) / "results" / "published"
 OVERLAYS = {
     "robustness": ("all_maps", "robustness_*"),
     "readings": ("readings", "readings"),
+    "posterior": ("all_posteriors", "posterior*"),
 }
 
 # The default study, whatever this run was configured with; nothing of it is kept.

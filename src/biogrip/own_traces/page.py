@@ -38,6 +38,7 @@ class Page:
     def add(self, identified: Identified) -> None:
         """Draw what is said of a trace."""
         data = identified.data
+        compared = data["posterior"]["evidence"] if "posterior" in data else []
         with styled():
             figures = [(title, _embedded(drawn)) for title, drawn in _figures(identified).items()]
         self._traces.append(
@@ -46,9 +47,7 @@ class Page:
                 "figures": figures,
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
                 "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
-                "evidence_in_words": evidence_in_words(
-                    data.get("posterior", {}).get("evidence", [])
-                ),
+                "evidence_in_words": evidence_in_words(compared),
                 "granted": taken_for_granted(data) if data["by_default"] else None,
             }
         )

@@ -70,10 +70,9 @@ def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     if not rows:
         return []
     best = min(rows, key=lambda row: row["delta_log_evidence"])
-    near = [r["title"] for r in rows if r is not best and r["delta_log_evidence"] < STRONG]
-    also = (
-        f"; less than {np.exp(STRONG):.2g} times lower is that of {', '.join(near)}" if near else ""
-    )
+    close = [row for row in rows if row is not best and row["delta_log_evidence"] < STRONG]
+    near = ", ".join(row["title"] for row in close)
+    also = f"; less than {np.exp(STRONG):.2g} times lower is that of {near}" if near else ""
     unreliable = [row["title"] for row in rows if not row["reliable"]]
     but = f" Not to be relied on: {', '.join(unreliable)}." if unreliable else ""
     return [f"The evidence is highest for the {best['title']}{also}.{but}"]

@@ -204,6 +204,7 @@ def _ticks(axes: Axes, x_edges: Array, y_edges: Array | None) -> None:
 CORNER = drawing(
     draw,
     name="corner",
+    file="posterior",
     caption="Posterior of one seed: each parameter alone, and each against each other, over "
     "logarithms. Outlined: the least regions with half and 95 % of the samples; shaded: the "
     "interval; dotted: the median; orange: the truth.",

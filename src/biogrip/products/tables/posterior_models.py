@@ -31,7 +31,7 @@ def compared(study: Study) -> list[str]:
     ]
 
 
-def model_evidence(cases: list[str], told: list[Path]) -> Table:
+def posterior_models(cases: list[str], told: list[Path]) -> Table:
     """List models; `told` is what is said of the posterior of each case, JSON."""
     rows: list[tuple[Cell, ...]] = [
         (
@@ -56,9 +56,9 @@ def model_evidence(cases: list[str], told: list[Path]) -> Table:
     return Table(caption, _COLUMNS, rows)
 
 
-MODEL_EVIDENCE = table(
-    model_evidence,
-    name="model_evidence",
+POSTERIOR_MODELS = table(
+    posterior_models,
+    name="posterior_models",
     item="evidence of models",
     caption="Evidence of sample models for one trace of each case, beside AIC and BIC.",
     settings=compared,
