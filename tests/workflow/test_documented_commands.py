@@ -26,7 +26,10 @@ LEFT = {
     ],
     "groups.md": ["dishes.compared.json"],
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
-    "howto/trace.md": ["found.json", "drifting.json", "page.html", "traces.csv", "maxwell.json"],
+    "howto/trace.md": [
+        *("found.json", "drifting.json", "page.html", "traces.csv", "maxwell.json"),
+        *("posterior.json", "posterior.parquet"),
+    ],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
