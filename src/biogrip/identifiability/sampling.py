@@ -1,8 +1,8 @@
 """Samples of a posterior by an ensemble of walkers.
 
-First the walkers explore, by differences between one another; a mixture is fitted to where they
-have been; then proposals from it, which lead from any basin to any other, take turns with
-differences until means and tails are known well enough.
+First the walkers explore, by differences between one another and one coordinate at a time; a
+mixture is fitted to where they have been; then proposals from it, which lead from any basin to
+any other, take turns with the others until means and tails are known well enough.
 
 References
 ----------
@@ -11,9 +11,6 @@ References
 .. [2] C. J. F. ter Braak, A Markov chain Monte Carlo version of the genetic algorithm
    differential evolution, Statistics and Computing 16 (2006), 239-249: its moves, and steps of
    a whole difference between basins.
-.. [3] J. A. Vrugt et al., Accelerating Markov chain Monte Carlo simulation by differential
-   evolution with self-adaptive randomized subspace sampling, International Journal of
-   Nonlinear Sciences and Numerical Simulation 10 (2009), 273-290: moves of some coordinates.
 """
 
 from collections.abc import Sequence
@@ -48,6 +45,9 @@ _POWERS, _WIDER = (0.05, 0.25, 1.0), 8
 # Stretches, time and again, before proposals are learnt anew.
 _LEARNING = (2, 4)
 _COOLER = 0.8
+# Log-parameters are multiples of this, far less than any is known to. Differences of differences
+# would otherwise blow up the last bits, in which processors differ, until decisions do.
+_GRID = 2.0**-20
 
 
 @dataclass(frozen=True)
@@ -106,10 +106,8 @@ def sampled(
     # What was seen while proposals were still learnt is not kept.
     for length in (*_LEARNING, left):
         learnt = np.concatenate([ensemble.recent, wider[: len(ensemble.recent) // _WIDER]])
-        moves, stretches = (
-            _moves(posterior, axes, mixture_of(axes.of(learnt), rng)),
-            list[Stretch](),
-        )
+        moves = _moves(posterior, axes, mixture_of(axes.of(learnt), rng))
+        stretches: list[Stretch] = []
         while len(stretches) < length:
             stretches.append(ensemble.walk(_STRETCH, moves))
             left -= _STRETCH
@@ -151,7 +149,7 @@ def starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
     centres = np.repeat(optima, _ABOUT, axis=0)
     scales = np.exp(rng.uniform(np.log(_NEAREST), np.log(_FURTHEST), (len(centres), 1)))
     about = centres + scales * rng.standard_normal(centres.shape)
-    pool = np.concatenate([drawn, optima, np.clip(about, prior.low, prior.high)])
+    pool = _gridded(np.concatenate([drawn, optima, np.clip(about, prior.low, prior.high)]))
     density = posterior.log_density(pool)
     pool, density = pool[np.isfinite(density)], density[np.isfinite(density)]
     if len(pool) < count:
@@ -225,17 +223,17 @@ class _AlongValley(DEMove):
         others = [self._axes.of(np.concatenate(c))]
         found = super().get_proposal(self._axes.of(s), others, random)  # type: ignore[no-untyped-call]
         proposed, factors = found
-        return self._axes.back(proposed), factors
+        return _gridded(self._axes.back(proposed)), factors
 
 
 def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = None) -> Moves:
     """Return what takes turns: differences, single coordinates, and draws of a mixture if any."""
-    prior = posterior.prior
+    prior, plain = posterior.prior, Straightened(())
     found: list[tuple[emcee.moves.Move, float]] = [
-        (DEMove(), 0.15),
+        (_AlongValley(plain), 0.15),
         (_AlongValley(axes), 0.15),
         (_AlongValley(axes, gamma0=1.0), 0.1),
-        (MHMove(partial(_one_anew, Straightened(()), prior.low, prior.high)), 0.15),
+        (MHMove(partial(_one_anew, plain, prior.low, prior.high)), 0.15),
         (MHMove(partial(_one_anew, axes, *axes.range(prior.low, prior.high))), 0.15),
     ]
     if mixture is not None:
@@ -251,13 +249,17 @@ def _one_anew(
     rows = np.arange(len(walkers))
     moved = random.randint(walkers.shape[1], size=len(walkers))
     proposed[rows, moved] = random.uniform(low[moved], high[moved])
-    return axes.back(proposed), np.zeros(len(walkers))
+    return _gridded(axes.back(proposed)), np.zeros(len(walkers))
 
 
 def _of_mixture(
     axes: Straightened, mixture: Mixture, walkers: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
     """Draw from a mixture, wherever the walkers are."""
-    drawn = mixture.draw(len(walkers), random)
-    factors = mixture.log_density(axes.of(walkers)) - mixture.log_density(drawn)
-    return axes.back(drawn), factors
+    drawn = _gridded(axes.back(mixture.draw(len(walkers), random)))
+    before, after = (mixture.log_density(axes.of(points)) for points in (walkers, drawn))
+    return drawn, before - after
+
+
+def _gridded(log_parameters: Array) -> Array:
+    return np.rint(log_parameters / _GRID) * _GRID
