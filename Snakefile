@@ -24,6 +24,11 @@ rule all_maps:
         [file for file in ALL_FILES if "/robustness_" in file],
 
 
+rule all_posteriors:
+    input:
+        [file for file in ALL_FILES if Path(file).name.startswith("posterior")],
+
+
 rule all_tables:
     input:
         [file for file in ALL_FILES if file.startswith("results/tables/")],

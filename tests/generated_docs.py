@@ -30,6 +30,7 @@ PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
 NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
+CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
 _RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
@@ -116,12 +117,30 @@ def simulated_dishes() -> str:
 
 def published_table(name: str) -> str:
     """A published table, caption and all; until it is published, its name."""
-    file = PUBLISHED / "tables" / f"{name}.md"
-    if not file.is_file():
+    files = sorted(PUBLISHED.rglob(f"{name}.md"))
+    if not files:
         return (
             f"(Table `{name}`: in `results/tables/` after a run, not yet among the published ones.)"
         )
-    return file.read_text(encoding="utf-8").strip()
+    return files[0].read_text(encoding="utf-8").strip()
+
+
+def posterior_calibration() -> str:
+    """Whether ranks of true values among samples of posteriors are uniform."""
+    if not CALIBRATION.is_file():
+        return "(Not yet published.)"
+    return _table(
+        {
+            "quantity": row["quantity"],
+            "draws": f"{row['draws']}",
+            "converged": f"{row['converged']}",
+            "p-value": f"{row['p_value']:.2g}",
+            "in bins": f"{row['p_value_binned']:.2g}",
+            "in the 50 % interval": f"{row['coverage_50_percent']:.3g} %",
+            "in the 95 % interval": f"{row['coverage_95_percent']:.3g} %",
+        }
+        for row in pd.read_csv(CALIBRATION).to_dict("records")
+    )
 
 
 def identified_example() -> str:
@@ -209,6 +228,11 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
     ROOT / "docs" / "identifiability.md": {"noise": simulated_noise},
     ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
+    ROOT / "docs" / "posterior.md": {
+        "posterior": partial(published_table, "posterior"),
+        "posterior_models": partial(published_table, "posterior_models"),
+        "calibration": posterior_calibration,
+    },
     ROOT / "docs" / "model.md": {
         name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
     },

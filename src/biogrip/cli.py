@@ -148,6 +148,9 @@ def _identify_parser(stages: Any) -> None:
     )
     _trace_options(identify)
     identify.add_argument(
+        "--posterior", action="store_true", help="sample the posterior, too: some seconds a trace"
+    )
+    identify.add_argument(
         "--report", type=Path, metavar="PAGE", help="HTML file: all of it on a page, with figures"
     )
     identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file: a row a trace")
@@ -242,6 +245,7 @@ def _identify(options: argparse.Namespace) -> None:
         output=options.output,
         report=options.report,
         table=options.csv,
+        posterior=options.posterior,
         force=options.force,
     )
 

@@ -28,12 +28,8 @@ LEFT = {
     "design.md": ["designed.yaml", "designed.html"],
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
-        "found.json",
-        "drifting.json",
-        "coloured.json",
-        "page.html",
-        "traces.csv",
-        "maxwell.json",
+        *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
+        *("maxwell.json", "posterior.json", "posterior.parquet"),
     ],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),

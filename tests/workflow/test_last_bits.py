@@ -96,6 +96,26 @@ def test_other_code_paths_change_no_byte(
     assert [file for file in ours if ours[file] != reference[file]] == []
 
 
+POSTERIOR = """
+import hashlib
+from tests.identifiability import test_posterior as own
+problem = own.posed_for(own.MODELS["liquid_drop"], *own.trace_of("liquid_drop_2"))
+found = own.sample(own.posterior_of(problem), 3)
+print(hashlib.sha256(found.log_parameters.tobytes()).hexdigest())
+"""
+
+
+@pytest.fixture(scope="module")
+def walked() -> str:
+    return in_process({}, "-c", POSTERIOR)
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_other_code_paths_sample_the_same_posterior(name: str, walked: str) -> None:
+    """To the last bit, over some hundred thousand decisions."""
+    assert in_process(SETTINGS[name], "-c", POSTERIOR) == walked
+
+
 def test_the_settings_do_change_last_bits() -> None:
     """Else the tests above would compare nothing: exp and products really differ."""
     bits = {name: in_process(SETTINGS[name], "-c", BITS).split() for name in SETTINGS}

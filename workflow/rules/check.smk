@@ -8,6 +8,7 @@ OVERLAYS = {
     "robustness": (["robustness"], "all_maps", "robustness_*"),
     "readings": (["readings"], "readings", "readings"),
     "design": (["design", "designed"], "designed", "designed"),
+    "posterior": (["posterior"], "all_posteriors", "posterior*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 

@@ -97,6 +97,13 @@ class Quantity:
             return float(np.dot(self.sign, x))
         return float(self._sense * np.logaddexp.reduce(self._sense * x))
 
+    def logs(self, log_parameters: Array) -> Array:
+        """Logarithms of many, (n,), from log-parameters of shape (n, n_parameters)."""
+        x = log_parameters[:, list(self.members)]
+        if self.form == "product":
+            return np.sum(x * np.array(self.sign), axis=1)
+        return self._sense * np.logaddexp.reduce(self._sense * x, axis=1)
+
     def gradient(self, log_parameters: Array) -> Array:
         """Its derivatives by the log-parameters, (n_parameters,)."""
         x = log_parameters[list(self.members)]

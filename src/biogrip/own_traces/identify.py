@@ -7,7 +7,7 @@ from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
 from biogrip.own_traces.many_traces import Told, identify_traces, write_table
 from biogrip.own_traces.one_trace import Wanted, check_trace_file, study_of
-from biogrip.own_traces.outputs import check_output
+from biogrip.own_traces.outputs import SAMPLES, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import in_words, side_by_side
 from biogrip.study.trace_file import trace_file_problem
@@ -22,6 +22,7 @@ def identify(
     output: Path | None,
     report: Path | None,
     table: Path | None,
+    posterior: bool,
     force: bool,
 ) -> int:
     """Identify traces, write what is found, and print it.
@@ -36,6 +37,8 @@ def identify(
         JSON file, of a single trace; else each has one beside it.
     report, table
         HTML and CSV file, if they are wanted.
+    posterior
+        As of `Wanted`.
     force
         Whether to replace files that this program did not write.
 
@@ -56,12 +59,15 @@ def identify(
     problems = {trace: trace_file_problem(trace) for trace in traces}
     absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
     there = [trace for trace in traces if str(trace) not in absent]
-    wanted = Wanted((there or traces)[0], model, read_as, config)
-    if len(traces) > 1 and there:
+    wanted = Wanted((there or traces)[0], model, read_as, config, posterior)
+    samples = posterior
+    if there and (len(traces) > 1 or config is not None):
         # What is wrong with all of them is said once.
-        study_of(wanted)
+        (case,) = study_of(wanted).cases.values()
+        samples = case.posterior is not None
     outputs = {trace: output or trace.with_suffix(".identified.json") for trace in there}
-    written = [*outputs.values(), *filter(None, (report, table))]
+    drawn = [path.with_suffix(SAMPLES) for path in outputs.values()] if samples else []
+    written = [*outputs.values(), *drawn, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     refuse_inputs(written, [*traces, *filter(None, [config])])
@@ -82,6 +88,7 @@ def identify(
         page.write(told.refused, report)
     print(in_words(told.found[0]) if len(traces) == 1 else _of_many(told))
     said = [outputs[Path(each["trace"])] for each in told.found]
+    said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     print(f"Written to {', '.join(map(str, said))}.")
     return 1 if told.refused else 0

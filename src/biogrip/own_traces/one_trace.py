@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,13 @@ from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import assumed, by_default, versions
 from biogrip.own_traces.models_tried import models_tried
-from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.second_opinion import second_opinion
+from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
-from biogrip.products.stages import judgement, recording
+from biogrip.products.stages import judgement, posterior, recording
 from biogrip.progress import Progress
 from biogrip.response.nuisance import nuisance_basis, within
 from biogrip.response.simulation import simulated_rotation
@@ -47,12 +49,15 @@ class Wanted:
         Where in the file it stands, and what the instrument added.
     config
         YAML file laid over the default study: gripper, protocol, search range.
+    posterior
+        Whether the posterior is sampled even if the config does not say so.
     """
 
     trace: Path
     model: str
     read_as: ReadAs
     config: Path | None
+    posterior: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,11 +72,14 @@ class Identified:
         What was assumed.
     recorded
         The trace.
+    samples : (n, n_parameters)
+        Of its posterior, SI units, if it was sampled.
     """
 
     data: dict[str, Any]
     problem: CaseProblem
     recorded: Measurements
+    samples: Array | None = None
 
 
 def identify_trace(wanted: Wanted, output: Path) -> Identified:
@@ -82,7 +90,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     wanted
         What to identify.
     output
-        Is written with what is said of it, JSON.
+        Is written with what is said of it, JSON; samples of its posterior beside it, Parquet.
 
     Raises
     ------
@@ -91,7 +99,8 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     """
     study = study_of(wanted)
     (case,) = study.cases.values()
-    with Progress(str(wanted.trace), 5, live=True) as progress:
+    pieces = 5 + (case.posterior is not None)
+    with Progress(str(wanted.trace), pieces, live=True) as progress:
         recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
@@ -124,8 +133,22 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             "by_default": by_default(wanted.config),
             "versions": versions(),
         }
+        samples = None
+        if case.posterior is not None:
+            progress.done()
+            progress.doing("sampling the posterior")
+            data["posterior"], drawn = posterior.posterior_of_trace(
+                posterior.settings_of(study, case),
+                posed,
+                partial(fit.problem_of, posed, recorded.time_s, recorded.rotation_rad[0]),
+                limits_in(said),
+                progress.within,
+            )
+            words = {WRITTEN_BY: __version__}
+            write_samples(output.with_suffix(SAMPLES), posed.searched, drawn, words)
+            samples = np.exp(drawn)
     write_text(output, json.dumps(data, indent=1) + "\n")
-    return Identified(data, posed, recorded)
+    return Identified(data, posed, recorded, samples)
 
 
 def check_trace_file(trace: Path) -> None:
@@ -161,6 +184,8 @@ def study_of(wanted: Wanted) -> Study:
     measurement = {**wanted.read_as.block, "file": str(wanted.trace)}
     # A config may name cases of its own, for the workflow.
     merged.pop("only", None)
+    if wanted.posterior:
+        merged.setdefault("posterior", {})
     merged["cases"] = {
         case: {
             "sample": {"model": sample.name, "branches": sample.branches},

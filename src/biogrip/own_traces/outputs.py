@@ -6,9 +6,13 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_of
+from biogrip.products.files.parquet import column_names
 
 WRITTEN_BY = "written_by_biogrip"
 """Tells our files from others, which are not replaced."""
+
+SAMPLES = ".parquet"
+"""Ending of a file with samples of a posterior, in the place of ``.json``."""
 
 _HEAD_BYTES = 500
 _LONGEST = 100_000
@@ -54,11 +58,13 @@ def _is_ours(output: Path) -> bool:
     try:
         if output.suffix == ".json":
             return WRITTEN_BY in json.loads(output.read_bytes())
+        if output.suffix == SAMPLES:
+            return WRITTEN_BY in column_names(output)
         with output.open("rb") as stream:
             # The header of a table, however many quantities it has; the first lines of a page.
             head = (
                 stream.readline(_LONGEST) if output.suffix == ".csv" else stream.read(_HEAD_BYTES)
             )
             return WRITTEN_BY.encode() in head
-    except (OSError, ValueError, TypeError, RecursionError):
+    except (BiogripError, OSError, ValueError, TypeError, RecursionError):
         return False

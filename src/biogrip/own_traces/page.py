@@ -13,7 +13,13 @@ from biogrip import __version__
 from biogrip.files import write_text
 from biogrip.own_traces.one_trace import Identified
 from biogrip.own_traces.outputs import WRITTEN_BY
-from biogrip.own_traces.words import labels_of, limits_in_short, taken_for_granted
+from biogrip.own_traces.words import (
+    evidence_in_words,
+    labels_of,
+    limits_in_short,
+    taken_for_granted,
+)
+from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.fit import draw_fit
 from biogrip.products.figures.profiles import Settings as ProfileSettings
 from biogrip.products.figures.profiles import draw_profiles
@@ -32,6 +38,7 @@ class Page:
     def add(self, identified: Identified) -> None:
         """Draw what is said of a trace."""
         data = identified.data
+        compared = data["posterior"]["evidence"] if "posterior" in data else []
         with styled():
             figures = [(title, embedded(drawn)) for title, drawn in _figures(identified).items()]
         self._traces.append(
@@ -40,6 +47,7 @@ class Page:
                 "figures": figures,
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
                 "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
+                "evidence_in_words": evidence_in_words(compared),
                 "granted": taken_for_granted(data) if data["by_default"] else None,
             }
         )
@@ -62,11 +70,16 @@ def _figures(identified: Identified) -> dict[str, Figure]:
     found = {item["quantity"]: item["value"] for item in data["quantities"]}
     values = {name: found[name] for name in problem.searched.names}
     fit = fit_of(problem, {**problem.fixed, **values}, identified.recorded, 0)
-    return {
+    figures = {
         "The trace, its best fit, and what that leaves": draw_fit(fit, "best fit", ""),
         "What the fit leaves: over time, its correlation, its distribution": draw_residuals(fit),
         "Profile likelihoods": draw_profiles(ProfileSettings("", {}), data),
     }
+    if identified.samples is not None:
+        figures["The posterior: every parameter alone, and against each other"] = draw_corner(
+            problem.searched.parameters, identified.samples, data["posterior"], {}, ""
+        )
+    return figures
 
 
 def embedded(drawn: Figure) -> str:

@@ -5,6 +5,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
 from tabulate import tabulate
 
 from biogrip.digits import with_unit
@@ -14,6 +15,9 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
+
+STRONG = 3.0
+"""Natural logarithm of a ratio of evidences from which on it is strong (Kass and Raftery 1995)."""
 
 _COLOURS = {DETERMINED: 32, BOUNDED_ABOVE: 33, BOUNDED_BELOW: 33, NOT_DETERMINED: 31}
 
@@ -40,8 +44,39 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
     lines += [f"Note: {note}" for note in found["notes"]]
     lines += [found["advice"]] if found["advice"] else []
+    lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def _posterior(told: Mapping[str, Any]) -> list[str]:
+    """Say what samples of a posterior say."""
+    width = max(len(item["quantity"]) for item in told["quantities"])
+    prior = (
+        f"prior: {', '.join(told['prior'])} as given, else log-uniform over the search range"
+        if told["prior"]
+        else "prior: log-uniform over the search range"
+    )
+    return [
+        f"Posterior, median and {100 * told['confidence']:g} % interval ({prior}):",
+        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in told["quantities"]),
+        *(f"  {item['why']}" for item in told["quantities"] if item["against_profile"] != "agrees"),
+        told["in_words"],
+        *evidence_in_words(told["evidence"]),
+    ]
+
+
+def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Say in a sentence which models the evidence is for, if it was asked for."""
+    if not rows:
+        return []
+    best = min(rows, key=lambda row: row["delta_log_evidence"])
+    close = [row for row in rows if row is not best and row["delta_log_evidence"] < STRONG]
+    near = ", ".join(row["title"] for row in close)
+    also = f"; less than {np.exp(STRONG):.2g} times lower is that of {near}" if near else ""
+    unreliable = [row["title"] for row in rows if not row["reliable"]]
+    but = f" Not to be relied on: {', '.join(unreliable)}." if unreliable else ""
+    return [f"The evidence is highest for the {best['title']}{also}.{but}"]
 
 
 def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:

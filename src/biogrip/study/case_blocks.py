@@ -11,6 +11,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
+from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
@@ -104,6 +105,13 @@ class Shared:
     ]
     identifiability: Annotated[Identifiability, Key()]
     design: Annotated[DesignSettings | None, Key()] = None
+    posterior: Annotated[
+        PosteriorSettings | None,
+        Key(
+            "The posterior of the first trace, sampled if this block is there, even an empty one, "
+            "`{}`."
+        ),
+    ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -176,6 +184,7 @@ class CaseBlock(Shared):
         yield from self._contact_problems()
         yield from self._design_problems()
         yield from self.of_methods.problems_of(self._genes)
+        yield from self._posterior_problems()
         if self.sample.sample.model.power_law:
             yield from self._band_problems()
         if not self.recorded:
@@ -221,6 +230,16 @@ class CaseBlock(Shared):
         if missing:
             text = f"has none for {', '.join(sorted(missing))}, of which nothing else is known."
             yield ("design", "ranges"), text
+
+    def _posterior_problems(self) -> Iterator[Problem]:
+        if self.posterior is None:
+            return
+        if self.models.identification != "linear":
+            text = "is sampled with hundreds of thousands of responses; allowed with it is "
+            yield ("posterior",), f"{text}models.identification: linear."
+        model = self.sample.sample.model
+        for path, text in self.posterior.problems_of(model, list(self.known)):
+            yield ("posterior", *path), text
 
     def _fixed_problems(self) -> Iterator[Problem]:
         model = self.sample.sample.model

@@ -10,6 +10,7 @@ from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import Sample, with_fixed
 from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import Published, Truth
+from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
@@ -211,6 +212,11 @@ class Case:
         return self.block.identifiability.confidence
 
     @property
+    def posterior(self) -> PosteriorSettings | None:
+        """How the posterior of its first trace is sampled, if it is."""
+        return self.block.posterior
+
+    @property
     def coverage_seeds(self) -> int:
         """Over how many seeds intervals are held against the truth: none without noise."""
         tried = not self.recorded and not self.noise.absent
@@ -357,6 +363,11 @@ class Study:
     def covered(self) -> list[str]:
         """Cases whose intervals are tested."""
         return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
+
+    @property
+    def sampled(self) -> list[str]:
+        """Cases whose posterior is sampled."""
+        return [name for name, case in self.cases.items() if case.posterior is not None]
 
     @property
     def published(self) -> list[str]:

@@ -64,7 +64,7 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
                 settings.case,
                 name,
                 item["unit"],
-                _target(name, settings.parameters),
+                target_of(name, settings.parameters),
                 item["verdict"],
                 item["value"] if item["verdict"] == "determined" else None,
                 item["low"],
@@ -92,7 +92,8 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
     return Table(caption, columns, rows)
 
 
-def _target(quantity: str, parameters: Mapping[str, float]) -> float | None:
+def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
+    """Return the true value of a parameter or a sum of some, None where it is unknown."""
     names = quantity.split(" + ")
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
 

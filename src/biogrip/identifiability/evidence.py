@@ -1,0 +1,76 @@
+"""How well a model with its prior foretells a trace: the evidence, by importance sampling.
+
+References
+----------
+.. [1] R. E. Kass and A. E. Raftery, Bayes factors, Journal of the American Statistical
+   Association 90 (1995), 773-795: section 4.3, importance sampling.
+.. [2] A. Vehtari, D. Simpson, A. Gelman, Y. Yao and J. Gabry, Pareto smoothed importance
+   sampling, Journal of Machine Learning Research 25 (2024), 1-58: what k-hat says.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.identifiability.mixture import mixture_of
+from biogrip.identifiability.posterior import Posterior
+from biogrip.identifiability.sampling import Samples
+from biogrip.identifiability.straightened import straightened
+
+MOST_K_HAT = 0.7
+"""Above it, the largest weights are too few to tell how large weights become [2]."""
+
+_DRAWN = 20_000
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Integral of likelihood times prior.
+
+    Parameters
+    ----------
+    log
+        Its natural logarithm, densities of the trace being per rad.
+    error
+        Standard deviation of that.
+    k_hat
+        Shape of the tail of the importance weights.
+    """
+
+    log: float
+    error: float
+    k_hat: float
+
+    @property
+    def reliable(self) -> bool:
+        """Whether the weights allow a judgement."""
+        return self.k_hat <= MOST_K_HAT
+
+
+def evidence_of(posterior: Posterior, samples: Samples, rng: np.random.Generator) -> Evidence:
+    """Weigh points of a mixture that follows the samples.
+
+    Parameters
+    ----------
+    posterior, samples
+        What was sampled.
+    rng
+        Draws the points.
+    """
+    from arviz_stats.base import array_stats
+
+    axes = straightened(posterior.problem.residuals.model)
+    visited = samples.log_parameters.reshape(-1, samples.log_parameters.shape[2])
+    mixture = mixture_of(axes.of(visited), rng)
+    points = mixture.draw(_DRAWN, rng)
+    weights = posterior.log_density(axes.back(points)) - mixture.log_density(points)
+    largest = np.max(weights)
+    relative = np.exp(weights - largest)
+    mean = float(np.mean(relative))
+    # It takes log-ratios the other way round.
+    _, k_hat = array_stats.psislw(-weights[np.isfinite(weights)])
+    return Evidence(
+        float(largest + np.log(mean)),
+        float(np.std(relative) / (mean * np.sqrt(_DRAWN))),
+        float(k_hat),
+    )

@@ -1,0 +1,101 @@
+"""A mixture of multivariate t distributions that follows a cloud of samples.
+
+What a trace tells is a hill in some directions and a plateau over decades in others.
+Clusters of samples (k-means), a t distribution each, follow both: independent samples
+are proposed from it, and the evidence is weighed with it.
+
+References
+----------
+.. [1] D. Arthur and S. Vassilvitskii, k-means++: the advantages of careful seeding, Proceedings
+   of the 18th annual ACM-SIAM Symposium on Discrete Algorithms, 2007, 1027-1035.
+.. [2] S. Kotz and S. Nadarajah, Multivariate t Distributions and Their Applications, Cambridge
+   University Press, 2004, eq. (1.1).
+"""
+
+from dataclasses import dataclass
+from math import lgamma
+
+import numpy as np
+
+from biogrip.arrays import Array
+
+FREEDOM = 5
+"""Degrees of freedom: tails heavy enough for importance weights to be bounded."""
+
+_MOST_CLUSTERS = 60
+# Points a cluster has, a dimension; and how many of all that it is fitted to.
+_POINTS, _MOST_POINTS = 5, 10_000
+# A share of the weight is divided equally: where samples are few, proposals must not be fewer.
+_ALIKE = 0.2
+# A share of the whole cloud's variance that no direction of a cluster falls short of.
+_LEAST_VARIANCE = 1e-10
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Weighted t distributions.
+
+    Parameters
+    ----------
+    weights : (n_clusters,)
+        Sum to one.
+    centres : (n_clusters, n_dimensions)
+    factors : (n_clusters, n_dimensions, n_dimensions)
+        Lower triangles whose squares are the scale matrices.
+    """
+
+    weights: Array
+    centres: Array
+    factors: Array
+
+    def log_density(self, points: Array) -> Array:
+        """Logarithm of the density at points (n, n_dimensions), (n,)."""
+        size = points.shape[1]
+        inverse = np.linalg.inv(self.factors)
+        scaled = np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres)
+        distance = np.sum(scaled**2, axis=2)
+        logs = np.log(np.diagonal(self.factors, axis1=1, axis2=2))
+        constant = lgamma((FREEDOM + size) / 2) - lgamma(FREEDOM / 2)
+        constant -= 0.5 * size * np.log(FREEDOM * np.pi)
+        peaks = np.log(self.weights) + constant - np.sum(logs, axis=1)
+        each = peaks - 0.5 * (FREEDOM + size) * np.log1p(distance / FREEDOM)
+        found: Array = np.logaddexp.reduce(each, axis=1)
+        return found
+
+    def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Array:
+        """Draw points, (count, n_dimensions)."""
+        which = rng.choice(len(self.weights), size=count, p=self.weights)
+        normal = rng.standard_normal((count, self.centres.shape[1]))
+        normal /= np.sqrt(rng.chisquare(FREEDOM, size=(count, 1)) / FREEDOM)
+        drawn: Array = self.centres[which] + np.einsum("nij,nj->ni", self.factors[which], normal)
+        return drawn
+
+
+def mixture_of(points: Array, rng: np.random.Generator) -> Mixture:
+    """Fit a mixture to a cloud of points.
+
+    Parameters
+    ----------
+    points : (n, n_dimensions)
+        Samples; some dozens a dimension at least.
+    rng
+        Seeds the clusters.
+    """
+    from scipy.cluster.vq import kmeans2
+
+    points = points[:: -(-len(points) // _MOST_POINTS)]
+    count, size = points.shape
+    spread = np.std(points, axis=0)
+    clusters = min(_MOST_CLUSTERS, max(count // (_POINTS * size), 1))
+    _, own = kmeans2(points / spread, clusters, minit="++", seed=rng)
+    found, own, sizes = np.unique(own, return_inverse=True, return_counts=True)
+    centres = np.array([np.mean(points[own == cluster], axis=0) for cluster in range(len(found))])
+    away = points - centres[own]
+    squares = np.zeros((len(found), size, size))
+    np.add.at(squares, own, away[:, :, None] * away[:, None, :])
+    usual = np.sum(squares, axis=0) / count + np.diag(_LEAST_VARIANCE * spread**2)
+    # Of a cluster of few points, the others' shape is a part: as if it had so many points of it.
+    borrowed = size + 2
+    scales = (squares + borrowed * usual) / (sizes + borrowed)[:, None, None]
+    weights = (1 - _ALIKE) * sizes / count + _ALIKE / len(found)
+    return Mixture(weights, centres, np.linalg.cholesky(scales))

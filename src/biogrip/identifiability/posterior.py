@@ -1,0 +1,83 @@
+"""The posterior of a sample's parameters, the noise's level being taken account of.
+
+References
+----------
+.. [1] G. E. P. Box and G. C. Tiao, Bayesian Inference in Statistical Analysis, Addison-Wesley,
+   1973, sections 1.3 and 2.7: noise of unknown level under Jeffreys' prior.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from math import lgamma, log, pi
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.prior import Prior
+from biogrip.identify.problem import Problem
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Density of the log-parameters given a trace, up to the evidence.
+
+    Parameters
+    ----------
+    problem
+        The trace and the model.
+    prior
+        What is known beforehand.
+    noise_rad
+        Standard deviation of the noise if it is known.
+    """
+
+    problem: Problem
+    prior: Prior
+    noise_rad: float | None = None
+
+    def log_density(self, log_parameters: Array, power: float = 1.0) -> Array:
+        """Logarithm of likelihood times prior; a sample's does not depend on the others.
+
+        Parameters
+        ----------
+        log_parameters : (n, n_parameters)
+        power
+            To which the likelihood is raised.
+
+        Returns
+        -------
+        (n,)
+            Minus infinity where the prior forbids a sample, or the model has no answer.
+        """
+        density = self.prior.log_density(log_parameters)
+        allowed = np.flatnonzero(np.isfinite(density))
+        if len(allowed):
+            misfit_rad = self.misfit(np.exp(log_parameters[allowed]))
+            density[allowed] += power * self.log_likelihood(misfit_rad)
+        return np.where(np.isnan(density), -np.inf, density)
+
+    def log_likelihood(self, misfit_rad: Array) -> Array:
+        r"""Logarithm of the likelihood of samples with these misfits, (n,).
+
+        With S the sum of squares and nu the samples less what the instrument may have
+        added, whose coefficients have no other prior than a flat one: where the noise
+        is known, -nu/2 ln(2 pi sigma^2) - S/(2 sigma^2). Where it is not, sigma has
+        Jeffreys' prior 1/sigma, and its integral is
+
+            Gamma(nu/2) / 2 (pi S)^(-nu/2)                                [1], section 1.3
+        """
+        residuals = self.problem.residuals
+        half, square_sum = 0.5 * residuals.free, residuals.samples * misfit_rad**2
+        if self.noise_rad is not None:
+            variance = self.noise_rad**2
+            return -half * log(2 * pi * variance) - 0.5 * square_sum / variance
+        return lgamma(half) - log(2) - half * np.log(pi * square_sum)
+
+    @cached_property
+    def misfit(self) -> Callable[[Array], Array]:
+        """RMS misfit in rad of parameters of shape (n, n_parameters)."""
+        # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
+        # loses, the rarer it is that two processors disagree about one.
+        residuals = self.problem.residuals
+        return residuals.condensed_misfit if residuals.condensable else self.problem.misfit

@@ -1,0 +1,70 @@
+"""What is known of a sample beforehand, and how long its posterior may be sampled."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from biogrip.errors import nearest
+from biogrip.experiment.sample import SampleModel
+from biogrip.keys import Key, Problem
+
+
+@dataclass(frozen=True)
+class LogNormal:
+    """A parameter whose logarithm is normal beforehand, within the search range."""
+
+    median: Annotated[float, Key("Median, SI units.", above=0, high=1e12)]
+    spread: Annotated[float, Key("Standard deviation of the natural logarithm.", above=0, high=100)]
+
+
+@dataclass(frozen=True)
+class PosteriorSettings:
+    """Samples of the posterior of the first trace; nothing is sampled without this block."""
+
+    prior: Annotated[
+        Mapping[str, LogNormal],
+        Key(
+            "What is known beforehand, by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
+            "being the standard deviation of the natural logarithm. All others are uniform in "
+            "their logarithms over the search range."
+        ),
+    ] = field(default_factory=dict)
+    walkers: Annotated[
+        int, Key("Samples that move together. By default 100.", low=20, high=10_000)
+    ] = 100
+    most_steps: Annotated[
+        int,
+        Key(
+            "Steps of every walker after which sampling stops although it has not converged. By "
+            "default 5000.",
+            low=1000,
+            high=1_000_000,
+        ),
+    ] = 5000
+    evidence: Annotated[
+        bool,
+        Key(
+            "Whether the models of `model_selection` are sampled, too, and their evidence is "
+            "compared. By default false."
+        ),
+    ] = False
+
+    def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
+        """Find priors of what a model does not have, or of branches that are told by their order.
+
+        Parameters
+        ----------
+        model
+            Of the sample.
+        known
+            Parameters that are not identified.
+        """
+        searched = [name for name in model.names if name not in known]
+        branches = [name for pair in model.branches for name in pair] * (len(model.branches) > 1)
+        for name in self.prior:
+            if name not in searched:
+                text = f"found {name}, allowed is what is identified, {', '.join(searched)}."
+                yield ("prior", name), text + nearest(name, searched)
+            elif name in branches:
+                text = "is of one of several branches, which are named by the order in which they "
+                yield ("prior", name), f"{text}relax; allowed are priors of the other parameters."

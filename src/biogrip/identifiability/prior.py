@@ -1,0 +1,110 @@
+"""What is known of a sample before its trace is looked at."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from math import factorial
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import SampleModel
+from biogrip.identifiability.posterior_settings import LogNormal
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal distributions of the log-parameters, cut off at the ends of the search range.
+
+    One of no precision is uniform. Branches relax in their order, the fastest first:
+    a trace is the same whichever is called which.
+
+    Parameters
+    ----------
+    model
+        Whose parameters.
+    low, high : (n_parameters,)
+        Ends of the range.
+    centre, precision : (n_parameters,)
+        Logarithms of medians, before the cut, and one over standard deviations.
+    """
+
+    model: SampleModel
+    low: Array
+    high: Array
+    centre: Array
+    precision: Array
+
+    def log_density(self, log_parameters: Array) -> Array:
+        """Logarithm of the density of the log-parameters, which integrates to one.
+
+        Parameters
+        ----------
+        log_parameters : (n, n_parameters)
+
+        Returns
+        -------
+        (n,)
+            Minus infinity outside the range, and where branches are not in their order.
+        """
+        away = (log_parameters - self.centre) * self.precision
+        density = self._largest - 0.5 * np.sum(away**2, axis=1)
+        allowed = np.all((log_parameters >= self.low) & (log_parameters <= self.high), axis=1)
+        branches = self.model.free_branches
+        if len(branches) > 1:
+            springs, dampers = np.array(branches).T
+            times = log_parameters[:, dampers] - log_parameters[:, springs]
+            allowed &= np.all(np.diff(times, axis=1) >= 0, axis=1)
+        return np.where(allowed, density, -np.inf)
+
+    def draw(self, count: int, rng: np.random.Generator) -> Array:
+        """Draw log-parameters, (count, n_parameters)."""
+        from scipy.special import ndtri
+
+        share = rng.random((count, len(self.low)))
+        below, above = self._within
+        drawn = self.low + share * (self.high - self.low)
+        told = self.precision > 0
+        z = ndtri(below + share * (above - below))[:, told]
+        drawn[:, told] = self.centre[told] + z / self.precision[told]
+        drawn = np.clip(drawn, self.low, self.high)
+        return np.take_along_axis(drawn, self.model.in_order(np.exp(drawn)), axis=1)
+
+    @property
+    def _within(self) -> tuple[Array, Array]:
+        """Shares of the normal distributions below both ends of the range."""
+        from scipy.special import ndtr
+
+        ends = (self.low, self.high)
+        below, above = (ndtr((end - self.centre) * self.precision) for end in ends)
+        return below, above
+
+    @cached_property
+    def _largest(self) -> float:
+        """Logarithm of the density at the centre."""
+        below, above = self._within
+        told = self.precision > 0
+        of_normal = np.log(self.precision[told] / np.sqrt(2 * np.pi) / (above - below)[told])
+        of_uniform = -np.log((self.high - self.low)[~told])
+        orders = factorial(max(len(self.model.free_branches), 1))
+        return float(np.sum(of_normal) + np.sum(of_uniform) + np.log(orders))
+
+
+def prior_of(model: SampleModel, low: Array, high: Array, told: Mapping[str, LogNormal]) -> Prior:
+    """Return the prior of a model's parameters.
+
+    Parameters
+    ----------
+    model
+        Whose parameters.
+    low, high : (n_parameters,)
+        Logarithms of the ends of the search range.
+    told
+        What is known beforehand, by name; the others are log-uniform.
+    """
+    centre, precision = 0.5 * (low + high), np.zeros(len(low))
+    for index, name in enumerate(model.names):
+        if name in told:
+            centre[index] = np.log(told[name].median)
+            precision[index] = 1 / told[name].spread
+    return Prior(model, low, high, centre, precision)

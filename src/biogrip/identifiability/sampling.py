@@ -1,0 +1,265 @@
+"""Samples of a posterior by an ensemble of walkers.
+
+First the walkers explore, by differences between one another and one coordinate at a time; a
+mixture is fitted to where they have been; then proposals from it, which lead from any basin to
+any other, take turns with the others until means and tails are known well enough.
+
+References
+----------
+.. [1] D. Foreman-Mackey et al., emcee: the MCMC hammer, Publications of the Astronomical
+   Society of the Pacific 125 (2013), 306-312: the sampler.
+.. [2] C. J. F. ter Braak, A Markov chain Monte Carlo version of the genetic algorithm
+   differential evolution, Statistics and Computing 16 (2006), 239-249: its moves, and steps of
+   a whole difference between basins.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import emcee
+import numpy as np
+from emcee.moves import DEMove, MHMove
+
+from biogrip.arrays import Array
+from biogrip.errors import BiogripError
+from biogrip.identifiability.convergence import Convergence, convergence_of
+from biogrip.identifiability.mixture import Mixture, mixture_of
+from biogrip.identifiability.posterior import Posterior
+from biogrip.identifiability.posterior_settings import PosteriorSettings
+from biogrip.identifiability.straightened import Straightened, straightened
+from biogrip.identify.answer import Progress
+from biogrip.identify.local_fit import FAIR, local_fit
+from biogrip.identify.many_fits import ManyFits, fit_together
+
+# Points of the prior, the best of which are fitted from, and points about each optimum.
+_DRAWN, _FITTED, _ABOUT = 2000, 32, 200
+# About an optimum they are so far away, in e-folds, at least and at most.
+_NEAREST, _FURTHEST = 1e-3, 10.0
+# Steps between looks at what has been found; proposals are learnt from every other.
+_STRETCH, _KEPT = 250, 2
+# Powers of the likelihood, one a stretch, in which walkers explore: where it is flatter, they
+# find their way from one basin to another. Of what was seen under the last but one, a few points
+# are learnt from to the end, so that proposals are nowhere much rarer than samples.
+_POWERS, _WIDER = (0.05, 0.25, 1.0), 8
+# Stretches, time and again, before proposals are learnt anew.
+_LEARNING = (2, 4)
+_COOLER = 0.8
+# Log-parameters are multiples of this, far less than any is known to. Differences of differences
+# would otherwise blow up the last bits, in which processors differ, until decisions do.
+_GRID = 2.0**-20
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What the walkers visited once they had found their way.
+
+    Parameters
+    ----------
+    log_parameters : (n_steps, n_walkers, n_parameters)
+    log_density : (n_steps, n_walkers)
+        Of the posterior, up to the evidence.
+    accepted
+        Share of the proposals.
+    convergence
+        How far the samples can be relied on.
+    """
+
+    log_parameters: Array
+    log_density: Array
+    accepted: float
+    convergence: Convergence
+
+
+def sampled(
+    posterior: Posterior, settings: PosteriorSettings, rng: np.random.Generator, progress: Progress
+) -> Samples:
+    """Sample a posterior until it has converged, or for as many steps as are allowed.
+
+    Parameters
+    ----------
+    posterior
+        What is sampled.
+    settings
+        How many walkers and steps.
+    rng
+        The only source of randomness.
+    progress
+        Is told of the evaluations, after every stretch.
+
+    Raises
+    ------
+    BiogripError
+        If the model has no answer anywhere.
+    """
+    axes = straightened(posterior.problem.residuals.model)
+    walkers = starts(posterior, settings.walkers, rng)
+    # The sampler draws from NumPy's older generator, whose streams never change.
+    seed = np.random.RandomState(np.random.MT19937(int(rng.integers(2**63)))).get_state()
+    ensemble = _Ensemble(posterior, emcee.State(walkers, random_state=seed), progress)
+    moves = _moves(posterior, axes)
+    for power in _POWERS:
+        wider = ensemble.recent
+        ensemble.walk(_STRETCH, moves, power)
+        moves = _moves(posterior, axes, mixture_of(axes.of(ensemble.recent), rng))
+    left = settings.most_steps - len(_POWERS) * _STRETCH
+    # What was seen while proposals were still learnt is not kept.
+    for length in (*_LEARNING, left):
+        learnt = np.concatenate([ensemble.recent, wider[: len(ensemble.recent) // _WIDER]])
+        moves = _moves(posterior, axes, mixture_of(axes.of(learnt), rng))
+        stretches: list[Stretch] = []
+        while len(stretches) < length:
+            stretches.append(ensemble.walk(_STRETCH, moves))
+            left -= _STRETCH
+            found = _samples(stretches, axes)
+            if found.convergence.reached or left < _STRETCH:
+                return found
+        ensemble.recent = found.log_parameters[::_KEPT].reshape(-1, walkers.shape[1])
+    return found
+
+
+def _samples(stretches: Sequence["Stretch"], axes: Straightened) -> Samples:
+    chains, densities, accepted = map(list, zip(*stretches, strict=True))
+    together = np.concatenate(chains)
+    convergence = convergence_of(together, axes)
+    return Samples(together, np.concatenate(densities), float(np.mean(accepted)), convergence)
+
+
+def starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
+    """Choose where walkers set out: by their densities, from the prior and about all optima.
+
+    Returns
+    -------
+    (count, n_parameters)
+        Log-parameters.
+
+    Raises
+    ------
+    BiogripError
+        If the model has no answer anywhere.
+    """
+    prior, problem = posterior.prior, posterior.problem
+    drawn = prior.draw(_DRAWN, rng)
+    order = np.argsort(-posterior.log_density(drawn).astype(np.float32), kind="stable")
+    best = drawn[order[:_FITTED]]
+    if fit_together([problem]):
+        optima = ManyFits([problem]).fitted(best, np.zeros(len(best), dtype=np.int64), FAIR).x
+    else:
+        optima = np.array([local_fit(problem, start, FAIR).log_parameters for start in best])
+    centres = np.repeat(optima, _ABOUT, axis=0)
+    scales = np.exp(rng.uniform(np.log(_NEAREST), np.log(_FURTHEST), (len(centres), 1)))
+    about = centres + scales * rng.standard_normal(centres.shape)
+    pool = _gridded(np.concatenate([drawn, optima, np.clip(about, prior.low, prior.high)]))
+    density = posterior.log_density(pool)
+    pool, density = pool[np.isfinite(density)], density[np.isfinite(density)]
+    if len(pool) < count:
+        raise BiogripError(
+            "posterior: the model has no answer in most of the search range; allowed is a "
+            "narrower one."
+        )
+    share = _tempered(density - density.max(), count)
+    chosen: Array = pool[rng.choice(len(pool), size=count, replace=False, p=share)]
+    return chosen
+
+
+def _tempered(log_weights: Array, count: int) -> Array:
+    """Weights, flattened until so many points share them."""
+    power = 1.0
+    while True:
+        weights = np.exp(power * log_weights)
+        weights /= weights.sum()
+        if 1 / np.sum(weights**2) > 0.5 * count and np.count_nonzero(weights) >= count:
+            return weights
+        power *= _COOLER
+
+
+Moves = Sequence[tuple[emcee.moves.Move, float]]
+Stretch = tuple[Array, Array, float]
+
+
+class _Ensemble:
+    """Walkers, and where they are."""
+
+    def __init__(self, posterior: Posterior, state: emcee.State, progress: Progress) -> None:
+        self._posterior = posterior
+        self._state = state
+        self._progress = progress
+        self._evaluations = 0
+        self.recent = state.coords
+
+    def walk(self, steps: int, moves: Moves, power: float = 1.0) -> Stretch:
+        """Take steps, under a power of the likelihood.
+
+        Returns
+        -------
+        Stretch
+            Where the walkers were, the logarithm of the density there, and the share of
+            proposals that were accepted.
+        """
+        count, size = self._state.coords.shape
+        density = partial(self._posterior.log_density, power=power)
+        sampler = emcee.EnsembleSampler(count, size, density, moves=moves, vectorize=True)
+        start = emcee.State(self._state.coords, random_state=self._state.random_state)
+        self._state = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+        chain = sampler.get_chain()
+        self.recent = chain[steps // 2 :: _KEPT].reshape(-1, size)
+        self._evaluations += count * steps
+        best = self._state.coords[[np.argmax(self._state.log_prob)]]
+        self._progress(self._evaluations, float(self._posterior.misfit(np.exp(best))[0]))
+        return chain, sampler.get_log_prob(), float(np.mean(sampler.acceptance_fraction))
+
+
+class _AlongValley(DEMove):  # type: ignore[misc]
+    """Differential evolution in coordinates whose Jacobian determinant is one."""
+
+    def __init__(self, axes: Straightened, gamma0: float | None = None) -> None:
+        super().__init__(gamma0=gamma0)
+        self._axes = axes
+
+    def get_proposal(
+        self, s: Array, c: list[Array], random: np.random.RandomState
+    ) -> tuple[Array, Array]:
+        """Propose for walkers `s`, by differences of the others, `c`."""
+        others = [self._axes.of(np.concatenate(c))]
+        found = super().get_proposal(self._axes.of(s), others, random)
+        proposed, factors = found
+        return _gridded(self._axes.back(proposed)), factors
+
+
+def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = None) -> Moves:
+    """Return what takes turns: differences, single coordinates, and draws of a mixture if any."""
+    prior, plain = posterior.prior, Straightened(())
+    found: list[tuple[emcee.moves.Move, float]] = [
+        (_AlongValley(plain), 0.15),
+        (_AlongValley(axes), 0.15),
+        (_AlongValley(axes, gamma0=1.0), 0.1),
+        (MHMove(partial(_one_anew, plain, prior.low, prior.high)), 0.15),
+        (MHMove(partial(_one_anew, axes, *axes.range(prior.low, prior.high))), 0.15),
+    ]
+    if mixture is not None:
+        found.append((MHMove(partial(_of_mixture, axes, mixture)), 0.3))
+    return found
+
+
+def _one_anew(
+    axes: Straightened, low: Array, high: Array, walkers: Array, random: np.random.RandomState
+) -> tuple[Array, Array]:
+    """Put each walker anywhere in one coordinate: where it is free, that is where it can be."""
+    proposed = axes.of(walkers)
+    rows = np.arange(len(walkers))
+    moved = random.randint(walkers.shape[1], size=len(walkers))
+    proposed[rows, moved] = random.uniform(low[moved], high[moved])
+    return _gridded(axes.back(proposed)), np.zeros(len(walkers))
+
+
+def _of_mixture(
+    axes: Straightened, mixture: Mixture, walkers: Array, random: np.random.RandomState
+) -> tuple[Array, Array]:
+    """Draw from a mixture, wherever the walkers are."""
+    drawn = _gridded(axes.back(mixture.draw(len(walkers), random)))
+    before, after = (mixture.log_density(axes.of(points)) for points in (walkers, drawn))
+    return drawn, before - after
+
+
+def _gridded(log_parameters: Array) -> Array:
+    return np.rint(log_parameters / _GRID) * _GRID

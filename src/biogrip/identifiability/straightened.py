@@ -1,0 +1,71 @@
+"""Coordinates in which the valley of exchangeable dampers is straight.
+
+Where c and c_p trade against each other, only their sum being known, logarithms of
+samples lie along a narrow bend, round which no straight step leads. Over the
+logarithm of the sum and those of ratios it is a straight line.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import SampleModel
+
+
+@dataclass(frozen=True)
+class Straightened:
+    """A change of coordinates whose Jacobian determinant is one.
+
+    Parameters
+    ----------
+    members
+        Indices of the exchangeable parameters; fewer than two change nothing.
+    """
+
+    members: tuple[int, ...]
+
+    def of(self, log_parameters: Array) -> Array:
+        """Put the sum's logarithm in place of the last member's, log-ratios to it of the others'.
+
+        Parameters
+        ----------
+        log_parameters : (n, n_parameters)
+
+        Returns
+        -------
+        (n, n_parameters)
+        """
+        found = log_parameters.copy()
+        if len(self.members) > 1:
+            *others, last = self.members
+            own = log_parameters[:, list(self.members)]
+            found[:, last] = np.logaddexp.reduce(own, axis=1)
+            found[:, others] = own[:, :-1] - own[:, -1:]
+        return found
+
+    def range(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Ends between which coordinates can be if log-parameters are, (n_parameters,) each."""
+        ends = low.copy(), high.copy()
+        if len(self.members) > 1:
+            *others, last = self.members
+            for own, these, those in zip(ends, (low, high), (high, low), strict=True):
+                own[others] = these[others] - those[last]
+                own[last] = np.logaddexp.reduce(these[list(self.members)])
+        return ends
+
+    def back(self, coordinates: Array) -> Array:
+        """Return to log-parameters, both of shape (n, n_parameters)."""
+        found = coordinates.copy()
+        if len(self.members) > 1:
+            *others, last = self.members
+            ratios = coordinates[:, others]
+            found[:, last] -= np.logaddexp.reduce(np.pad(ratios, ((0, 0), (0, 1))), axis=1)
+            found[:, others] = ratios + found[:, last, None]
+        return found
+
+
+def straightened(model: SampleModel) -> Straightened:
+    """Return the coordinates for a model's parameters."""
+    named = enumerate(model.names)
+    return Straightened(tuple(index for index, name in named if name in model.exchangeable))

@@ -1,0 +1,215 @@
+"""The posterior of a sample's parameters: each alone, and each against each other.
+
+Samples are drawn over logarithms. Densities of pairs are smoothed, and the least regions that
+hold half and 95 % of them are outlined.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from scipy.ndimage import gaussian_filter
+
+from biogrip.arrays import Array
+from biogrip.experiment.sample import Parameter, Sample, with_fixed
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.profiles import decade_ticks
+from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, PAGE_IN, SHADE, figure
+from biogrip.products.files.posterior import SAMPLES, TOLD, read_posterior, read_samples
+from biogrip.products.product import JUDGEMENT, the
+from biogrip.study.study import Case, Study
+
+# Parameters that a column has room for.
+_MOST_IN_COLUMN = 4
+_BINS, _SMOOTH = 60, 1.5
+_HALF, _MOST = 0.5, 0.95
+# Of samples, beyond either end of an axis, where they are few.
+_BEYOND = 0.002
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a case's posterior is drawn.
+
+    Parameters
+    ----------
+    title
+        The case in print.
+    sample, fixed
+        Its model, and parameters that are known.
+    parameters
+        True values by name, none if they are unknown.
+    """
+
+    title: str
+    sample: Sample
+    fixed: Mapping[str, float]
+    parameters: Mapping[str, float]
+
+
+def settings(study: Study, case: Case) -> Settings:
+    """Choose what the figure of a case depends on."""
+    return Settings(case.title, case.sample, case.fixed, case.parameters)
+
+
+def draw(settings: Settings, told: Path, samples: Path) -> Figure:
+    """Draw the posterior of a case.
+
+    Parameters
+    ----------
+    settings
+        How.
+    told, samples
+        What is said of it, JSON, and its samples, Parquet.
+    """
+    model = with_fixed(settings.sample.model, settings.fixed)
+    values = read_samples(samples, model)
+    return draw_corner(
+        model.parameters, values, read_posterior(told), settings.parameters, settings.title
+    )
+
+
+def draw_corner(
+    parameters: Sequence[Parameter],
+    values: Array,
+    told: Mapping[str, Any],
+    truth: Mapping[str, float],
+    title: str,
+) -> Figure:
+    """Draw samples of a posterior.
+
+    Parameters
+    ----------
+    parameters
+        What they are of.
+    values : (n, n_parameters)
+        Samples, SI units.
+    told
+        What is said of them, see `posterior_data`.
+    truth
+        True values by name, where they are known.
+    title
+        Of what; may be empty.
+    """
+    count = len(parameters)
+    width = COLUMN_IN if count <= _MOST_IN_COLUMN else PAGE_IN
+    drawn = figure(width, width + 0.3)
+    grid = drawn.subplots(count, count, squeeze=False, sharex="col")
+    logs = np.log(values)
+    edges = [_edges(logs[:, i], truth.get(p.name)) for i, p in enumerate(parameters)]
+    intervals = {item["quantity"]: item for item in told["quantities"]}
+    for row, own in enumerate(parameters):
+        for column, other in enumerate(parameters):
+            axes = grid[row, column]
+            if column > row:
+                axes.set_axis_off()
+            elif column == row:
+                _alone(axes, logs[:, row], edges[row], intervals[own.name])
+                _mark(axes, truth.get(own.name), None)
+            else:
+                _pair(axes, logs[:, column], logs[:, row], edges[column], edges[row])
+                _mark(axes, truth.get(other.name), truth.get(own.name))
+            _ticks(axes, edges[column], edges[row] if column < row else None)
+            axes.tick_params(labelsize=6, labelbottom=row == count - 1, labelleft=column == 0)
+        grid[row, 0].set_ylabel(f"{own.symbol} ({own.unit})" if row else "", fontsize=7)
+        grid[-1, row].set_xlabel(f"{own.symbol} ({own.unit})", fontsize=7)
+    drawn.align_labels()
+    percent, most = f"{100 * told['confidence']:g} %", f"{100 * _MOST:g} % of them"
+    handles: list[Any] = [
+        Line2D([], [], color=BLUE, linewidth=1.0, label="half of the samples"),
+        Line2D([], [], color=BLUE, linewidth=0.6, linestyle="--", label=most),
+        Patch(color=SHADE, label=f"{percent} interval"),
+    ]
+    if truth:
+        handles.append(Line2D([], [], color=ORANGE, marker="*", linewidth=0.9, label="truth"))
+    drawn.legend(handles=handles, loc="upper right", fontsize=6.5, title=title, title_fontsize=7.5)
+    return drawn
+
+
+def _edges(logs: Array, truth: float | None) -> Array:
+    low, high = np.quantile(logs, [_BEYOND, 1 - _BEYOND])
+    inside = [np.log(truth)] if truth else []
+    low, high = min([low, *inside]), max([high, *inside])
+    margin = 0.06 * (high - low)
+    return np.linspace(low - margin, high + margin, _BINS + 1)
+
+
+def _alone(axes: Axes, logs: Array, edges: Array, interval: Mapping[str, Any]) -> None:
+    counts, _ = np.histogram(logs, edges)
+    axes.axvspan(interval["low"], interval["high"], color=SHADE, linewidth=0, zorder=0)
+    axes.stairs(counts / counts.max(), np.exp(edges), color=BLUE, linewidth=0.9)
+    axes.axvline(interval["median"], color=BLUE, linewidth=0.6, linestyle=":")
+    axes.set_ylim(0, 1.1)
+    axes.set_yticks([])
+    axes.spines["left"].set_visible(False)
+
+
+def _pair(axes: Axes, x: Array, y: Array, x_edges: Array, y_edges: Array) -> None:
+    counts, _, _ = np.histogram2d(x, y, [x_edges, y_edges])
+    density = gaussian_filter(counts.T, _SMOOTH)
+    half, most = (_level(density, share) for share in (_HALF, _MOST))
+    middles = [np.exp(0.5 * (edges[1:] + edges[:-1])) for edges in (x_edges, y_edges)]
+    shades = LinearSegmentedColormap.from_list("shades", ["#ffffff", SHADE, BLUE])
+    axes.pcolormesh(
+        np.exp(x_edges), np.exp(y_edges), np.sqrt(density), cmap=shades, rasterized=True
+    )
+    if half > most:
+        axes.contour(
+            *middles,
+            density,
+            [most, half],
+            colors=BLUE,
+            linewidths=[0.6, 1.0],
+            linestyles=["--", "-"],
+        )
+
+
+def _level(density: Array, share: float) -> float:
+    """Density at the edge of the least region that holds a share."""
+    falling = np.sort(density.ravel())[::-1]
+    place = np.searchsorted(np.cumsum(falling), share * falling.sum())
+    return float(falling[min(place, len(falling) - 1)])
+
+
+def _mark(axes: Axes, x: float | None, y: float | None) -> None:
+    style: dict[str, Any] = {"color": ORANGE, "linewidth": 0.9}
+    if x:
+        axes.axvline(x, **style)
+    if y:
+        axes.axhline(y, **style)
+    if x and y:
+        axes.plot(
+            x, y, "*", color=ORANGE, markersize=5, markeredgecolor="white", markeredgewidth=0.4
+        )
+
+
+def _ticks(axes: Axes, x_edges: Array, y_edges: Array | None) -> None:
+    for name, edges in (("x", x_edges), ("y", y_edges)):
+        if edges is not None:
+            low, high = np.exp(edges[[0, -1]]).tolist()
+            getattr(axes, f"set_{name}scale")("log")
+            getattr(axes, f"set_{name}lim")(low, high)
+            places, labels = decade_ticks(low, high)
+            getattr(axes, f"set_{name}ticks")(places, labels)
+            getattr(axes, f"set_{name}ticks")([], minor=True)
+
+
+CORNER = drawing(
+    draw,
+    name="corner",
+    file="posterior",
+    caption="Posterior of one seed: each parameter alone, and each against each other, over "
+    "logarithms. Outlined: the least regions with half and 95 % of the samples; shaded: the "
+    "interval; dotted: the median; orange: the truth.",
+    settings=settings,
+    reads={"told": the(TOLD), "samples": the(SAMPLES)},
+    cases=lambda study: study.sampled,
+    weight=JUDGEMENT,
+)

@@ -1,0 +1,131 @@
+"""A posterior as files: what is said of it as JSON, its samples as Parquet."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.digits import rounded
+from biogrip.errors import BiogripError
+from biogrip.experiment.sample import SampleModel
+from biogrip.products.files.parquet import read_columns, table_of, write_tables
+
+if TYPE_CHECKING:
+    from biogrip.identifiability.marginals import Marginal
+    from biogrip.identifiability.posterior_settings import PosteriorSettings
+    from biogrip.identifiability.sampling import Samples
+
+TOLD = "results/posterior/{case}.json"
+SAMPLES = "results/posterior/{case}.parquet"
+
+_MOST_ROWS = 10_000
+
+Limits = Mapping[str, tuple[float | None, float | None]]
+"""Limits of profile likelihoods by quantity."""
+
+
+def posterior_data(
+    samples: "Samples",
+    settings: "PosteriorSettings",
+    marginals: Sequence["Marginal"],
+    found: Limits,
+) -> dict[str, Any]:
+    """Return what is said of a posterior as dictionaries, lists, text and numbers in SI units."""
+    steps, walkers, _ = samples.log_parameters.shape
+    convergence = samples.convergence
+    return {
+        "prior": {name: dict(vars(own)) for name, own in settings.prior.items()},
+        "walkers": walkers,
+        "steps": steps,
+        "accepted": rounded(samples.accepted),
+        "r_hat": rounded(convergence.r_hat),
+        "bulk": rounded(convergence.bulk),
+        "tail": rounded(convergence.tail),
+        "converged": convergence.reached,
+        "in_words": convergence.words(),
+        "quantities": [_quantity(own, *found[own.quantity.label]) for own in marginals],
+    }
+
+
+def _quantity(own: "Marginal", low: float | None, high: float | None) -> dict[str, Any]:
+    return {
+        "quantity": own.quantity.label,
+        "symbol": own.quantity.symbol,
+        "unit": own.quantity.unit,
+        "median": rounded(own.median),
+        "low": rounded(own.outer[0]),
+        "high": rounded(own.outer[1]),
+        "half_low": rounded(own.inner[0]),
+        "half_high": rounded(own.inner[1]),
+        "share": rounded(own.share),
+        "profile_low": low,
+        "profile_high": high,
+        "against_profile": own.against(low, high),
+        "in_words": own.words(),
+        "why": own.why(low, high),
+    }
+
+
+def limits_in(verdicts: Mapping[str, Any]) -> Limits:
+    """Return the limits of profiles from what was said of a trace."""
+    return {item["quantity"]: (item["low"], item["high"]) for item in verdicts["quantities"]}
+
+
+def read_posterior(path: Path) -> dict[str, Any]:
+    """Read what is said of a posterior.
+
+    Raises
+    ------
+    BiogripError
+        If it is missing or says nothing of one.
+    """
+    try:
+        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BiogripError(f"{path}: cannot be read as a posterior: {error}.") from error
+    if not {"quantities", "converged", "in_words"} <= set(found):
+        raise BiogripError(f"{path}: says nothing of a posterior.")
+    return found
+
+
+def thinned(log_parameters: Array) -> Array:
+    """Return some thousand samples, evenly chosen, of all walkers.
+
+    Parameters
+    ----------
+    log_parameters : (n_steps, n_walkers, n_parameters)
+
+    Returns
+    -------
+    (n, n_parameters)
+    """
+    steps, walkers, size = log_parameters.shape
+    every = -(-steps * walkers // _MOST_ROWS)
+    return log_parameters[::every].reshape(-1, size)
+
+
+def write_samples(
+    path: Path, model: SampleModel, log_parameters: Array, words: Mapping[str, str] | None = None
+) -> None:
+    """Write samples (n, n_parameters) as Parquet, a column a parameter in SI units, and words."""
+    values = np.exp(log_parameters)
+    columns: dict[str, Array | str] = {
+        p.column: values[:, index] for index, p in enumerate(model.parameters)
+    }
+    columns |= words or {}
+    write_tables(path, [table_of(columns, len(values))], dictionary=False)
+
+
+def read_samples(path: Path, model: SampleModel) -> Array:
+    """Read samples written by `write_samples`, (n, n_parameters) in SI units.
+
+    Raises
+    ------
+    BiogripError
+        If the file is missing, damaged, or of another model.
+    """
+    columns = read_columns(path, [p.column for p in model.parameters])
+    return np.stack(list(columns.values()), axis=1)

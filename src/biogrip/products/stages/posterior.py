@@ -1,0 +1,252 @@
+"""Stage 4: samples of the posterior of one trace of a case, and the evidence for models."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.digits import rounded
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import CANDIDATES, SampleModel
+from biogrip.files import write_text
+from biogrip.identifiability.posterior_settings import PosteriorSettings
+from biogrip.identify.answer import Identification, Progress, silent
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.model_choice import ranked
+from biogrip.identify.problem import Problem
+from biogrip.identify.trace_fit import trace_fit
+from biogrip.products.files.posterior import (
+    SAMPLES,
+    TOLD,
+    Limits,
+    limits_in,
+    posterior_data,
+    thinned,
+    write_samples,
+)
+from biogrip.products.files.traces import MEASUREMENTS, read_measurements
+from biogrip.products.files.verdicts import PATH, read_verdicts
+from biogrip.products.plan import Wildcards
+from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
+from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.judgement import TRACE
+from biogrip.study.study import Case, Study
+
+# The sampler is loaded where something is sampled: that takes a second.
+_SAMPLER = "biogrip.identifiability.sampling"
+_EVIDENCE = "biogrip.identifiability.evidence"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a posterior is sampled.
+
+    Parameters
+    ----------
+    study_seed, case
+        Whose random streams.
+    problem, least_squares
+        What is identified, and by how many fits models are ranked.
+    posterior
+        Prior, walkers and steps.
+    models
+        Names of those whose evidence is compared, see `CANDIDATES`; none without.
+    confidence
+        Of the intervals.
+    """
+
+    study_seed: int
+    case: str
+    problem: CaseProblem
+    least_squares: object
+    posterior: PosteriorSettings
+    models: tuple[str, ...]
+    confidence: float
+
+
+def settings_of(study: Study, case: Case) -> Settings:
+    """Choose what the posterior of a case depends on."""
+    assert case.posterior is not None
+    compared = case.posterior.evidence and not case.fixed
+    return Settings(
+        study.study_seed,
+        case.name,
+        case.problem,
+        case.method("least_squares"),
+        case.posterior,
+        study.models_of(case) if compared else (),
+        case.confidence,
+    )
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what the posterior of a case depends on."""
+    return settings_of(study, study.case(job["case"]))
+
+
+def sample(
+    settings: Settings,
+    measurements: Path,
+    verdicts: Path,
+    calibrated: list[Path],
+    told: Path,
+    samples: Path,
+) -> None:
+    """Sample the posterior of the trace of the first seed.
+
+    Parameters
+    ----------
+    settings
+        How.
+    measurements
+        Noisy traces, Parquet.
+    verdicts
+        Verdicts on the same trace, JSON.
+    calibrated
+        A calibration, YAML, whose arms replace the gripper's, if there is one.
+    told
+        What is said of the posterior, JSON.
+    samples
+        Samples of the parameters, Parquet.
+    """
+    posed = settings.problem.calibrated(calibrated)
+    recorded = read_measurements(measurements, [TRACE])
+    time_s, trace = recorded.time_s, recorded.rotation_rad[TRACE]
+    limits = limits_in(read_verdicts(verdicts))
+    pose = partial(posed.of, time_s, trace)
+    if not posed.plain:
+        # In the noise that the verdicts are told in.
+        fit = trace_fit(posed, time_s, trace, partial(_found, settings))
+        pose = partial(fit.problem_of, posed, time_s, trace)
+    data, drawn = posterior_of_trace(settings, posed, pose, limits, silent)
+    write_samples(samples, posed.searched, drawn)
+    write_text(told, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
+
+
+def _found(settings: Settings, problem: Problem) -> Identification:
+    rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
+    return best_fit(problem, settings.least_squares, rng, silent)
+
+
+def posterior_of_trace(
+    settings: Settings,
+    posed: CaseProblem,
+    pose: Callable[[SampleModel], Problem],
+    limits: Limits,
+    progress: Progress,
+) -> tuple[dict[str, Any], Array]:
+    """Sample the posterior of a trace, and the evidence of other models for it.
+
+    Parameters
+    ----------
+    settings
+        How.
+    posed
+        What is assumed, calibrated if need be.
+    pose
+        Poses the trace, in its noise, for a sample model.
+    limits
+        Of its profile likelihoods.
+    progress
+        Is told of the evaluations.
+
+    Returns
+    -------
+    data
+        What is said of it.
+    log_parameters : (n, n_parameters)
+        Some thousand samples.
+    """
+    from biogrip.identifiability.marginals import marginals_of
+    from biogrip.identifiability.quantities import parameters_and_sum
+    from biogrip.identifiability.sampling import sampled
+
+    rng = stream(settings.study_seed, settings.case, TRACE, "posterior")
+    problem = pose(posed.searched)
+    posterior = _posterior(problem, settings.posterior, posed.noise_rad)
+    found = sampled(posterior, settings.posterior, rng, progress)
+    drawn = thinned(found.log_parameters)
+    every = found.log_parameters.reshape(-1, drawn.shape[1])
+    quantities = parameters_and_sum(posed.searched)
+    marginals = marginals_of(every, quantities, problem.residuals.duration_s, settings.confidence)
+    data = {
+        "model": posed.model.name,
+        "confidence": settings.confidence,
+        **posterior_data(found, settings.posterior, marginals, limits),
+        "evidence": _evidence(settings, pose, posed.noise_rad, progress),
+    }
+    return data, drawn
+
+
+def _posterior(problem: Problem, settings: PosteriorSettings, noise_rad: float | None) -> Any:
+    from biogrip.identifiability.posterior import Posterior
+    from biogrip.identifiability.prior import prior_of
+
+    prior = prior_of(problem.residuals.model, problem.low, problem.high, settings.prior)
+    return Posterior(problem, prior, noise_rad)
+
+
+def _evidence(
+    settings: Settings,
+    of_model: Callable[[SampleModel], Problem],
+    noise_rad: float | None,
+    progress: Progress,
+) -> list[dict[str, Any]]:
+    """Compare models by their evidence for a trace, beside AIC and BIC; a row each."""
+    if not settings.models:
+        return []
+    from biogrip.identifiability.evidence import evidence_of
+    from biogrip.identifiability.sampling import sampled
+
+    rows, misfits, samples = [], [], 0
+    for name in settings.models:
+        problem = of_model(CANDIDATES[name].model)
+        samples = problem.residuals.samples
+        fits = stream(settings.study_seed, settings.case, TRACE, f"model {name}")
+        misfits.append(best_fit(problem, settings.least_squares, fits, silent).misfit_rad)
+        rng = stream(settings.study_seed, settings.case, TRACE, f"evidence {name}")
+        posterior = _posterior(problem, settings.posterior, noise_rad)
+        found = sampled(posterior, settings.posterior, rng, progress)
+        own = evidence_of(posterior, found, rng)
+        rows.append((own, found.convergence.reached))
+    highest = max(own.log for own, _ in rows)
+    tried = ranked(settings.models, misfits, samples)
+    return [
+        {
+            "model": each.candidate,
+            "title": each.model.title,
+            "parameters": len(each.model.names),
+            "delta_aic": rounded(each.delta_aic),
+            "delta_bic": rounded(each.delta_bic),
+            "log_evidence": float(np.round(own.log, 3)),
+            "delta_log_evidence": float(np.round(highest - own.log, 3)),
+            "error": rounded(own.error),
+            "reliable": bool(own.reliable and reached),
+        }
+        for each, (own, reached) in zip(tried, rows, strict=True)
+    ]
+
+
+SAMPLED = Product(
+    "posterior_samples",
+    {"told": TOLD, "samples": SAMPLES},
+    sample,
+    settings,
+    lambda plan: wildcards_of(plan.study.sampled),
+    message="Sampling the posterior of the first trace of {case}",
+    reads={
+        "measurements": Reads(
+            lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
+        ),
+        "verdicts": the(PATH),
+        "calibrated": calibration_of(),
+    },
+    weight=JUDGEMENT,
+    modules=lambda _: (METHODS["least_squares"].module, _SAMPLER, _EVIDENCE),
+)

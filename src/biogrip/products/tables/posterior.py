@@ -1,0 +1,101 @@
+"""What posteriors say of all quantities, beside profile likelihoods."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from biogrip.products.files.posterior import TOLD, read_posterior
+from biogrip.products.product import of_cases
+from biogrip.products.tables.declared import table
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.tables.verdicts import target_of
+from biogrip.study.study import Study
+
+_IN_WORDS = {"agrees": "the same", "differs": "another interval", "prior": "an end is the prior's"}
+
+_COLUMNS = (
+    Column("case", "Case"),
+    Column("quantity", "Quantity"),
+    Column("unit", "Unit"),
+    Column("target", "Target", 4),
+    Column("median", "Median", 3),
+    Column("low", "From", 3),
+    Column("high", "To", 3),
+    Column("half_low", "Half from", 3),
+    Column("half_high", "Half to", 3),
+    Column("profile_low", "Profile from", 3),
+    Column("profile_high", "Profile to", 3),
+    Column("against_profile", "Against the profile"),
+    Column("r_hat", "R-hat", 4),
+    Column("bulk", "Effective samples", 2),
+    Column("tail", "In the tails", 2),
+    Column("steps", "Steps", 5),
+)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """True parameters of the cases by name, none if they are unknown."""
+
+    parameters: Mapping[str, Mapping[str, float]]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what the table depends on."""
+    return Settings({name: study.case(name).parameters for name in study.sampled})
+
+
+def posteriors(settings: Settings, told: list[Path]) -> Table:
+    """List posteriors; `told` is what is said of that of each case, JSON."""
+    found = [read_posterior(path) for path in told]
+    rows = [
+        row
+        for each, (case, parameters) in zip(found, settings.parameters.items(), strict=True)
+        for row in _rows(case, parameters, each)
+    ]
+    confidences = {f"{100 * each['confidence']:g}" for each in found}
+    percent = " or ".join(sorted(confidences))
+    caption = (
+        f"Posteriors of the trace of one seed: median, interval of {percent} % and of half of the "
+        "samples, beside the limits of profile likelihoods. Sums count where the branch relaxes "
+        "within the experiment."
+    )
+    return Table(caption, _COLUMNS, rows)
+
+
+def _rows(
+    case: str, parameters: Mapping[str, float], found: Mapping[str, Any]
+) -> Iterator[tuple[Cell, ...]]:
+    for item in found["quantities"]:
+        ends = ("low", "high", "half_low", "half_high", "profile_low", "profile_high")
+        yield (
+            case,
+            item["quantity"],
+            item["unit"],
+            target_of(item["quantity"], parameters),
+            _rounded(item["median"]),
+            *(_rounded(item[key]) for key in ends),
+            _IN_WORDS[item["against_profile"]],
+            found["r_hat"],
+            _rounded(found["bulk"]),
+            _rounded(found["tail"]),
+            found["steps"],
+        )
+
+
+def _rounded(value: float | None) -> float | None:
+    # As many digits as some thousand samples give.
+    return None if value is None else float(f"{value:.3g}")
+
+
+POSTERIOR_TABLE = table(
+    posteriors,
+    name="posterior",
+    item="posterior",
+    caption="Posteriors of one trace of each case, beside its profile likelihoods, and how far "
+    "the samples have converged.",
+    settings=settings,
+    reads={"told": of_cases(TOLD, lambda study: study.sampled)},
+    when=lambda study: bool(study.sampled),
+)

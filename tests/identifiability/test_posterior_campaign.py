@@ -1,0 +1,28 @@
+"""The campaign that tests whether posteriors are calibrated, and a few of its draws."""
+
+import numpy as np
+
+from tests.helpers.posterior_campaign import NAMES, Draw, counted, drawn
+
+
+def test_ranks_that_are_uniform_pass_and_others_do_not() -> None:
+    """Intervals twice too narrow push ranks outwards, others shift them."""
+    uniform = (np.arange(200) + 0.5) / 200
+    rng = np.random.default_rng(0)
+    good = [rng.permutation(uniform) for _ in NAMES]
+    assert counted(Draw(own, True) for own in np.transpose(good))["p_value"].min() > 0.01
+    narrow = np.where(uniform < 0.5, 0.5 * (2 * uniform) ** 2, 1 - 0.5 * (2 - 2 * uniform) ** 2)
+    shifted = uniform**1.3
+    for bad in (narrow, shifted):
+        found = counted(Draw(own, True) for own in np.transpose([bad] * len(NAMES)))
+        assert found["p_value"].max() < 0.01
+    outside = counted(Draw(np.full(len(NAMES), 0.99), False) for _ in range(20))
+    assert outside["coverage_95_percent"].max() == 0
+    assert outside["converged"].max() == 0
+
+
+def test_a_few_draws_are_not_all_on_one_side() -> None:
+    """Five: by chance, all of one quantity are in the same tenth once in thousands."""
+    found = counted([drawn(number) for number in range(5)])
+    assert list(found["quantity"]) == list(NAMES)
+    assert found["p_value"].min() > 1e-3
