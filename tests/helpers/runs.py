@@ -8,9 +8,11 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import pytest
 
+from tests.helpers import loaded
 from tests.helpers.places import ROOT
 
 # A whole study in a few seconds: real physics and algorithm, little of each.
@@ -79,15 +81,20 @@ def snakemake(
     environment: dict[str, str] | None = None,
     root: Path = ROOT,
 ) -> Run:
-    """Run the repository's workflow in a folder of its own, over a config laid on the default."""
+    """Run the repository's workflow in a folder of its own, over a config laid on the default.
+
+    In an environment of its own, or of another tree's code, by a program that is started.
+    """
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
     jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
-    command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
-    command += ["--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
-    command += ["--configfile", str(overlay)]
+    given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
+    given += ["--configfile", str(overlay)]
+    if root == ROOT and environment is None:
+        with NamedTemporaryFile("r") as said:
+            return Run(loaded.call(given, root, os.environ, Path(said.name)), said.read())
     done = subprocess.run(
-        command,
+        [sys.executable, "-m", "snakemake", *given],
         cwd=root,
         env={**os.environ, **(environment or {})},
         stdout=subprocess.PIPE,

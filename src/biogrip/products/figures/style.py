@@ -82,10 +82,13 @@ def row_of_panels(
 
 def save(drawn: Figure, output: Path) -> None:
     """Write a figure as PNG, and beside it as PDF, without dates."""
+    # Laid out once for both; each `savefig` would draw once more than it has to, for the layout.
+    drawn.set_dpi(mpl.rcParams["savefig.dpi"])
+    if (engine := drawn.get_layout_engine()) is not None:
+        engine.execute(drawn)
+    drawn.set_layout_engine(None)
     with written_whole(output) as scratch:
         drawn.savefig(scratch, format="png", metadata={"Software": None})
-    # Laid out once for both.
-    drawn.set_layout_engine("none")
     with written_whole(output.with_suffix(".pdf")) as scratch:
         drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 
