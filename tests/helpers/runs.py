@@ -30,6 +30,9 @@ cases:
   liquid_drop_1: null
 """
 
+# Folders of what is compared where figures and pages are not looked at.
+COMPARED = ("results/tables", "results/targets", "results/identifications")
+
 # Every kind of file, and of each as little as there can be.
 TINY = """
 seeds: 2
@@ -43,6 +46,17 @@ model_selection: {models: [damper, maxwell]}
 cases:
   endothelial_cell: null
   liquid_drop_1: null
+"""
+
+# A trace of a user's, and nothing else.
+RECORDED = """
+methods: [least_squares]
+model_selection: {models: [damper, liquid_drop]}
+only: [my_trace]
+cases:
+  my_trace:
+    sample: {model: generalized_maxwell}
+    measurement: {file: mine.csv, time: time_s, rotation: rotation_rad}
 """
 
 
@@ -172,8 +186,8 @@ def tables(folder: Path) -> dict[str, bytes]:
     results = folder / "results"
     return {
         str(path.relative_to(results)): path.read_bytes()
-        for kind in ("tables", "targets", "identifications")
-        for path in sorted((results / kind).glob("*.*"))
+        for kind in COMPARED
+        for path in sorted((folder / kind).glob("*.*"))
     }
 
 

@@ -23,10 +23,10 @@ def models_tried(
     if posed.nonlinear or posed.fixed:
         return {"models": [], "advice": None}
     identify = identifier("least_squares", case.method("least_squares"))
-    misfits = []
+    trace, misfits = posed.of(recorded.time_s, recorded.rotation_rad[0]), []
     for name in candidates:
         model = CANDIDATES[name].model
-        problem = posed.of(recorded.time_s, recorded.rotation_rad[0], model)
+        problem = posed.for_model(trace, model)
         rng = stream(study.study_seed, case.name, 0, f"model {name}")
         (found,) = identify([problem], [rng], progress)
         misfits.append(found.misfit_rad)

@@ -4,6 +4,8 @@ Slower than `biogrip.response.misfit_series.SeriesMisfit`, which needs torque st
 uniform sampling and the linear model.
 """
 
+from copy import copy
+
 import numpy as np
 
 from biogrip.arrays import Array
@@ -54,6 +56,12 @@ class FormedMisfit:
         self._nonlinear = nonlinear
         self._nuisance = nuisance
         self._chunk = max(1, _AT_ONCE // len(time_s))
+
+    def of_model(self, model: SampleModel) -> "FormedMisfit":
+        """Return the same trace for another model."""
+        other = copy(self)
+        other._model = model
+        return other
 
     def __call__(self, parameters: Array) -> Array:
         """Misfit in rad of each individual; infinite where the nonlinear model has no answer.

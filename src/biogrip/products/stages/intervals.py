@@ -31,6 +31,9 @@ from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
 
+# Local fits take less memory a seed than populations do, and the last of them come alone.
+_TIMES = 2
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -134,7 +137,7 @@ def _rows(
     for some in groups(seeds, EVERY):
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
-        for group in groups(some):
+        for group in groups(some, _TIMES):
             traces = _traces(settings, group, rotation)
             likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
             known = np.tile(truth, (len(group), 1))
