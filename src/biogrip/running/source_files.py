@@ -82,6 +82,7 @@ def _executed(tree: ast.Module) -> Iterator[ast.stmt]:
     while waiting:
         statement = waiting.pop()
         if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
+            waiting += statement.orelse
             continue
         yield statement
         for branch in (statement, *_of_branches(statement)):
