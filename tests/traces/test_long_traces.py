@@ -15,7 +15,7 @@ from biogrip.own_traces.one_trace import Wanted, identify_trace
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.response.linear import rotation, step_response
 
-SAMPLES, MEANS_OF = 100_000, 25
+SAMPLES, MEANS_OF = 200_000, 50
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([34.0, 12.0, 300.0])
 _RNG = np.random.default_rng(6)
 TIMES: dict[str, Array] = {
@@ -38,7 +38,7 @@ def found_in(path: Path) -> dict[str, Any]:
 
 @pytest.mark.parametrize("times", TIMES)
 def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Path) -> None:
-    """Means of many samples lose next to nothing here: estimates and limits agree.
+    """Means of fifty samples lose next to nothing here: estimates and limits agree.
 
     To a tenth of an interval; peak memory stays a few hundred bytes a sample.
     """
