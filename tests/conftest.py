@@ -5,6 +5,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Else every job that a test starts would compile all the source code for itself.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+import shutil
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,8 @@ from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_histo
 from biogrip.instrument.gripper import Arm, Gripper
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
-from tests.helpers.runs import SMALL, TINY, built_once, snakemake
+from tests.helpers.places import EXAMPLE
+from tests.helpers.runs import RECORDED, SMALL, TINY, built_once, snakemake
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -27,8 +30,14 @@ def pinning(request: pytest.FixtureRequest) -> bool:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Begin with the test that mostly waits, for Slurm: the others run beside it."""
-    items.sort(key=lambda item: item.path.name != "test_slurm.py")
+    """Begin with the test that mostly waits, for Slurm, then with those that take longest.
+
+    What takes long at the end keeps one worker only, and the two studies that most of them need
+    would be waited for by all.
+    """
+    items.sort(
+        key=lambda item: (item.path.name != "test_slurm.py", item.path.parent.name != "workflow")
+    )
 
 
 @pytest.fixture(scope="session")
@@ -74,3 +83,15 @@ def tiny(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
         assert done.status == 0, done.output
 
     return built_once("tiny", run, tmp_path_factory, worker_id)
+
+
+@pytest.fixture(scope="session")
+def recorded(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
+    """Results of a study of the example alone, named as a user's file; likewise."""
+
+    def make(folder: Path) -> None:
+        shutil.copy(EXAMPLE, folder / "mine.csv")
+        with chdir(folder):
+            make_in_process(folder, study_of(RECORDED))
+
+    return built_once("recorded", make, tmp_path_factory, worker_id)

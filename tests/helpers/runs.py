@@ -8,9 +8,11 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import pytest
 
+from tests.helpers import loaded
 from tests.helpers.places import ROOT
 
 # A whole study in a few seconds: real physics and algorithm, little of each.
@@ -28,6 +30,9 @@ cases:
   liquid_drop_1: null
 """
 
+# Folders of what is compared where figures and pages are not looked at.
+COMPARED = ("results/tables", "results/targets", "results/identifications")
+
 # Every kind of file, and of each as little as there can be.
 TINY = """
 seeds: 2
@@ -41,6 +46,17 @@ model_selection: {models: [damper, maxwell]}
 cases:
   endothelial_cell: null
   liquid_drop_1: null
+"""
+
+# A trace of a user's, and nothing else.
+RECORDED = """
+methods: [least_squares]
+model_selection: {models: [damper, liquid_drop]}
+only: [my_trace]
+cases:
+  my_trace:
+    sample: {model: generalized_maxwell}
+    measurement: {file: mine.csv, time: time_s, rotation: rotation_rad}
 """
 
 
@@ -79,15 +95,20 @@ def snakemake(
     environment: dict[str, str] | None = None,
     root: Path = ROOT,
 ) -> Run:
-    """Run the repository's workflow in a folder of its own, over a config laid on the default."""
+    """Run the repository's workflow in a folder of its own, over a config laid on the default.
+
+    In an environment of its own, or of another tree's code, by a program that is started.
+    """
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
     jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
-    command = [sys.executable, "-m", "snakemake", *jobs, *arguments]
-    command += ["--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
-    command += ["--configfile", str(overlay)]
+    given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
+    given += ["--configfile", str(overlay)]
+    if root == ROOT and environment is None:
+        with NamedTemporaryFile("r") as said:
+            return Run(loaded.call(given, root, os.environ, Path(said.name)), said.read())
     done = subprocess.run(
-        command,
+        [sys.executable, "-m", "snakemake", *given],
         cwd=root,
         env={**os.environ, **(environment or {})},
         stdout=subprocess.PIPE,
@@ -165,8 +186,8 @@ def tables(folder: Path) -> dict[str, bytes]:
     results = folder / "results"
     return {
         str(path.relative_to(results)): path.read_bytes()
-        for kind in ("tables", "targets", "identifications")
-        for path in sorted((results / kind).glob("*.*"))
+        for kind in COMPARED
+        for path in sorted((folder / kind).glob("*.*"))
     }
 
 

@@ -112,7 +112,7 @@ def test_noise_is_found_and_said() -> None:
     assert "remembered for some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
-    other = fit.problem_of(posed, TIMES, noisy(noise), POSED.searched)
+    other = posed.for_model(fit.problem, POSED.searched)
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 

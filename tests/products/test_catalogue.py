@@ -195,7 +195,7 @@ def test_a_digest_is_the_same_in_every_process() -> None:
             text=True,
             check=True,
         ).stdout
-        for seed in ("1", "2", "3")
+        for seed in ("1", "2")
     }
     assert len(found) == 1
     assert "target" in found.pop()

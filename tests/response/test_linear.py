@@ -13,7 +13,7 @@ from tests.helpers.responses import random_samples, rotation_50_digits
 
 # From 0.1 s after the start to the end, close to the step and far from it.
 TIMES = np.array([0.1, 0.2, 0.7, 3.3, 20.0, 90.0, 199.9, 200.1, 200.5, 210.0, 290.0, 400.0])
-CHUNKS = range(10)
+CHUNKS = range(4)
 
 
 def worst_error(gripper: Gripper, steps: TorqueHistory, samples: Array) -> float:
@@ -27,7 +27,7 @@ def worst_error(gripper: Gripper, steps: TorqueHistory, samples: Array) -> float
 def test_equal_arms_over_the_whole_search_range(
     gripper: Gripper, steps: TorqueHistory, chunk: int
 ) -> None:
-    """1000 chromosomes against 50 digits; 1e-9 of the peak is asked, 1e-11 is held."""
+    """400 chromosomes against 50 digits; 1e-9 of the peak is asked, 1e-11 is held."""
     assert worst_error(gripper, steps, random_samples(100, chunk)) < 1e-11
 
 
@@ -35,7 +35,7 @@ def test_equal_arms_over_the_whole_search_range(
 def test_unequal_arms_over_the_whole_search_range(
     unequal_gripper: Gripper, steps: TorqueHistory, chunk: int
 ) -> None:
-    """1000 chromosomes against 50 digits; 1e-6 of the peak is asked, 1e-11 is held."""
+    """400 chromosomes against 50 digits; 1e-6 of the peak is asked, 1e-11 is held."""
     assert worst_error(unequal_gripper, steps, random_samples(100, 100 + chunk)) < 1e-11
 
 

@@ -153,12 +153,15 @@ def test_against_radau(case: int) -> None:
     assert np.max(np.abs(ours - expected)) < 1e-7 * np.abs(expected).max()
 
 
-@pytest.mark.parametrize("equal_torques", [False, True])
-@pytest.mark.parametrize("case", [1, 3])
+# Samples that Radau follows in a second: in others it takes steps without end, at a residual of
+# the force that rounding does not let it lower.
+@pytest.mark.parametrize(
+    ("case", "equal_torques"),
+    [(1, False), (3, False), (8, False), (4, True), (8, True), (11, True)],
+)
 def test_unequal_arms_against_radau(case: int, equal_torques: bool) -> None:
     rng = np.random.default_rng([51, case])
     gripper = Gripper(1.5e-3, rng.uniform(40, 90), ARM, OTHER)
-    # Samples that Radau follows: stiff ones leave it fewer digits than the arms' difference needs.
     sample = 10 ** rng.uniform([-1, -2, 0, -2], [2, 1, 2, 1])
     factor = rng.uniform(1, 20)
     torques: list[tuple[float, ...]] = [

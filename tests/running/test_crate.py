@@ -19,22 +19,8 @@ from rocrate_validator.services import validate
 from urllib3 import HTTPResponse
 
 from biogrip.cli import main
-from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
 from tests.helpers.places import EXAMPLE
 
-RECORDED = """
-methods: [least_squares]
-least_squares: {candidates: 50, starts: 3}
-model_selection: {models: [damper, maxwell]}
-cases:
-  endothelial_cell: null
-  liquid_drop_1: null
-  liquid_drop_2: null
-  mine:
-    sample: {model: generalized_maxwell}
-    measurement: {file: mine.csv, time: time_s, rotation: rotation_rad}
-"""
 CONTEXT = "https://w3id.org/ro/crate/1.1/context"
 # Terms of version 1.1 that have moved in the context of 1.3, which rocrate ships.
 BIOSCHEMAS = "https://bioschemas.org"
@@ -144,16 +130,15 @@ def test_it_holds_the_results_with_their_hashes(crate: Path, study: Path) -> Non
 
 
 def test_a_recorded_trace_goes_along(
-    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    shutil.copy(EXAMPLE, tmp_path / "mine.csv")
-    monkeypatch.chdir(tmp_path)
-    make_in_process(tmp_path, study_of(RECORDED))
+    study = shutil.copytree(recorded, tmp_path / "study")
+    monkeypatch.chdir(study)
     assert main(["crate", "--output", "mine.zip"]) == 0
-    told = entities(tmp_path / "mine.zip")
-    assert {"@id": "traces/mine.csv"} in told["#run"]["object"]
-    with ZipFile(tmp_path / "mine.zip") as archive:
-        assert archive.read("traces/mine.csv") == EXAMPLE.read_bytes()
+    told = entities(study / "mine.zip")
+    assert {"@id": "traces/my_trace.csv"} in told["#run"]["object"]
+    with ZipFile(study / "mine.zip") as archive:
+        assert archive.read("traces/my_trace.csv") == EXAMPLE.read_bytes()
     # What was not written among the results is nobody's to replace.
     assert main(["crate", "--output", "mine.zip"]) == 1
 

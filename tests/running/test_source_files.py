@@ -1,3 +1,4 @@
+import re
 import shutil
 import subprocess
 import sys
@@ -72,6 +73,55 @@ def test_no_module_that_python_loads_is_forgotten(module: str) -> None:
         if not file.endswith("__init__.py") or "import" in Path(file).read_text()
     }
     assert loaded <= set(source_files(module))
+
+
+EVERYWHERE = """
+import biogrip.a_top
+from biogrip import a_name
+if TYPE_CHECKING:
+    import biogrip.never
+elif True:
+    import biogrip.an_elif
+else:
+    import biogrip.an_else
+try:
+    import biogrip.a_try
+except ImportError:
+    import biogrip.a_handler
+else:
+    import biogrip.a_success
+finally:
+    import biogrip.a_last
+try:
+    pass
+except* ImportError:
+    import biogrip.a_group
+def f():
+    for _ in ():
+        with g():
+            import biogrip.a_body
+    while h():
+        match k():
+            case 1:
+                import biogrip.a_case
+class C:
+    async def m(self):
+        import biogrip.a_method
+"""
+
+
+def test_an_import_is_found_wherever_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """But for a type checker's."""
+    named = set(re.findall(r"\b(?:a|an)_\w+", EVERYWHERE))
+    for name in {*named, "never"}:
+        (tmp_path / f"{name}.py").write_text("")
+    (tmp_path / "whole.py").write_text(EVERYWHERE)
+    monkeypatch.setattr("biogrip.running.source_files._PACKAGE", tmp_path)
+    files = source_files("biogrip.whole")
+    assert len(named) == 12
+    assert {Path(file).stem for file in files} == {*named, "whole"}
 
 
 def loaded_by(statement: str) -> set[str]:

@@ -1,7 +1,8 @@
 """What the tutorial and the how-tos tell to write and to type, written and typed as they say.
 
 A fenced block with a title is a file, one in sh is commands and one in python runs. Runs of the
-workflow are made small by a config beneath theirs, which the documents do not show.
+workflow are made small by a config beneath theirs, which the documents do not show, and where
+they make a whole study, by naming what the reader is to look at.
 """
 
 import os
@@ -37,6 +38,10 @@ LEFT = {
     ],
     "howto/crate.md": ["study.zip"],
     "howto/figure.md": ["results/figures/heights.png"],
+}
+LOOKED_AT = {
+    "study.yaml": ["results/summaries/mine.html"],
+    "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
 
 
@@ -80,6 +85,7 @@ def _typed(words: list[str], place: Tree) -> None:
     assert words[0] == "biogrip"
     if words[1] == "run":
         words[2:2] = ["tiny.yaml"]
+        words += LOOKED_AT.get(words[-1], [])
     _run(["-m", *words], place)
 
 

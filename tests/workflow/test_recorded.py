@@ -9,26 +9,13 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
-from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import assert_drawn
 from tests.helpers.places import CONFIG, EXAMPLE, ROOT
-from tests.helpers.runs import replaced, snakemake
-
-RECORDED = f"""
-methods: [least_squares]
-model_selection: {{models: [damper, liquid_drop]}}
-only: [my_trace]
-cases:
-  my_trace:
-    sample: {{model: generalized_maxwell}}
-    measurement: {{file: {EXAMPLE}, time: time_s, rotation: rotation_rad}}
-"""
+from tests.helpers.runs import RECORDED, replaced, snakemake
 
 
-def test_a_recorded_trace_gets_what_a_simulated_one_gets(tmp_path: Path) -> None:
-    make_in_process(tmp_path, study_of(RECORDED))
-    results = tmp_path / "results"
+def test_a_recorded_trace_gets_what_a_simulated_one_gets(recorded: Path) -> None:
+    results = recorded / "results"
     errors = pd.read_csv(results / "tables" / "errors_my_trace.csv")
     assert errors["parameter"].tolist() == ["k", "k_p", "c", "c_p", "c + c_p"]
     assert errors["target"].isna().all()
@@ -61,7 +48,7 @@ def test_the_example_is_what_its_truth_makes(tmp_path: Path) -> None:
 def test_a_bad_recording_stops_with_its_place(tmp_path: Path) -> None:
     bad = tmp_path / "bad.csv"
     bad.write_text("time_s,rotation_rad\n" + "".join(f"{t},{1e-3 * t}\n" for t in range(401)))
-    config = replaced(RECORDED, str(EXAMPLE), str(bad))
+    config = replaced(RECORDED, "mine.csv", str(bad))
     run = snakemake(tmp_path, "--dry-run", config=config)
     assert run.status != 0
     assert "cases.my_trace: " in run.output
@@ -90,9 +77,8 @@ def test_a_bad_recording_stops_with_its_place(tmp_path: Path) -> None:
 def test_what_a_recording_cannot_be_is_named(
     tmp_path: Path, old: str, new: str, messages: list[str]
 ) -> None:
-    assert old in RECORDED
     file = tmp_path / "overlay.yaml"
-    file.write_text(replaced(RECORDED, old, new))
+    file.write_text(replaced(replaced(RECORDED, "mine.csv", str(EXAMPLE)), old, new))
     with pytest.raises(BiogripError) as error:
         load_study(overlaid(read_config(CONFIG), read_config(file)), [CONFIG, file])
     assert [message for message in messages if message not in str(error.value)] == []

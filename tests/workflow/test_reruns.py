@@ -10,8 +10,8 @@ import pytest
 
 from biogrip.products.files.differences import DIFFERENCES
 from tests.helpers.default import study_of
-from tests.helpers.in_process import make_in_process
-from tests.helpers.runs import SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
+from tests.helpers.in_process import inputs_and_outputs, make_in_process
+from tests.helpers.runs import COMPARED, SMALL, TINY, Tree, copied_tree, replaced, snakemake, tables
 
 # Tables that put cases together and have a row, or a few, for each.
 JOINT = ("errors", "linearisation", "methods", "models", "coverage", "mechanics", "contact_loss")
@@ -32,7 +32,9 @@ def test_a_case_more_changes_no_number(finished_copy: Path) -> None:
         for file in (finished_copy / "results" / "tables").glob(f"{name}.*"):
             file.unlink()
     (finished_copy / DIFFERENCES.path).unlink()
-    make_in_process(finished_copy, study_of(SMALL + NEW_CASE))
+    larger = study_of(SMALL + NEW_CASE)
+    wanted = [file for file in inputs_and_outputs(larger)[1] if file.startswith(COMPARED)]
+    make_in_process(finished_copy, larger, wanted)
     after = tables(finished_copy)
     joint = {f"tables/{name}" for name in JOINT}
     assert [

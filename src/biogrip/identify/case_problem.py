@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, problem_of, rows_of
+from biogrip.identify.problem import Problem, for_model, problem_of, rows_of
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
@@ -116,6 +116,10 @@ class CaseProblem:
             noise_rad=noise_rad or self.noise_rad,
             condensed=condensed or self._condensed_at(time_s),
         )
+
+    def for_model(self, problem: Problem, model: SampleModel) -> Problem:
+        """Pose one of its problems for another model, at less than the price of a new one."""
+        return for_model(problem, model, dict(self.ranges))
 
     def nuisance(self, time_s: Array) -> Array:
         """What the instrument may have added, (n_functions, n_samples)."""

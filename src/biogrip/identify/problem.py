@@ -1,6 +1,5 @@
 """What there is to identify: a trace, a model, and the range that is searched."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,8 +11,9 @@ from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.every_sample import EverySample
-from biogrip.response.misfit import misfit_of
+from biogrip.response.misfit import Misfit, misfit_of
 from biogrip.response.misfit_formed import FormedMisfit
+from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
 
@@ -37,7 +37,7 @@ class Problem:
         Logarithms of the ends of the search range (Table 4).
     """
 
-    misfit: Callable[[Array], Array]
+    misfit: Misfit
     residuals: Residuals
     genome: Genome
     low: Array
@@ -83,7 +83,6 @@ def problem_of(
     condensed = condensed or rows_of(
         torque, time_s, offset=offset, drift=drift, nonlinear=nonlinear, inertia=inertia
     )
-    chosen = [ranges[parameter.range_name] for parameter in model.parameters]
     residuals = Residuals(
         gripper,
         model,
@@ -107,10 +106,34 @@ def problem_of(
     many = isinstance(misfit, FormedMisfit) and len(time_s) > _MANY_SAMPLES
     if condensed.coloured or (many and not inertia and residuals.condensable):
         misfit = residuals.condensed_misfit
+    return _searched(misfit, residuals, ranges)
+
+
+def for_model(problem: Problem, model: SampleModel, ranges: dict[str, GeneRange]) -> Problem:
+    """Pose a problem of `problem_of` for another model; what is tabulated of the trace is shared.
+
+    Parameters
+    ----------
+    problem
+        Of the trace.
+    model
+        The other model.
+    ranges
+        As of `problem_of`.
+    """
+    residuals = problem.residuals.of_model(model)
+    misfit = residuals.condensed_misfit
+    if isinstance(problem.misfit, SeriesMisfit | FormedMisfit):
+        misfit = problem.misfit.of_model(model)
+    return _searched(misfit, residuals, ranges)
+
+
+def _searched(misfit: Misfit, residuals: Residuals, ranges: dict[str, GeneRange]) -> Problem:
+    chosen = [ranges[parameter.range_name] for parameter in residuals.model.parameters]
     return Problem(
         misfit,
         residuals,
-        genome_of(model, ranges),
+        genome_of(residuals.model, ranges),
         np.log([genes.low for genes in chosen]),
         np.log([genes.high for genes in chosen]),
     )

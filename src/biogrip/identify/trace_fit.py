@@ -13,7 +13,6 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.digits import rounded
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import SampleModel
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.local_fit import local_fit, settled
@@ -21,8 +20,6 @@ from biogrip.identify.noise_colour import ColourLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
-from biogrip.response.condensed import Condensed
-from biogrip.response.every_sample import EverySample
 from biogrip.response.whitening import Colour
 
 MOST_SAMPLES = 50_000
@@ -53,22 +50,12 @@ class TraceFit:
         What the noise is, unless it was taken for white.
     outliers : (n_samples,)
         Which samples were left out.
-    condensed
-        Of the noise, if it is not just white.
     """
 
     problem: Problem
     found: Identification
     colour: Colour | None
     outliers: BoolArray
-    condensed: Condensed | EverySample | None = None
-
-    def problem_of(
-        self, posed: CaseProblem, time_s: Array, rotation_rad: Array, model: SampleModel
-    ) -> Problem:
-        """Pose the same trace in the same noise for another sample model."""
-        kept = ~self.outliers
-        return posed.of(time_s[kept], rotation_rad[kept], model, condensed=self.condensed)
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return what the noise was found to be as plain data."""
@@ -137,12 +124,12 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
         posed = replace(posed, offset=True, drift=True)
         kept, plain, found = _without_outliers(posed, time_s, rotation_rad, find)
     time_s, rotation_rad = time_s[kept], rotation_rad[kept]
-    problem, found, colour, condensed = _in_turn(posed, time_s, rotation_rad, plain, found)
+    problem, found, colour = _in_turn(posed, time_s, rotation_rad, plain, found)
     # What is slow counts less now, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
         found = other
-    return TraceFit(problem, found, colour, ~kept, condensed)
+    return TraceFit(problem, found, colour, ~kept)
 
 
 def _without_outliers(
@@ -161,9 +148,9 @@ def _without_outliers(
 
 def _in_turn(
     posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
-) -> tuple[Problem, Identification, Colour | None, Condensed | EverySample | None]:
+) -> tuple[Problem, Identification, Colour | None]:
     """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
-    problem, colour, condensed, freedom = plain, None, None, np.inf
+    problem, colour, freedom = plain, None, np.inf
     for _ in range(_ROUNDS):
         residual, sensitivity = _left(plain, found)
         uncertain = gripper_functions(posed, time_s, found.parameters)
@@ -185,7 +172,7 @@ def _in_turn(
         found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
         if moved < _STAYED and _alike(before, colour):
             break
-    return problem, found, colour, condensed
+    return problem, found, colour
 
 
 def _left(plain: Problem, found: Identification) -> tuple[Array, Array]:

@@ -10,13 +10,10 @@ from biogrip.identify.answer import Progress
 from biogrip.identify.methods import best_fit
 from biogrip.identify.model_choice import advice, ranked
 from biogrip.identify.trace_fit import TraceFit
-from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study
 
 
-def models_tried(
-    study: Study, case: Case, recorded: Measurements, fit: TraceFit, progress: Progress
-) -> dict[str, Any]:
+def models_tried(study: Study, case: Case, fit: TraceFit, progress: Progress) -> dict[str, Any]:
     """Fit the other sample models in the same noise, and say which the trace asks for.
 
     With parameters that are known, or where a fit takes minutes, there is nothing to say.
@@ -30,8 +27,7 @@ def models_tried(
     least_squares = case.method("least_squares")
     misfits = []
     for name in candidates:
-        model = CANDIDATES[name].model
-        problem = fit.problem_of(posed, recorded.time_s, recorded.rotation_rad[0], model)
+        problem = posed.for_model(fit.problem, CANDIDATES[name].model)
         rng = stream(study.study_seed, case.name, 0, f"model {name}")
         misfits.append(best_fit(problem, least_squares, rng, progress).misfit_rad)
     tried = ranked(candidates, misfits, fit.problem.residuals.samples)

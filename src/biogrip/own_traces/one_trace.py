@@ -128,7 +128,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             **said,
             "notes": [*fit.notes(), *said["notes"], *doubts],
             "noise_model": fit.noise_data(),
-            **models_tried(study, case, recorded, fit, progress.within),
+            **models_tried(study, case, fit, progress.within),
             "assumed": assumed(case),
             "by_default": by_default(wanted.config),
             "versions": versions(),
@@ -140,7 +140,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             data["posterior"], drawn = posterior.posterior_of_trace(
                 posterior.settings_of(study, case),
                 posed,
-                partial(fit.problem_of, posed, recorded.time_s, recorded.rotation_rad[0]),
+                partial(posed.for_model, fit.problem),
                 limits_in(said),
                 progress.within,
             )

@@ -4,6 +4,8 @@ Slower than `biogrip.response.misfit_series.SeriesMisfit`, which needs torque st
 uniform sampling and the linear model.
 """
 
+from copy import copy
+
 import numpy as np
 
 from biogrip.arrays import Array
@@ -60,6 +62,12 @@ class FormedMisfit:
         self._nuisance = nuisance
         # As many modes at once, about.
         self._chunk = max(1, _AT_ONCE // len(time_s) // (10 if model.power_law else 1))
+
+    def of_model(self, model: SampleModel) -> "FormedMisfit":
+        """Return the same trace for another model."""
+        other = copy(self)
+        other._model = model
+        return other
 
     def __call__(self, parameters: Array) -> Array:
         """Misfit in rad of each individual; infinite where the nonlinear model has no answer.

@@ -13,6 +13,7 @@ in the population, and however many populations are looked at together.
 """
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 from itertools import combinations
 
@@ -76,6 +77,14 @@ class SeriesMisfit:
     def joined(cls, misfits: Sequence["SeriesMisfit"]) -> "SeriesMisfit":
         """Take the traces of several that agree in all else, see `joins`, together."""
         return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
+
+    def of_model(self, model: SampleModel) -> "SeriesMisfit":
+        """Return the same traces for another model: what is tabulated of them is for any."""
+        other = copy(self)
+        other._simulated = (self._simulated[0], model, *self._simulated[2:])
+        other.__dict__.pop("_closed_form", None)
+        other.projections = self.projections
+        return other
 
     def joins(self, other: "SeriesMisfit") -> bool:
         """Whether populations against traces of both give the same bits together as apart."""

@@ -76,12 +76,25 @@ def _imports(module: str) -> list[str]:
     return [name for name in sorted(found) if _is_ours(name)]
 
 
-def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """Walk over a tree but for what only a type checker sees."""
-    yield node
-    for child in ast.iter_child_nodes(node):
-        if not (isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"):
-            yield from _executed(child)
+def _executed(tree: ast.Module) -> Iterator[ast.stmt]:
+    """Walk over all statements, for in no other place is an import, but for a type checker's."""
+    waiting: list[ast.stmt] = [*tree.body]
+    while waiting:
+        statement = waiting.pop()
+        if isinstance(statement, ast.If) and ast.unparse(statement.test) == "TYPE_CHECKING":
+            waiting += statement.orelse
+            continue
+        yield statement
+        for branch in (statement, *_of_branches(statement)):
+            for name in ("body", "orelse", "finalbody"):
+                waiting += getattr(branch, name, [])
+
+
+def _of_branches(statement: ast.stmt) -> list[ast.ExceptHandler] | list[ast.match_case]:
+    """What holds statements of a ``try`` or a ``match`` without being one."""
+    if isinstance(statement, ast.Try | ast.TryStar):
+        return statement.handlers
+    return statement.cases if isinstance(statement, ast.Match) else []
 
 
 def _is_ours(name: str) -> bool:

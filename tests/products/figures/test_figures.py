@@ -1,17 +1,22 @@
 """Figures drawn from the committed study's settings, and read back from their axes."""
 
 import re
+import zlib
+from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from fontTools import subset
+from fontTools.ttLib import TTFont
 from matplotlib.figure import Figure
 
 from biogrip.products.figures import comb, convergence, linkage, torque
 from biogrip.products.figures.results import scale_of
-from biogrip.products.figures.style import ALL_SEEDS, FITTED, save, styled
+from biogrip.products.figures.style import ALL_SEEDS, FITTED, figure, save, styled
 from biogrip.products.product import Product
 from tests.helpers.default import STUDY
 
@@ -20,8 +25,8 @@ def drawn(module: Any) -> Figure:
     """A figure of the default study's inputs."""
     (product,) = (value for value in vars(module).values() if isinstance(value, Product))
     with styled():
-        figure: Figure = module.draw(product.settings(STUDY, {}))
-    return figure
+        found: Figure = module.draw(product.settings(STUDY, {}))
+    return found
 
 
 def test_torque_shows_the_protocol_and_its_voltages() -> None:
@@ -131,3 +136,28 @@ def test_tips_are_drawn_as_far_closed_as_samples_let_them() -> None:
     assert turned == pytest.approx(float(told[1]) * int(told[2]), rel=0.02)
     texts = {text.get_text() for text in tips.texts}
     assert {"$x$", "$u_B$", "$u_C$"} <= texts
+
+
+def test_a_pdf_has_the_glyphs_that_are_drawn_and_no_table_that_lays_text_out(
+    tmp_path: Path,
+) -> None:
+    options = subset.Options
+    with styled():
+        empty = figure(2, 2)
+        empty.subplots().set_title("Wxyz")
+        save(empty, tmp_path / "drawn.png")
+    assert subset.Options is options
+    content = (tmp_path / "drawn.pdf").read_bytes()
+    streams = map(decompressed, re.findall(rb"stream\r?\n(.*?)\r?\nendstream", content, re.DOTALL))
+    (font,) = (TTFont(BytesIO(text)) for text in streams if text.startswith(b"\x00\x01\x00\x00"))
+    assert not {"GDEF", "GPOS", "GSUB", "kern"} & set(font.keys())
+    with_outlines = sum(font["glyf"][name].numberOfContours != 0 for name in font.getGlyphOrder())
+    # Of the title, and of 0.0, 0.2 ... 1.0 at the ticks: seven digits and the point.
+    assert with_outlines >= len("Wxyz") + len("01.2468") - 1
+
+
+def decompressed(stream: bytes) -> bytes:
+    """What is in a stream of a PDF; nothing if it is not compressed."""
+    with suppress(zlib.error):
+        return zlib.decompress(stream)
+    return b""

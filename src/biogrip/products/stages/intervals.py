@@ -35,6 +35,8 @@ from biogrip.study.study import Study
 
 # Digits of what is found, and of what is known to within less than a thousandth.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
+# Local fits take less memory a seed than populations do, and the last of them come alone.
+_TIMES = 2
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ def _rows(
     for some in groups(seeds, EVERY):
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
-        for group in groups(some):
+        for group in groups(some, _TIMES):
             traces = _traces(settings, group, time_s, rotation)
             likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
             known = np.tile(truth, (len(group), 1))

@@ -80,16 +80,21 @@ def _rows(
     case, samples = settings.case, len(recorded.time_s)
     identify = identifier("least_squares", settings.least_squares)
     progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
-    for name in settings.models:
-        model = CANDIDATES[name].model
-        for group in groups(seeds):
-            traces = [recorded.rotation_rad[seed] for seed in group]
-            problems = [posed.of(recorded.time_s, trace, model) for trace in traces]
+    rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in settings.models}
+    for group in groups(seeds):
+        traces = [posed.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
+        for name in settings.models:
+            model = CANDIDATES[name].model
+            problems = [posed.for_model(trace, model) for trace in traces]
             rngs = [stream(settings.study_seed, case, seed, f"model {name}") for seed in group]
             found = identify(problems, rngs, silent)
-            for seed, answer in zip(group, found, strict=True):
-                yield case, name, seed, len(model.names), samples, f"{answer.misfit_rad:.8e}"
+            rows[name] += [
+                (case, name, seed, len(model.names), samples, f"{answer.misfit_rad:.8e}")
+                for seed, answer in zip(group, found, strict=True)
+            ]
             progress.done(len(group))
+    for of_model in rows.values():
+        yield from of_model
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:

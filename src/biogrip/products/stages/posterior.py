@@ -123,7 +123,7 @@ def sample(
     if not posed.plain:
         # In the noise that the verdicts are told in.
         fit = trace_fit(posed, time_s, trace, partial(_found, settings))
-        pose = partial(fit.problem_of, posed, time_s, trace)
+        pose = partial(posed.for_model, fit.problem)
     data, drawn = posterior_of_trace(settings, posed, pose, limits, silent)
     write_samples(samples, posed.searched, drawn)
     write_text(told, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
