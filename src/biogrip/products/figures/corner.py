@@ -34,7 +34,7 @@ _HALF, _MOST = 0.5, 0.95
 # Of samples, beyond either end of an axis, where they are few.
 _BEYOND = 0.002
 # An axis that spans less has no decades to be marked.
-_WIDE = 20.0
+_WIDE = 5.0
 
 
 @dataclass(frozen=True)
