@@ -11,8 +11,8 @@ def test_ranks_that_are_uniform_pass_and_others_do_not() -> None:
     rng = np.random.default_rng(0)
     good = [rng.permutation(uniform) for _ in NAMES]
     assert counted(Draw(own, True) for own in np.transpose(good))["p_value"].min() > 0.01
-    narrow = np.where(uniform < 0.5, 0.5 * (2 * uniform) ** 2, 1 - 0.5 * (2 - 2 * uniform) ** 2)
-    shifted = uniform**1.3
+    narrow = np.where(uniform < 0.5, 0.5 * (2 * uniform) ** 3, 1 - 0.5 * (2 - 2 * uniform) ** 3)
+    shifted = uniform**1.6
     for bad in (narrow, shifted):
         found = counted(Draw(own, True) for own in np.transpose([bad] * len(NAMES)))
         assert found["p_value"].max() < 0.01

@@ -130,6 +130,8 @@ def test_the_figure_shows_samples_interval_and_truth(folder: Path, study: Study)
     assert [axes.axison for axes in grid.ravel()] == [True, False, True, True]
     pair = grid[1, 0]
     assert pair.get_xscale() == pair.get_yscale() == "log"
+    # Both axes have numbers on them, however little they span.
+    assert min(len(axis.get_major_ticks()) for axis in (pair.xaxis, pair.yaxis)) >= 1
     lines = [line.get_xdata()[0] for line in pair.lines if len(line.get_xdata()) == 2]
     assert lines[0] == 1.0
     texts = [text.get_text() for text in drawn.legends[0].get_texts()]

@@ -15,6 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 from scipy.ndimage import gaussian_filter
 
 from biogrip.arrays import Array
@@ -32,6 +33,8 @@ _BINS, _SMOOTH = 60, 1.5
 _HALF, _MOST = 0.5, 0.95
 # Of samples, beyond either end of an axis, where they are few.
 _BEYOND = 0.002
+# An axis that spans less has no decades to be marked.
+_WIDE = 5.0
 
 
 @dataclass(frozen=True)
@@ -196,9 +199,15 @@ def _ticks(axes: Axes, x_edges: Array, y_edges: Array | None) -> None:
             low, high = np.exp(edges[[0, -1]]).tolist()
             getattr(axes, f"set_{name}scale")("log")
             getattr(axes, f"set_{name}lim")(low, high)
-            places, labels = decade_ticks(low, high)
+            places, labels = decade_ticks(low, high) if high > _WIDE * low else _few(low, high)
             getattr(axes, f"set_{name}ticks")(places, labels)
             getattr(axes, f"set_{name}ticks")([], minor=True)
+
+
+def _few(low: float, high: float) -> tuple[list[float], list[str]]:
+    """Return one round value or two between the ends of an axis, and their labels."""
+    inside = [float(v) for v in MaxNLocator(2).tick_values(low, high) if low <= v <= high]
+    return inside, [f"{value:.6g}" for value in inside]
 
 
 CORNER = drawing(
