@@ -14,6 +14,7 @@ References
 
 import sys
 from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -95,10 +96,11 @@ def counted(draws: Iterable[Draw]) -> pd.DataFrame:
 def main(draws: int, first: int) -> None:
     """Write the table, and print it."""
     found = []
-    for number in range(first, first + draws):
-        found.append(drawn(number))
-        ranks = " ".join(f"{rank:.3f}" for rank in found[-1].ranks)
-        print(f"{number}: {ranks} {'' if found[-1].converged else 'not converged'}", flush=True)
+    with ProcessPoolExecutor() as processes:
+        for number, each in enumerate(processes.map(drawn, range(first, first + draws)), first):
+            found.append(each)
+            ranks = " ".join(f"{rank:.3f}" for rank in each.ranks)
+            print(f"{number}: {ranks} {'' if each.converged else 'not converged'}", flush=True)
     table = counted(found)
     print(table.to_string(index=False), flush=True)
     TABLE.parent.mkdir(parents=True, exist_ok=True)
