@@ -70,7 +70,10 @@ def draw_told(found: Designed) -> Figure:
 
 def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
     """All figures of a design, with their titles."""
-    yield "Torque, readings (a bar is 1/200 of the experiment), jaw force", draw_experiment(found)
+    yield (
+        "Torque, readings (a bar is 1/200 of the experiment), jaw force of each plausible sample",
+        draw_experiment(found),
+    )
     yield (
         "What a reading tells of each parameter, in units of the noise, after the steps with the "
         "most readings (ticks)",

@@ -38,6 +38,7 @@ def _told(found: Designed) -> dict[str, Any]:
     return {
         "title": found.case.title,
         "names": wanted.model.names,
+        "in_print": [f"{p.name} ({p.unit})" if p.unit else p.name for p in wanted.model.parameters],
         "samples": [
             {
                 "values": [f"{value:.3g}" for value in values],
