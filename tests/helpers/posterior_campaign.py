@@ -38,6 +38,7 @@ TABLE = ROOT / "results/published/posterior_calibration/tables/posterior_calibra
 QUANTITIES = parameters_and_sum(MODEL)
 NAMES = (*(quantity.label for quantity in QUANTITIES), "likelihood")
 RATE_HZ = 1.0
+_WRITTEN_EVERY = 20
 # The level's prior is Jeffreys' as far as it goes: of an improper one nothing can be drawn.
 LEAST_NOISE, MOST_NOISE = 0.05, 0.2
 
@@ -101,10 +102,11 @@ def main(draws: int, first: int) -> None:
             found.append(each)
             ranks = " ".join(f"{rank:.3f}" for rank in each.ranks)
             print(f"{number}: {ranks} {'' if each.converged else 'not converged'}", flush=True)
-    table = counted(found)
-    print(table.to_string(index=False), flush=True)
-    TABLE.parent.mkdir(parents=True, exist_ok=True)
-    table.to_csv(TABLE, index=False, float_format="%.3g")
+            if len(found) % _WRITTEN_EVERY == 0 or len(found) == draws:
+                table = counted(found)
+                print(table.to_string(index=False), flush=True)
+                TABLE.parent.mkdir(parents=True, exist_ok=True)
+                table.to_csv(TABLE, index=False, float_format="%.3g")
 
 
 if __name__ == "__main__":
