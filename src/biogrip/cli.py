@@ -35,6 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         options = parser.parse_args(given)
     signal.signal(signal.SIGTERM, _terminated)
+    # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         # What the workflow makes is recorded; what a person writes elsewhere is theirs.
         with ExitStack() as stack:
