@@ -24,6 +24,11 @@ rule all_maps:
         [file for file in ALL_FILES if "/robustness_" in file],
 
 
+rule all_designs:
+    input:
+        [file for file in ALL_FILES if Path(file).name.startswith("designed")],
+
+
 rule all_posteriors:
     input:
         [file for file in ALL_FILES if Path(file).name.startswith("posterior")],

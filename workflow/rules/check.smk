@@ -7,7 +7,7 @@ PUBLISHED = Path(workflow.basedir) / "results" / "published"
 OVERLAYS = {
     "robustness": (["robustness"], "all_maps", "robustness_*"),
     "readings": (["readings"], "readings", "readings"),
-    "design": (["design", "designed"], "designed", "designed"),
+    "design": (["design", "designed"], "all_designs", "designed*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.products.designed_cases import settings
 from biogrip.products.files.intervals import INTERVALS
-from biogrip.products.tables.designed import designed, settings
+from biogrip.products.tables.designed import designed
 from tests.helpers.default import study_of
 
 OVERLAY = """

@@ -1,25 +1,18 @@
 """What designed experiments tell beside the study's own, and whether they keep their promise."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from biogrip.arrays import Array
-from biogrip.design.experiment import relative_bounds
 from biogrip.design.schedule import forces
-from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
-from biogrip.experiment.sample import SampleModel
-from biogrip.experiment.sampling import Sampling
-from biogrip.instrument.gripper import Gripper
+from biogrip.experiment.protocol import torque_history
+from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.response.ringing import ringing_responses
-from biogrip.study.study import Study
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -37,57 +30,6 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class CaseSettings:
-    """A case's experiment, and the study's.
-
-    Parameters
-    ----------
-    gripper, model
-        What is simulated, with inertia; the model without what is known.
-    parameters
-        True values by name, SI units.
-    noise_rad
-        Of the sensor.
-    before, after
-        Protocol and sampling of the study, and of the case.
-    covered
-        Whether its seeds are there to be held against the bound.
-    """
-
-    gripper: Gripper
-    model: SampleModel
-    parameters: Mapping[str, float]
-    noise_rad: float
-    before: tuple[tuple[Phase, ...], Sampling]
-    after: tuple[tuple[Phase, ...], Sampling]
-    covered: bool
-
-
-def settings(study: Study) -> dict[str, CaseSettings]:
-    """Choose the experiments of cases that ask for a design."""
-    shared = study.config
-    before = (
-        shared.protocol.torques(shared.actuator),
-        Sampling(shared.measurement.rate_Hz, shared.measurement.times_s, shared.measurement.bursts),
-    )
-    found = {}
-    for name in _designed(study):
-        case = study.cases[name]
-        asked = case.block.design
-        assert asked is not None
-        found[name] = CaseSettings(
-            case.gripper,
-            case.problem.searched,
-            case.parameters,
-            asked.noise_rad,
-            before,
-            (case.phases, case.sampling),
-            case.coverage_seeds > 0,
-        )
-    return found
-
-
 def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Table:
     """Hold bounds of both experiments, and estimates of many seeds, against one another.
 
@@ -102,7 +44,10 @@ def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Tab
     rows: list[tuple[Cell, ...]] = []
     for name, case in settings.items():
         found = INTERVALS.read(next(files)) if case.covered else None
-        before, after = (_bounds(case, *one) for one in (case.before, case.after))
+        truths = np.array([[case.parameters[name] for name in case.model.names]])
+        before, after = (
+            bounds(case, experiment, truths)[0] for experiment in (case.before, case.after)
+        )
         least_N = _least_force(case)
         for index, parameter in enumerate(case.model.parameters):
             truth = case.parameters[parameter.name]
@@ -118,14 +63,6 @@ def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Tab
         "study's confidence, hold the truth."
     )
     return Table(caption, _COLUMNS, rows)
-
-
-def _bounds(case: CaseSettings, phases: tuple[Phase, ...], sampling: Sampling) -> Array:
-    torque: TorqueHistory = torque_history(phases)
-    values = np.array([[case.parameters[name] for name in case.model.names]])
-    times = sampling.over(torque.end_s)
-    told = ringing_responses(case.gripper, case.model, torque, times, values)[:, 1:]
-    return relative_bounds(told @ told.swapaxes(1, 2) / case.noise_rad**2)[0]
 
 
 def _least_force(case: CaseSettings) -> float:
@@ -154,14 +91,6 @@ def _of_seeds(found: pd.DataFrame | None, name: str, truth: float, bound: float)
     return [100 * spread, spread / bound, 100 * float(holds.mean()), len(mine)]
 
 
-def _designed(study: Study) -> list[str]:
-    return [
-        name
-        for name in study.simulated
-        if study.cases[name].block.design and study.cases[name].problem.inertia
-    ]
-
-
 DESIGNED = table(
     designed,
     name="designed",
@@ -172,8 +101,8 @@ DESIGNED = table(
     reads={
         "intervals": of_cases(
             INTERVALS.path,
-            lambda study: [n for n in _designed(study) if study.cases[n].coverage_seeds > 0],
+            lambda study: [n for n in designed_cases(study) if study.cases[n].coverage_seeds > 0],
         )
     },
-    when=lambda study: bool(_designed(study)),
+    when=lambda study: bool(designed_cases(study)),
 )

@@ -1,0 +1,107 @@
+"""Where the gripper is a measuring instrument: what two experiments tell of any sample."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+
+from biogrip.arrays import Array
+from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
+from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.style import PAGE_IN, figure, panel
+from biogrip.study.study import Study
+
+WELL = 0.1
+"""A parameter that is known to this share of itself counts as determined."""
+
+_STIFFNESSES = np.geomspace(1e-3, 1e2, 16)
+_DAMPINGS = np.geomspace(1e-2, 1e3, 16)
+_SHOWN_PERCENT = (0.1, 1000.0)
+
+
+def of_case(study: Study, case: str) -> CaseSettings:
+    """Choose what a case's map depends on."""
+    return settings(study)[case]
+
+
+def draw(case: CaseSettings) -> Figure:
+    """Draw bounds over k_p and c, in the study's experiment and in the case's own.
+
+    Parameters
+    ----------
+    case
+        Both experiments; k and c_p of the samples are as in its own.
+    """
+    symbols = [parameter.symbol for parameter in case.model.parameters]
+    drawn = figure(PAGE_IN, 3.6)
+    grid = drawn.subplots(2, len(symbols), sharex=True, sharey=True, squeeze=False)
+    samples = samples_of(case)
+    for row, (experiment, whose) in enumerate(((case.before, "study's"), (case.after, "own"))):
+        percent = 100 * bounds(case, experiment, samples).T
+        for column, symbol in enumerate(symbols):
+            axes = grid[row, column]
+            mesh = _map(axes, percent[column].reshape(len(_DAMPINGS), -1))
+            _mark(axes, case)
+            letter = chr(ord("a") + row * len(symbols) + column)
+            panel(axes, letter, f"{symbol}, {whose} protocol")
+    for axes in grid[-1]:
+        axes.set_xlabel("$k_p$ (N/m)")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("$c$ (N s/m)")
+    drawn.colorbar(mesh, ax=grid, label="bound (%)", extend="both", pad=0.01)
+    return drawn
+
+
+def samples_of(case: CaseSettings) -> Array:
+    """Return the map's samples, (n, n_parameters), k_p changing first."""
+    stiffness, damping = np.meshgrid(_STIFFNESSES, _DAMPINGS)
+    values = {name: np.full(stiffness.size, case.parameters[name]) for name in case.model.names}
+    values |= {"k_p": stiffness.ravel(), "c": damping.ravel()}
+    return np.stack([values[name] for name in case.model.names], axis=1)
+
+
+def _map(axes: Axes, percent: Array) -> QuadMesh:
+    # No finite bound is as far beyond the scale as any.
+    shown = np.where(np.isfinite(percent), percent, 1e9)
+    mesh = axes.pcolormesh(
+        _STIFFNESSES,
+        _DAMPINGS,
+        shown,
+        norm=LogNorm(*_SHOWN_PERCENT),
+        cmap="cividis_r",
+        shading="nearest",
+    )
+    if shown.min() < 100 * WELL < shown.max():
+        axes.contour(_STIFFNESSES, _DAMPINGS, shown, [100 * WELL], colors="black", linewidths=1.2)
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    return mesh
+
+
+def _mark(axes: Axes, case: CaseSettings) -> None:
+    """Show the case itself, where it is on the map."""
+    k_p, c = case.parameters["k_p"], case.parameters["c"]
+    if _STIFFNESSES[0] <= k_p <= _STIFFNESSES[-1]:
+        axes.plot(k_p, c, "*", color="white", markeredgecolor="black", markersize=8)
+
+
+def _mapped(study: Study) -> list[str]:
+    """Cases of which both k_p and c are searched."""
+    return [
+        name
+        for name in designed_cases(study)
+        if {"k_p", "c"} <= set(study.cases[name].problem.searched.names)
+    ]
+
+
+DESIGNED_MAP = drawing(
+    draw,
+    name="designed_map",
+    caption="Where the gripper is a measuring instrument: Cramér-Rao bounds of every parameter, "
+    "all of them free, over the parallel spring k_p and the branch's damper c of a sample, in the "
+    "study's experiment (above) and in the case's own (below), at the same noise. The line is "
+    f"{100 * WELL:g} %, the star the case.",
+    settings=of_case,
+    cases=_mapped,
+)
