@@ -211,6 +211,11 @@ def test_a_trace_that_is_no_file_is_refused(
             ("--rotation-unit", "microrad"),
             "--rotation-unit: found 'microrad'. Did you mean 'urad'? Allowed: rad, mrad, urad",
         ),
+        (("--noise-model", "pink"), "--noise-model: found 'pink'. Allowed: white, coloured."),
+        (
+            ("--noise-model", "coloured", "--noise", "1e-6"),
+            "--noise: is that of white noise; leave it out with coloured noise.",
+        ),
         (("--time", ""), "--time: found '' of 0 characters, allowed are at least 1."),
         (("--rotation", "x" * 5000), "of 5000 characters, allowed are at most 4000."),
     ],

@@ -15,9 +15,10 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.multi_start import fitted_from
 from biogrip.identify.outliers import FAR, outliers_of
 from biogrip.identify.problem import Problem
-from biogrip.identify.trace_fit import MOST_SAMPLES, trace_fit
+from biogrip.identify.trace_fit import trace_fit
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.simulation import simulated_rotation
+from biogrip.response.whitening import MOST_SAMPLES
 from tests.helpers.default import STUDY
 
 CASE = STUDY.cases["liquid_drop_2"]

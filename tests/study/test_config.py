@@ -146,6 +146,12 @@ BAD = {
         r"my.yaml, line 1: cases.x.contact: found unilateral and a nonlinear target, allowed is "
         r"models.target: linear"
     ),
+    "measurement: {noise: {flicker: {share: 2}}}": r"noise.flicker.share: found 2, allowed is "
+    r"greater than 0 and at most 1",
+    "measurement: {rate_Hz: 1000, noise_model: coloured}": r"allowed are 7 to 50000 with a "
+    r"coloured noise model",
+    "gripper: {uncertainty: {left: {stiffness_Nm_per_rad: 1e-6}}}": r"uncertainty.left."
+    r"stiffness_Nm_per_rad: found 1e-06, allowed is less than half of 4.4e-07",
     "measurement: {noise: {kind: pink}}": r"noise.kind: found 'pink'. Allowed: gaussian, uniform",
     "genetic_algorithm: {survivors: 500}": r"survivors: found 500, allowed is less than population",
     "search_range: {k: {exponent: [3, -3]}}": r"found \[3, -3\], allowed is \[lowest, highest\]",

@@ -20,10 +20,7 @@ from biogrip.identify.noise_colour import ColourLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
-from biogrip.response.whitening import Colour
-
-MOST_SAMPLES = 50_000
-"""In coloured noise each sample weighs differently, and few cannot stand for all."""
+from biogrip.response.whitening import MOST_SAMPLES, Colour
 
 _ROUNDS = 5
 # Shares and times that change by less change no limit in its third digit.

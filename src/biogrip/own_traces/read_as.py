@@ -3,6 +3,7 @@
 from dataclasses import asdict, dataclass
 
 from biogrip.errors import BiogripError
+from biogrip.study.measurement_block import COLOURED
 from biogrip.study.validation import value_problem
 
 _OPTIONS = {"noise_rad": "noise"}
@@ -48,6 +49,10 @@ class ReadAs:
         BiogripError
             With the option.
         """
+        if self.noise_model == COLOURED and self.noise_rad is not None:
+            raise BiogripError(
+                f"--noise: is that of white noise; leave it out with {COLOURED} noise."
+            )
         for key, value in self.block.items():
             if problem := value_problem(("measurement", key), value):
                 option = _OPTIONS.get(key, key).replace("_", "-")

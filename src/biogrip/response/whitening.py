@@ -24,6 +24,9 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise_parts import flicker_rates
 from biogrip.response.nuisance import with_uncertain, without
 
+MOST_SAMPLES = 50_000
+"""In coloured noise each sample weighs differently, and few cannot stand for all."""
+
 
 @dataclass(frozen=True)
 class Colour:

@@ -17,6 +17,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
 from biogrip.keys import Key, Problem, printed
+from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.method_blocks import MethodBlocks
@@ -280,16 +281,19 @@ class CaseBlock(Shared):
 
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
-        needed = len(self._searched) + measured.offset + measured.drift + 1
+        fitted_along = 2 if measured.coloured else measured.offset + measured.drift
+        needed = len(self._searched) + fitted_along + 1
         if measured.bursts:
             yield from self._burst_problems(needed)
             return
         times = measured.times_s
         if not times:
             samples = end * measured.rate_Hz + 1
-            if not needed <= samples <= _MOST_SAMPLES:
+            most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
+            if not needed <= samples <= most:
                 text = f"found {measured.rate_Hz}, which gives {samples:.6g} samples over the "
-                allowed = f"protocol; allowed are {needed} to {_MOST_SAMPLES}."
+                how = " with a coloured noise model" if measured.coloured else ""
+                allowed = f"protocol; allowed are {needed} to {most}{how}."
                 yield ("measurement", "rate_Hz"), text + allowed
             return
         if len(times) < needed:

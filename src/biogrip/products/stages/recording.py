@@ -10,6 +10,7 @@ from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_meas
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Reads
 from biogrip.response.nuisance import nuisance_basis
+from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.recordings import Columns, read_recording
@@ -58,6 +59,11 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
 def read_checked(settings: Settings, recorded: Path) -> Measurements:
     """Read a recorded trace, and refuse what its gripper and protocol cannot have given."""
     trace, problem = read_recording(recorded, settings.columns), settings.problem
+    if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
+        raise BiogripError(
+            f"{recorded}: found {len(trace.time_s)} samples, allowed are at most {MOST_SAMPLES} "
+            "with a coloured noise model: average neighbouring ones."
+        )
     nuisance = nuisance_basis(trace.time_s, offset=problem.offset, drift=problem.drift)
     check_recording(
         trace,
