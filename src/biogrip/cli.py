@@ -23,6 +23,9 @@ _SHOWN = 200
 
 # Imports stay inside their command: a job pays only for what it uses.
 
+_MESSAGES = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
+_stops: list[signal.Signals] = []
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
@@ -34,7 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.rest = given[1:]
     else:
         options = parser.parse_args(given)
-    signal.signal(signal.SIGTERM, _terminated)
+    for number in _MESSAGES:
+        # Ignored, as with nohup, it stays so.
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, _stop)
     # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -57,9 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = "" if error.filename is None else f"{str(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print("biogrip: stopped; nothing was written by halves.", file=sys.stderr)
-        return 128 + signal.SIGINT
+    except (KeyboardInterrupt, ImportError, SystemError):
+        # A library that was being loaded may have made another error of it.
+        if not _stops:
+            raise
+        print(f"biogrip: {_MESSAGES[_stops[0]]}; nothing was written by halves.", file=sys.stderr)
+        return 128 + _stops[0]
     return options.status
 
 
@@ -72,10 +81,10 @@ def _refuse_others(path: Path, scratch: Path) -> None:
         refuse_others(Manifest(RESULTS), RESULTS, [path])
 
 
-def _terminated(number: int, frame: FrameType | None) -> None:
-    print("biogrip: ended by SIGTERM; nothing was written by halves.", file=sys.stderr)
+def _stop(number: int, _: FrameType | None) -> None:
+    _stops.append(signal.Signals(number))
     # Scratch files are tidied up on the way out.
-    raise SystemExit(128 + number)
+    raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -12,6 +12,8 @@ from biogrip.identify.model_choice import advice, ranked
 from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
 
+_MOST_SAMPLES = 50_000
+
 
 def models_tried(study: Study, case: Case, fit: TraceFit, progress: Progress) -> dict[str, Any]:
     """Fit the other sample models in the same noise, and say which the trace asks for.
@@ -19,8 +21,10 @@ def models_tried(study: Study, case: Case, fit: TraceFit, progress: Progress) ->
     With parameters that are known, or where a fit takes minutes, there is nothing to say.
     """
     posed = case.problem
-    # Beside arms that ring there is no springpot yet.
-    power_laws = [] if posed.inertia else _power_laws(posed.torque.end_s)
+    # Beside arms that ring there is no springpot yet, and beside so many samples its modes, of
+    # which it has dozens, would take gigabytes.
+    few = fit.problem.residuals.samples <= _MOST_SAMPLES
+    power_laws = _power_laws(posed.torque.end_s) if few and not posed.inertia else []
     candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
     if posed.nonlinear or posed.fixed:
         return {"models": [], "advice": None}

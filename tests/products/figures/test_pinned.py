@@ -13,15 +13,18 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.testing.compare import compare_images
 
+from biogrip.experiment.sample import MODELS
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared
+from biogrip.products.figures import declared, designed_map
 from biogrip.products.figures import robustness as heat_map
+from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
 from tests.helpers.default import plan_of, study_of
 from tests.helpers.runs import SMALL
+from tests.products.tables.test_designed import OVERLAY
 
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures, in which a line is still a line.
@@ -61,7 +64,13 @@ def jobs() -> dict[str, tuple[str, dict[str, str]]]:
 
 JOBS = jobs()
 HEAT_MAPS = "robustness_level"
-NAMES = [*JOBS, HEAT_MAPS]
+# Those of overlays, by what they are drawn from here.
+OTHERS = {
+    HEAT_MAPS: "robustness_map",
+    "posterior_made_up": "corner",
+    "designed_map": "designed_map",
+}
+NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
     ("name", "figure"), [(name, name) for name in NAMES], indirect=["figure"], ids=NAMES
 )
@@ -123,11 +132,33 @@ def difference(name: str, figure: Figure, folder: Path) -> str | None:
 @pytest.fixture(scope="module")
 def figure(request: pytest.FixtureRequest, draw: Draw, judged: list[Path]) -> Figure:
     """The figure that two tests are about, drawn; the second changes it."""
-    if request.param != HEAT_MAPS:
+    if request.param not in OTHERS:
         return draw(request.param)
-    study = study_of(SWEEP)
     with styled():
-        return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
+        if request.param == HEAT_MAPS:
+            study = study_of(SWEEP)
+            return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
+        if request.param == "designed_map":
+            designed = study_of(OVERLAY.replace("SEEDS", "0"))
+            return designed_map.draw(designed_map.of_case(designed, "endothelial_cell"))
+        return _corner()
+
+
+def _corner() -> Figure:
+    """Two parameters that trade, and one of which nothing is known, made up."""
+    rng = np.random.default_rng(0)
+    first, second = rng.standard_normal((2, 4000))
+    logs = np.stack((first, 0.3 * second - first, rng.uniform(-9, 0, 4000)), axis=1)
+    parameters = MODELS["liquid_drop"].parameters
+    told = [
+        {"quantity": p.name, "median": m, "low": low, "high": high}
+        for p, (low, m, high) in zip(
+            parameters, np.exp(np.quantile(logs, (0.025, 0.5, 0.975), axis=0)).T, strict=True
+        )
+    ]
+    truth = {p.name: 1.0 for p in parameters[:2]}
+    said = {"quantities": told, "confidence": 0.95}
+    return draw_corner(parameters, np.exp(logs), said, truth, "made up")
 
 
 @pytest.fixture
@@ -178,6 +209,6 @@ def test_every_figure_is_pinned_and_nothing_else(pinning: bool) -> None:
             if path.stem not in NAMES:
                 path.unlink()
     assert {path.stem for path in PINNED.glob("*.png")} == set(NAMES)
-    pinned = {JOBS[name][0] for name in JOBS} | {"robustness_map"}
+    pinned = {JOBS[name][0] for name in JOBS} | set(OTHERS.values())
     assert pinned == {name for name, one in products().items() if one.category == "Figures"}
     assert sum(path.stat().st_size for path in PINNED.iterdir()) < 1_000_000
