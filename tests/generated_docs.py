@@ -85,7 +85,8 @@ def simulated_noise() -> str:
     """How often intervals held the truth in noise of several kinds, and what was said of it."""
     return _table(
         {
-            "beside white noise": row["noise"],
+            "noise": row["noise"],
+            "sample": row["case"].replace("_", " "),
             "quantity": row["quantity"],
             "flagged": f"{row['flagged_percent']:.1f} %",
             "held, taken for white": f"{row['white_coverage_percent']:.1f} %",
