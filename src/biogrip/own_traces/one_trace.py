@@ -27,7 +27,7 @@ from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, posterior, recording
 from biogrip.progress import Progress
-from biogrip.response.nuisance import nuisance_basis, within
+from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
@@ -204,7 +204,7 @@ def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -
     simulated = simulated_rotation(
         posed.gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear
     )[0]
-    basis = nuisance_basis(time_s, offset=posed.offset, drift=posed.drift)
+    basis = posed.nuisance(time_s)
     added = within(basis, measured - simulated)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     start = float(added[0] - slope * time_s[0])

@@ -14,7 +14,7 @@ from biogrip.identify.success import typical
 from biogrip.products.batches import parse_batch
 from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.traces import Measurements, read_measurements
-from biogrip.response.nuisance import nuisance_basis, within
+from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
 
 SHOWN_SEEDS = 100
@@ -99,7 +99,7 @@ def fit_of(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
     )[0]
     measured = recorded.rotation_rad[seed]
-    nuisance = nuisance_basis(recorded.time_s, offset=problem.offset, drift=problem.drift)
+    nuisance = problem.nuisance(recorded.time_s)
     fitted = simulated + within(nuisance, measured - simulated)
     return Fit(recorded.time_s, recorded.target_rad, measured, fitted)
 

@@ -15,12 +15,11 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, SampleModel
 from biogrip.files import write_text
 from biogrip.identifiability.posterior_settings import PosteriorSettings
-from biogrip.identify.answer import Identification, Progress, silent
+from biogrip.identify.answer import Progress, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, best_fit
 from biogrip.identify.model_choice import ranked
 from biogrip.identify.problem import Problem
-from biogrip.identify.trace_fit import trace_fit
 from biogrip.products.files.posterior import (
     SAMPLES,
     TOLD,
@@ -34,6 +33,7 @@ from biogrip.products.files.traces import MEASUREMENTS, read_measurements
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
+from biogrip.products.stages import judgement
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
@@ -44,30 +44,19 @@ _EVIDENCE = "biogrip.identifiability.evidence"
 
 
 @dataclass(frozen=True)
-class Settings:
-    """How a posterior is sampled.
+class Settings(judgement.Settings):
+    """How a posterior is sampled, of the trace that is judged.
 
     Parameters
     ----------
-    study_seed, case
-        Whose random streams.
-    problem, least_squares
-        What is identified, and by how many fits models are ranked.
     posterior
         Prior, walkers and steps.
     models
         Names of those whose evidence is compared, see `CANDIDATES`; none without.
-    confidence
-        Of the intervals.
     """
 
-    study_seed: int
-    case: str
-    problem: CaseProblem
-    least_squares: object
     posterior: PosteriorSettings
     models: tuple[str, ...]
-    confidence: float
 
 
 def settings_of(study: Study, case: Case) -> Settings:
@@ -75,13 +64,9 @@ def settings_of(study: Study, case: Case) -> Settings:
     assert case.posterior is not None
     compared = case.posterior.evidence and not case.fixed
     return Settings(
-        study.study_seed,
-        case.name,
-        case.problem,
-        case.method("least_squares"),
-        case.posterior,
-        study.models_of(case) if compared else (),
-        case.confidence,
+        **vars(judgement.settings_of(study, case)),
+        posterior=case.posterior,
+        models=study.models_of(case) if compared else (),
     )
 
 
@@ -122,16 +107,11 @@ def sample(
     pose = partial(posed.of, time_s, trace)
     if not posed.plain:
         # In the noise that the verdicts are told in.
-        fit = trace_fit(posed, time_s, trace, partial(_found, settings))
+        fit = settings.fit(posed, time_s, trace, TRACE)
         pose = partial(posed.for_model, fit.problem)
     data, drawn = posterior_of_trace(settings, posed, pose, limits, silent)
     write_samples(samples, posed.searched, drawn)
     write_text(told, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
-
-
-def _found(settings: Settings, problem: Problem) -> Identification:
-    rng = stream(settings.study_seed, settings.case, TRACE, "identifiability")
-    return best_fit(problem, settings.least_squares, rng, silent)
 
 
 def posterior_of_trace(

@@ -9,7 +9,6 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Reads
-from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.plausibility import check_recording
@@ -64,7 +63,7 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
             f"{recorded}: found {len(trace.time_s)} samples, allowed are at most {MOST_SAMPLES} "
             "with a coloured noise model: average neighbouring ones."
         )
-    nuisance = nuisance_basis(trace.time_s, offset=problem.offset, drift=problem.drift)
+    nuisance = problem.nuisance(trace.time_s)
     check_recording(
         trace,
         settings.gripper,
