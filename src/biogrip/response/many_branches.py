@@ -185,10 +185,7 @@ def modes_of_rotation(
     weights : (n, n_arms, n_drives, n_modes)
         In rad per N m.
     """
-    network = separated(network)
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    impedance = arms.with_sample(network)
-    zeros = impedance.zeros()
+    arms, network, impedance, zeros = _held(gripper, network, symmetric=symmetric)
     static = arms.rotations_at_rest(network)
     if inertia:
         found = ringing(gripper, network, zeros, alike=arms.alike)
@@ -201,16 +198,23 @@ def modes_of_force(
     gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     """Jaw force after unit steps, in N per N m; as of `modes_of_rotation`, with one arm."""
-    network = separated(network)
-    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    impedance = arms.with_sample(network)
-    zeros = impedance.zeros()
+    arms, network, impedance, zeros = _held(gripper, network, symmetric=symmetric)
     static = arms.forces_at_rest(network)
     if inertia:
         found = ringing(gripper, network, zeros, alike=arms.alike)
         return _by_sample(static, found.rates.T, found.forces(), symmetric)
     weights = -arms.forces(zeros) / impedance.steepness(zeros)
     return _by_sample(static, -zeros.values, weights, symmetric)
+
+
+def _held(
+    gripper: Gripper, network: Network, *, symmetric: bool
+) -> tuple[Arms, Network, Impedance, Zeros]:
+    """Samples between the arms, and the rates of their modes without inertia."""
+    network = separated(network)
+    arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
+    impedance = arms.with_sample(network)
+    return arms, network, impedance, impedance.zeros()
 
 
 def _by_sample(

@@ -1,6 +1,5 @@
 """A posterior as files: what is said of it as JSON, its samples as Parquet."""
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,8 +8,8 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded
-from biogrip.errors import BiogripError
 from biogrip.experiment.sample import SampleModel
+from biogrip.products.files.json_object import read_object
 from biogrip.products.files.parquet import read_columns, table_of, write_tables
 
 if TYPE_CHECKING:
@@ -82,13 +81,8 @@ def read_posterior(path: Path) -> dict[str, Any]:
     BiogripError
         If it is missing or says nothing of one.
     """
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as a posterior: {error}.") from error
-    if not {"quantities", "converged", "in_words"} <= set(found):
-        raise BiogripError(f"{path}: says nothing of a posterior.")
-    return found
+    keys = {"quantities", "converged", "in_words"}
+    return read_object(path, "a posterior", keys, "says nothing of a posterior")
 
 
 def thinned(log_parameters: Array) -> Array:

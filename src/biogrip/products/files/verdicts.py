@@ -1,13 +1,12 @@
 """A diagnosis as plain data, for JSON files and whatever reads them."""
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from biogrip.digits import rounded
-from biogrip.errors import BiogripError
+from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
     from biogrip.identifiability.diagnosis import Diagnosis
@@ -52,13 +51,7 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     BiogripError
         If it is missing or is not one.
     """
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise BiogripError(f"{path}: cannot be read as verdicts: {error}.") from error
-    if not {"quantities", "trades", "notes"} <= set(found):
-        raise BiogripError(f"{path}: holds no verdicts.")
-    return found
+    return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 
 def told_from_zero(verdicts: dict[str, Any]) -> set[str]:
