@@ -20,9 +20,8 @@ from biogrip.arrays import Array, ComplexArray
 from biogrip.experiment.network import Network
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.interlacing import Zeros
-from biogrip.response.roots import roots
+from biogrip.response.roots import roots, swept
 
-_SWEEPS = 80
 # Off the real axis, which nothing that begins on it would leave.
 _ASIDE = 1 + 1e-3j
 
@@ -88,21 +87,8 @@ def ringing(gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) ->
     """
     system = _System(gripper, network, alike=alike)
     origin, beyond = system.begin(zeros)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        settled = resting = np.zeros((len(origin), 1), dtype=bool)
-        others = ~np.eye(origin.shape[1], dtype=bool)
-        for _ in range(_SWEEPS):
-            newton = system.newton_step(origin, beyond)
-            apart = (origin[:, None] - origin[..., None]) + (beyond[..., None] - beyond[:, None])
-            repulsion = np.where(others, 1 / apart, 0).sum(axis=2)
-            step = newton / (1 - newton * repulsion)
-            step = np.where(np.isfinite(step) & ~resting, step, 0)
-            beyond = beyond - step
-            if np.all(settled):
-                break
-            # The error is cubed in a sweep, so one more takes it below rounding.
-            resting = settled
-            settled = np.all(np.abs(step) <= 1e-8 * np.abs(beyond), axis=1, keepdims=True)
+    between = origin[:, None] - origin[..., None]
+    beyond = swept(beyond, lambda points: system.newton_step(origin, points), between)
     return system.at(origin, beyond)
 
 

@@ -15,6 +15,7 @@ References
    Numerical Algorithms 13 (1996), 179-200: starting radii from the Newton polygon.
 """
 
+from collections.abc import Callable
 from itertools import combinations
 from typing import TypeVar
 
@@ -78,15 +79,41 @@ def roots(coefficients: Array) -> ComplexArray:
     # No symmetry, so that no two starting points can move in step.
     angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
     z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
-    off_diagonal = ~np.eye(degree, dtype=bool)
+    return separate(swept(z, lambda z: _newton_step(coefficients, z)))
+
+
+def swept(
+    z: ComplexArray,
+    newton_step: Callable[[ComplexArray], ComplexArray],
+    between: Array | None = None,
+) -> ComplexArray:
+    """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
+
+    Parameters
+    ----------
+    z : (n, n_points)
+        Starting points; of each function as many as it has zeros.
+    newton_step
+        Function over derivative at such points.
+    between : (n, n_points, n_points), optional
+        What the distance of two points is more than their difference, if points are counted from
+        origins of their own.
+
+    Returns
+    -------
+    (n, n_points)
+    """
+    off_diagonal = ~np.eye(z.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
         settled = resting = np.zeros((len(z), 1), dtype=bool)
         for _ in range(_SWEEPS):
-            newton = _newton_step(coefficients, z)
+            newton = newton_step(z)
             distance = z[:, :, None] - z[:, None, :]
+            if between is not None:
+                distance = between + distance
             repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
-            # What is done rests, so that its last bits do not depend on the other polynomials.
+            # What is done rests, so that its last bits do not depend on the other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
             z = z - step
             if np.all(settled):
@@ -94,7 +121,7 @@ def roots(coefficients: Array) -> ComplexArray:
             # The error is cubed in a sweep, so one more takes it below rounding.
             resting = settled
             settled = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
-    return separate(z)
+    return z
 
 
 def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
