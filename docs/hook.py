@@ -9,7 +9,7 @@ from mkdocs.structure.files import File, Files
 ROOT = Path(__file__).parents[1]
 SHOWN = (
     *("*.md", "CITATION.cff", "LICENSE", "config/*", "data/*", "docs/**/*", "profiles/**/*"),
-    *("results/published/**/*", "benchmarks/**/results/*", "tests/identifiability/*.py"),
+    *("results/published/**/*", "benchmarks/**/results/*", "tests/*/test_*.py"),
 )
 _LEFT_OUT = {".lock", ".pyc"}
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
