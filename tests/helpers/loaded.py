@@ -1,79 +1,168 @@
-"""Snakemake called as often as need be and loaded once.
+"""Snakemake and `biogrip`, called as often as need be and loaded once.
 
-Loading it and the study's code takes longer than most of what tests call it for. So a
-process loads both, and forks for each call: folder, environment and output of a call
-are its own, as those of a program that is started.
+Loading them takes longer than most of what tests call them for. So a process loads both, and
+forks for each call: folder, environment and output of a call are its own, as those of a program
+that is started. The jobs of a run ask it, too: for their shell `biogrip` is `asking.py`.
 """
 
-import json
+import atexit
+import gc
 import os
+import shlex
+import shutil
+import socket
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import tempfile
+import traceback
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from importlib import import_module
+from io import BytesIO
 from pathlib import Path
 from select import select
+from typing import IO, Any, NoReturn
+
+from tests.helpers import asking
 
 _SECONDS = 600
 
 
-def call(arguments: Sequence[str], folder: Path, environment: Mapping[str, str], said: Path) -> int:
-    """Call Snakemake in a folder; its exit status.
+def call(
+    program: str,
+    arguments: Sequence[str],
+    folder: Path,
+    environment: Mapping[str, str],
+    outputs: Sequence[IO[str]],
+) -> int:
+    """Call a program in a folder; its exit status.
 
     Parameters
     ----------
+    program
+        Which: ``biogrip`` or ``snakemake``.
     arguments
         Of the command line.
     folder
         Where.
     environment
-        All of it.
-    said
-        File for both of its outputs.
+        All of it; its jobs are told besides whom to ask.
+    outputs
+        Files for its output and its errors.
     """
-    process = _process()
-    assert process.stdin is not None
-    assert process.stdout is not None
-    process.stdin.write(json.dumps([arguments, str(folder), dict(environment), str(said)]) + "\n")
-    process.stdin.flush()
-    if not select([process.stdout], [], [], _SECONDS)[0]:
-        process.kill()
-        _process.cache_clear()
-        raise TimeoutError(said.read_text())
-    return int(process.stdout.readline())
+    place = _place()
+    told = {**environment, "BASH_ENV": f"{place}/functions"}
+    with open(os.devnull) as nothing:
+        files = [nothing.fileno(), *(file.fileno() for file in outputs)]
+        return asking.ask(
+            f"{place}/socket", [program, *arguments], str(folder), told, files, _SECONDS
+        )
 
 
 @cache
-def _process() -> "subprocess.Popen[str]":
-    # It ends when nobody can ask any more.
-    return subprocess.Popen(
-        [sys.executable, "-m", __name__],
+def _place() -> str:
+    """Folder of the socket at which a process listens; it ends when nobody can ask any more."""
+    # Not that of a test: the path of a socket has to be short.
+    folder = tempfile.mkdtemp(prefix="biogrip-loaded-")
+    atexit.register(shutil.rmtree, folder)
+    client = shlex.join([sys.executable, "-I", "-S", asking.__file__, f"{folder}/socket"])
+    Path(folder, "functions").write_text(f'biogrip() {{ {client} "$@"; }}\n')
+    # Its standard input is closed when this process ends, however it does.
+    process = subprocess.Popen(
+        [sys.executable, "-m", __name__, f"{folder}/socket"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
+    atexit.register(process.communicate)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return folder
 
 
-def _serve() -> None:
-    from snakemake.cli import main
+def _serve(place: str) -> None:
+    programs = _load()
+    # Else a call would copy all that is loaded, to count what refers to it.
+    gc.freeze()
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(place)
+        listening.listen()
+        print("ready", flush=True)
+        while sys.stdin not in select([listening, sys.stdin], [], [])[0]:
+            connection, _ = listening.accept()
+            with connection:
+                if not os.fork():
+                    listening.close()
+                    _answer(connection, programs)
+            _reap()
 
+
+def _load() -> dict[str, Callable[[], Any]]:
+    from snakemake.cli import get_argument_parser
+    from snakemake.cli import main as snakemake_main
+
+    from biogrip.cli import main
     from biogrip.products.catalogue import products
+    from biogrip.products.figures.style import figure, styled
+    from biogrip.running.source_files import fingerprint
 
-    products()
-    for line in sys.stdin:
-        arguments, folder, environment, said = json.loads(line)
-        child = os.fork()
-        if not child:
-            output = os.open(said, os.O_WRONLY)
-            for number, file in enumerate((os.open(os.devnull, os.O_RDONLY), output, output)):
-                os.dup2(file, number)
-            os.chdir(folder)
-            os.environ.clear()
-            os.environ.update(environment)
-            sys.argv = ["snakemake", *arguments]
-            sys.exit(main())
-        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+    # What either imports only when it is needed.
+    get_argument_parser()
+    for name in ("smart_open", "snakemake.report"):
+        import_module(name)
+    for product in products().values():
+        fingerprint(product.module)
+    with styled():
+        drawn = figure(1.0, 1.0)
+        drawn.subplots().set_title("$10^{-1}$")
+        for kind in ("png", "pdf"):
+            drawn.savefig(BytesIO(), format=kind)
+    return {"biogrip": main, "snakemake": snakemake_main}
+
+
+def _answer(connection: socket.socket, programs: Mapping[str, Callable[[], Any]]) -> None:
+    """Run what is asked for in a process of its own, and say how that ended."""
+    (program, *arguments), folder, environment, files = asking.asked(connection)
+    child = os.fork()
+    if not child:
+        connection.close()
+        for number, file in enumerate(files):
+            os.dup2(file, number)
+            os.close(file)
+        os.chdir(folder)
+        os.environ.clear()
+        os.environ.update(environment)
+        sys.argv = [program, *arguments]
+        _end(programs[program])
+    asking.answer(connection, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+    os._exit(0)
+
+
+def _end(program: Callable[[], Any]) -> NoReturn:
+    """Run a program and end as it does, but leave it to the system to take all down."""
+    try:
+        status = program()
+    except SystemExit as ended:
+        status = ended.code
+    except BaseException:
+        traceback.print_exc()
+        status = 1
+    if isinstance(status, str):
+        print(status, file=sys.stderr)
+        status = 1
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status or 0)
+
+
+def _reap() -> None:
+    try:
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+    except ChildProcessError:
+        return
 
 
 if __name__ == "__main__":
-    _serve()
+    _serve(sys.argv[1])

@@ -105,8 +105,10 @@ def snakemake(
     given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
     given += ["--configfile", str(overlay)]
     if root == ROOT and environment is None:
-        with NamedTemporaryFile("r") as said:
-            return Run(loaded.call(given, root, os.environ, Path(said.name)), said.read())
+        with NamedTemporaryFile("w+") as said:
+            status = loaded.call("snakemake", given, root, os.environ, (said, said))
+            said.seek(0)
+            return Run(status, said.read())
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", *given],
         cwd=root,
