@@ -38,6 +38,7 @@ TABLE = ROOT / "results/published/posterior_calibration/tables/posterior_calibra
 QUANTITIES = parameters_and_sum(MODEL)
 NAMES = (*(quantity.label for quantity in QUANTITIES), "likelihood")
 RATE_HZ = 1.0
+SETTINGS = PosteriorSettings()
 _WRITTEN_EVERY = 20
 # The level's prior is Jeffreys' as far as it goes: of an improper one nothing can be drawn.
 LEAST_NOISE, MOST_NOISE = 0.05, 0.2
@@ -51,7 +52,7 @@ class Draw:
     converged: bool
 
 
-def drawn(number: int) -> Draw:
+def drawn(number: int, settings: PosteriorSettings = SETTINGS) -> Draw:
     """Draw a sample from the prior, simulate its trace, and sample the posterior."""
     rng = np.random.default_rng([number, 31])
     genes = [RANGES[p.range_name] for p in MODEL.parameters]
@@ -65,7 +66,7 @@ def drawn(number: int) -> Draw:
     condensed = condensed_of(TORQUE, times, offset=False, drift=False)
     problem = problem_of(GRIPPER, MODEL, TORQUE, times, trace, RANGES, condensed=condensed)
     posterior = Posterior(problem, prior)
-    found = sampled(posterior, PosteriorSettings(), rng, silent)
+    found = sampled(posterior, settings, rng, silent)
     samples = found.log_parameters.reshape(-1, len(low))
     ranks = [np.mean(q.logs(samples) < q.log(truth[0])) for q in QUANTITIES]
     # The prior is uniform, so that this orders samples as the likelihood does.

@@ -90,6 +90,8 @@ def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
     return posed(*clean(case), count, level=level)
 
 
-def identified(problems: list[Problem], seeds: list[int]) -> list[Identification]:
+def identified(
+    problems: list[Problem], seeds: list[int], settings: Any = SETTINGS
+) -> list[Identification]:
     rngs = [np.random.default_rng(seed) for seed in seeds]
-    return least_squares.identify_many(problems, SETTINGS, rngs)
+    return least_squares.identify_many(problems, settings, rngs)

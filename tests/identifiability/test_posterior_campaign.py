@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from biogrip.identifiability.posterior_settings import PosteriorSettings
 from tests.helpers.posterior_campaign import NAMES, Draw, counted, drawn
 
 
@@ -22,7 +23,11 @@ def test_ranks_that_are_uniform_pass_and_others_do_not() -> None:
 
 
 def test_a_few_draws_are_not_all_on_one_side() -> None:
-    """Five: by chance, all of one quantity are in the same tenth once in thousands."""
-    found = counted([drawn(number) for number in range(5)])
+    """Five: by chance, all of one quantity are in the same tenth once in thousands.
+
+    Ranks differ by a few hundredths from those of the campaign, which samples until it converges.
+    """
+    short = PosteriorSettings(walkers=40, most_steps=1000)
+    found = counted([drawn(number, short) for number in range(5)])
     assert list(found["quantity"]) == list(NAMES)
     assert found["p_value"].min() > 1e-3

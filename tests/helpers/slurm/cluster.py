@@ -26,6 +26,20 @@ CONFIGURATION = Path(__file__).with_name("slurm.conf")
 # Daemons are in /usr/sbin, which is not on every user's path.
 PATH = os.pathsep.join([os.environ["PATH"], "/usr/sbin"])
 PATIENCE_S = 30.0
+# Snakemake's executor asks how all jobs are at ever longer intervals while none ends. It is
+# answered when one has; after a minute in any case.
+SQUEUE = """
+case "$*" in *--states=all*) ;; *) exec {program} "$@" ;; esac
+before=$(cat {ended} 2> /dev/null || echo 0)
+for _ in $(seq 240); do
+  answer=$({program} "$@") || exit
+  now=$(echo "$answer" | grep -cE "CANCELLED|COMPLETED|FAILED|OUT_OF_MEMORY|TIMEOUT")
+  test "$now" -gt "$before" && break
+  sleep 0.25
+done
+echo "$now" > {ended}
+echo "$answer"
+""".strip()
 
 
 class SlurmError(Exception):
@@ -69,11 +83,14 @@ def _configure(folder: Path) -> dict[str, str]:
     folder.chmod(0o711)  # munged insists on a socket that everyone can reach
     (folder / "munge.key").write_bytes(os.urandom(128))
     (folder / "munge.key").chmod(0o600)
+    programs = folder / "bin"
+    programs.mkdir()
     # Jobs are deprived of SLURM_CONF by Snakemake's executor before they call srun.
-    srun = folder / "bin" / "srun"
-    srun.parent.mkdir()
-    srun.write_text(f'#!/bin/sh\nSLURM_CONF={configuration} exec {_path_of("srun")} "$@"\n')
-    srun.chmod(0o755)
+    srun = f'SLURM_CONF={configuration} exec {_path_of("srun")} "$@"'
+    squeue = SQUEUE.format(program=_path_of("squeue"), ended=folder / "ended")
+    for name, script in (("srun", srun), ("squeue", squeue)):
+        (programs / name).write_text(f"#!/bin/sh\n{script}\n")
+        (programs / name).chmod(0o755)
     node = subprocess.check_output([_path_of("slurmd"), "-C"], text=True).splitlines()[0]
     configuration.write_text(
         CONFIGURATION.read_text().format(
@@ -87,7 +104,7 @@ def _configure(folder: Path) -> dict[str, str]:
     )
     return {
         **os.environ,
-        "PATH": os.pathsep.join([str(srun.parent), PATH]),
+        "PATH": os.pathsep.join([str(programs), PATH]),
         "SLURM_CONF": str(configuration),
     }
 
