@@ -20,8 +20,10 @@ METHOD = ("--method", "least_squares")
 # Every module of ours whose functions run while a product is made, in a process for each: what
 # is kept from one job to the next would not be called again.
 WATCHED = """
-import cProfile, json, os, sys
+import cProfile, gc, json, os, sys
 from pathlib import Path
+import pandas, pyarrow.parquet
+import matplotlib.backends.backend_agg, matplotlib.backends.backend_pdf
 import biogrip
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
@@ -45,6 +47,9 @@ def seen_by(name, job):
         if not isinstance(entry.code, str) and entry.code.co_name != "<module>"
     }
     return sorted(file for file in called if file.startswith(package))
+# What is loaded before is not profiled while it is.
+products()
+gc.freeze()
 for name, job in json.load(sys.stdin):
     if child := os.fork():
         assert os.waitpid(child, 0)[1] == 0, name
