@@ -1,8 +1,8 @@
 """What the tutorial and the how-tos tell to write and to type, written and typed as they say.
 
 A fenced block with a title is a file, one in sh is commands and one in python runs. Runs of the
-workflow are made small by a config beneath theirs, which the documents do not show, and where
-they make a whole study, by naming what the reader is to look at.
+workflow, and fits of a trace that need no config, are made small by one which the documents do
+not show; runs that make a whole study, by naming what the reader is to look at, too.
 """
 
 import os
@@ -45,6 +45,11 @@ LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
+# A trace fitted from few starts, and with few models.
+TINY_FIT = """
+least_squares: {candidates: 50, starts: 3}
+model_selection: {models: [damper, maxwell]}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +77,7 @@ def test_what_is_said_can_be_done(
     # Most bring a case of their own.
     needed = "cases:" not in text or "[liquid_drop_2]" in text
     (place.root / "tiny.yaml").write_text(TINY if needed else f"{TINY}  liquid_drop_2: null\n")
+    (place.root / "tiny_fit.yaml").write_text(TINY_FIT)
     blocks = BLOCK.findall(text)
     # Else the copy's code is the repository's, which is loaded already.
     own_code = any(title.endswith(".py") for _, title, _ in blocks)
@@ -94,9 +100,11 @@ def _typed(words: list[str]) -> list[str]:
     """Arguments of a command, such that a run is small."""
     command, *arguments = words
     assert command == "biogrip"
-    if arguments[0] != "run":
-        return arguments
-    return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
+    if arguments[0] == "run":
+        return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
+    if arguments[0] == "identify" and "--config" not in arguments:
+        return [*arguments, "--config", "tiny_fit.yaml"]
+    return arguments
 
 
 def _call(arguments: list[str], place: Tree) -> None:

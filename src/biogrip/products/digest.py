@@ -27,6 +27,11 @@ def digest(settings: object) -> str:
 
 
 def _plain(value: object) -> Any:
+    # What there is most of comes first.
+    if isinstance(value, str | int) or value is None:
+        return value
+    if isinstance(value, float | complex):
+        return f"{value:.{_DIGITS}g}"
     if is_dataclass(value) and not isinstance(value, type):
         return [
             [field.name, _plain(getattr(value, field.name))]
@@ -39,10 +44,6 @@ def _plain(value: object) -> Any:
         return [_plain(inner) for inner in value]
     if isinstance(value, np.ndarray):
         return _plain(value.tolist())
-    if isinstance(value, bool | int | str) or value is None:
-        return value
-    if isinstance(value, float | complex):
-        return f"{value:.{_DIGITS}g}"
     if callable(value):
         return None
     raise TypeError(f"settings cannot hold {value!r}")

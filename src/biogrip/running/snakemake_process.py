@@ -3,12 +3,16 @@
 While Snakemake loads and plans, an interruption would show where in its code it was.
 """
 
+import atexit
+import gc
 import signal
 import sys
 
 
 def main() -> None:
     """Run Snakemake with the arguments of this process."""
+    # As of a job, see `biogrip.cli.main`: looking for cycles at the end takes time.
+    atexit.register(gc.freeze)
     # What is started by a script in the background would ignore it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
