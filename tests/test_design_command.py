@@ -14,8 +14,8 @@ from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque
-from biogrip.own_design.asked import plausible, wanted_of
 from biogrip.response.simulation import simulated_rotation
+from biogrip.study.asked_design import plausible, wanted_of
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from tests.helpers.default import study_of
