@@ -8,6 +8,7 @@ OVERLAYS = {
     "robustness": (["robustness"], "all_maps", "robustness_*"),
     "readings": (["readings"], "readings", "readings"),
     "design": (["design", "designed"], "all_designs", "designed*"),
+    "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
