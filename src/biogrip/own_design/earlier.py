@@ -17,6 +17,9 @@ from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import Columns
 
+# What a fit may leave of traces, in units of the noise, before they are of something else.
+_UNLIKE = 2.0
+
 
 @dataclass(frozen=True)
 class Recorded:
@@ -48,7 +51,7 @@ def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
     Raises
     ------
     BiogripError
-        With file and line, if a trace cannot be used.
+        With file and line, if a trace cannot be used, or is not what the configs say.
     """
     case = traces[0].case
     asked = case.block.design
@@ -59,11 +62,16 @@ def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
     def identify(problem: Problem) -> Identification:
         return best_fit(problem, case.method("least_squares"), rng, silent)
 
-    told = None
-    for count in range(1, len(problems) + 1):
+    told, ends = None, plausible_ends(case)
+    for count, recorded in enumerate(traces, 1):
         joint = joint_problem(problems[:count], count * [asked.noise_rad])
-        ends = plausible_ends(case)
         told = told_by(joint, asked.noise_rad, identify, ends, asked.drawn, rng, told)
+        if told.misfit_rad > _UNLIKE * asked.noise_rad:
+            raise BiogripError(
+                f"--after: {recorded.file}: found {told.misfit_rad:.3g} rad that the best fit "
+                f"leaves, allowed is at most {_UNLIKE:g} times design.noise_rad: is it of this "
+                "sample, and was it recorded as the configs say?"
+            )
     assert told is not None
     return told
 

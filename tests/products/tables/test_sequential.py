@@ -40,7 +40,7 @@ def made_up(folder: Path) -> list[Path]:
     """Three cells in each way: c_p is never known, or after one or two experiments in some."""
     files = []
     for cell in range(3):
-        rows = []
+        rows: list[tuple[object, ...]] = []
         for way, helpful in ((REPEATED, 0.0), (AFTER, 1.0), (BEFOREHAND, 0.4), (TRUTH, 2.0)):
             for count in (1, 2):
                 head = "endothelial_cell", cell, way, count
@@ -49,9 +49,9 @@ def made_up(folder: Path) -> list[Path]:
                     error = 1 + 0.01 * (cell - 1)
                     ends = truth * error * (1 - half), truth * error * (1 + half)
                     rows.append((*head, quantity, truth, truth * error, *ends, int(cell == 2), 1))
-                width = 1 + 0.06 * (1 + cell) / (helpful * count) if helpful else 0.0
-                ends = (1e-2 / width, 1e-2 * width) if width else ("", 3.0)
-                rows.append((*head, "c_p", 1e-2, 1.2e-2, *ends, int(cell == 2), 1))
+                width = 1 + 0.06 * (1 + cell) / (helpful * count) if helpful else 1.0
+                low = 1e-2 / width if helpful else ""
+                rows.append((*head, "c_p", 1e-2, 1.2e-2, low, 1e-2 * width, int(cell == 2), 1))
         files.append(folder / f"cell_{cell}.csv")
         SEQUENCES.write(files[-1], rows)
     return files

@@ -86,13 +86,12 @@ def known_well(found: pd.DataFrame) -> BoolArray:
     return well
 
 
-def errors(found: pd.DataFrame) -> "pd.Series[float]":
-    """By which share of itself each row's truth is missed."""
-    return (found["estimate"] / found["truth"] - 1).abs()
-
-
 def _lines(case: str, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
-    found = found.assign(well=known_well(found), half=half_widths(found), error=errors(found))
+    found = found.assign(
+        well=known_well(found),
+        half=half_widths(found),
+        error=(found["estimate"] / found["truth"] - 1).abs(),
+    )
     low, high = found["low"].fillna(0.0), found["high"].fillna(np.inf)
     found = found.assign(held=(low <= found["truth"]) & (found["truth"] <= high))
     lines: list[tuple[Cell, ...]] = []
