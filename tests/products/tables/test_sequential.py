@@ -89,14 +89,22 @@ def test_counts_of_made_up_cells(tmp_path: Path) -> None:
     assert never["coverage_percent"] == 100
 
 
-def one_torque(wanted: Wanted, *_: object) -> list[Torque]:
+class OneTorque:
     """A train of steps that is as good as any for a test; a search takes seconds."""
-    return [TorqueSearch(wanted).torque(np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8]))]
+
+    def __init__(self) -> None:
+        self.wanted: list[Wanted] = []
+
+    def __call__(self, wanted: Wanted, *_: object) -> list[Torque]:
+        self.wanted.append(wanted)
+        shares = np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
+        return [TorqueSearch(wanted).torque(shares)]
 
 
 def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trace of the paper's leaves c_p open however often; a designed one after it does not."""
-    monkeypatch.setattr(stage, "best_torques", one_torque)
+    search = OneTorque()
+    monkeypatch.setattr(stage, "best_torques", search)
     study = study_of(OVERLAY)
     assert len(SEQUENCE.jobs(Plan(study, tmp_path))) == 3  # type: ignore[arg-type]
     chosen = settings(study, {"case": "endothelial_cell", "seed": "0"})
@@ -112,6 +120,13 @@ def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         if known:
             # Some standard deviations of the interval's own.
             assert abs(c_p["estimate"] / c_p["truth"] - 1) < 2 * (c_p["high"] / c_p["low"] - 1)
+    # What the first trace told goes into the second's design: k_p as well as its interval says.
+    after, beforehand, _ = search.wanted
+    assert not beforehand.before.any()
+    index = after.model.names.index("k_p")
+    spread = np.sqrt(np.linalg.inv(after.before[0] + np.eye(4))[index, index])
+    k_p = found.loc[AFTER, 1, "k_p"]
+    assert np.log(k_p["high"] / k_p["low"]) / 2 == pytest.approx(1.96 * spread, rel=0.1)
     k = found.xs("k", level="quantity")
     # Without a range all cells are as in the config.
     assert set(k["truth"]) == {35.0}
