@@ -140,7 +140,9 @@ def figure(request: pytest.FixtureRequest, draw: Draw, judged: list[Path]) -> Fi
             return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
         if request.param == "designed_map":
             designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed_map.of_case(designed, "endothelial_cell"))
+            return designed_map.draw(
+                designed_map.of_case(designed, designed.case("endothelial_cell"))
+            )
         return _corner()
 
 
