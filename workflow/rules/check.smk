@@ -17,7 +17,7 @@ CONFIGS = Path(workflow.basedir) / "config"
 RUN_AFRESH = (
     "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
     "snakemake -j {threads} --snakefile {params.snakefile:q} "
-    '--directory "$scratch" --quiet all {params.config} -- {params.targets} >> {log:q} 2>&1'
+    '--directory "$scratch" --quiet rules progress host reason {params.config} -- {params.targets} >> {log:q} 2>&1'
 )
 
 

@@ -147,7 +147,9 @@ def figure(
             return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
         if request.param == "designed_map":
             designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed_map.of_case(designed, "endothelial_cell"))
+            return designed_map.draw(
+                designed_map.of_case(designed, designed.case("endothelial_cell"))
+            )
         if request.param == "sequential":
             cell = STUDY.cases["endothelial_cell"]
             rows = made_up(tmp_path_factory.mktemp("cells"))
