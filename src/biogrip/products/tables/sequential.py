@@ -69,8 +69,9 @@ def sequential(settings: Mapping[str, tuple[int, float]], rows: list[Path]) -> T
         "one designed from what all before told; one designed for all cells of the ranges, and one "
         "for the true values, again and again. A quantity counts as known where its interval of "
         f"{confidence} %, from the profile likelihood, has two ends and is no wider than "
-        f"{100 * WELL:g} % to each side. Intervals with one end count, too, among those that hold "
-        "the truth. A best fit is missed if one from the truth goes deeper."
+        f"{100 * WELL:g} % to each side; all are where each of them is. Intervals with one end "
+        "count, too, among those that hold the truth. A best fit is missed if one from the truth "
+        "goes deeper."
     )
     return Table(caption, _COLUMNS, lines)
 
@@ -104,7 +105,8 @@ def _lines(case: str, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
         cells = some.groupby("cell")
         worst = [cells["well"].all().mean(), *(cells[n].max().median() for n in ("half", "error"))]
         flags = [cells[name].first().mean() for name in ("missed", "pressed")]
-        lines.append((*head, ALL, len(cells), *map(_percent, worst), None, *map(_percent, flags)))
+        shares = map(_percent, [*worst, some["held"].mean(), *flags])
+        lines.append((*head, ALL, len(cells), *shares))
     return lines
 
 
