@@ -105,6 +105,11 @@ def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
     assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
 
 
+def seldom_sampled() -> Case:
+    """The paper's protocol, with a tenth of its samples."""
+    return study_of(f"{ASKED}measurement: {{rate_Hz: 1.0}}\n").cases["liquid_drop_2"]
+
+
 def write_trace(case: Case, file: Path) -> Path:
     """Write a trace of a case, as its protocol and sampling have it."""
     times = case.sampling.over(case.problem.torque.end_s)
@@ -132,7 +137,7 @@ def test_after_a_trace(tmp_path: Path) -> None:
 
     The same again would leave k, c and c_p without a bound.
     """
-    trace = write_trace(study_of(ASKED).cases["liquid_drop_2"], tmp_path / "trace.csv")
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
     bounds = bounds_after(tmp_path, "--after", str(trace))
     assert "none" not in [after for _, after in bounds.values()]
     assert bounds["c_p"][0] == "none"
@@ -149,7 +154,7 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
     Read by the protocol that it was not recorded with, the same file is refused.
     """
     monkeypatch.setattr(designed, "best_torques", lambda wanted, *_: [one_torque(wanted)])
-    first = write_trace(study_of(ASKED).cases["liquid_drop_2"], tmp_path / "first.csv")
+    first = write_trace(seldom_sampled(), tmp_path / "first.csv")
     second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
     over = str(folder[0] / "out.yaml")
     bounds = bounds_after(tmp_path, "--after", str(first), "--after", str(second), over)
