@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.keys import Key, Problem
 
 _Value = Annotated[float, Key(above=0, high=1e12)]
@@ -80,9 +81,13 @@ class DesignSettings:
     tried: Annotated[
         int, Key("Torques that the search tries, about. By default 2000.", low=128, high=1_000_000)
     ] = 2000
+    sequence: Annotated[SequenceSettings | None, Key()] = None
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that do not go together."""
+        if self.sequence and not self.ranges:
+            text = "found no design.ranges, which cells are drawn from; allowed is one at least."
+            yield ("sequence",), text
         given = [key for key in ("largest_torque_Nm", "largest_voltage_V") if getattr(self, key)]
         if len(given) != 1:
             text = f"found {' and '.join(given) or 'neither'}, allowed is one of largest_torque_Nm "
