@@ -26,6 +26,10 @@ from biogrip.own_traces.words import side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
+FEW = """
+least_squares: {candidates: 100, starts: 4}
+model_selection: {models: [damper, maxwell]}
+"""
 TRUTH = yaml.safe_load((ROOT / "data" / "example_truth.yaml").read_text())["cases"]["example"]
 
 
@@ -41,6 +45,14 @@ def written(path: Path, times: Array, values: Array, header: str = "time_s,rotat
     lines = [header, *(f"{t:.6g},{v:.8e}" for t, v in zip(times, values, strict=True))]
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+@pytest.fixture(scope="module")
+def few(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A config with few starts, and few models to compare, where that is not looked at."""
+    config = tmp_path_factory.mktemp("config") / "few.yaml"
+    config.write_text(FEW)
+    return str(config)
 
 
 @pytest.fixture(scope="module")
@@ -73,16 +85,19 @@ def test_the_example_gives_its_truth(tmp_path: Path) -> None:
     assert found["notes"] == []
 
 
-def test_units_separators_offset_and_drift(tmp_path: Path, trace: tuple[Array, Array]) -> None:
+def test_units_separators_offset_and_drift(
+    tmp_path: Path, trace: tuple[Array, Array], few: str
+) -> None:
     times, values = trace
     plain = tmp_path / "plain.json"
-    assert identify(written(tmp_path / "a.csv", times, values), "--output", plain).returncode == 0
+    file = written(tmp_path / "a.csv", times, values)
+    assert identify(file, "--config", few, "--output", plain).returncode == 0
     other = written(
         tmp_path / "b.csv", times / 60, 1e3 * (values + 5e-4 + 1e-6 * times), "t;phi_mrad;note"
     )
     other.write_text(other.read_text().replace(",", ";"))
     shifted = tmp_path / "shifted.json"
-    options = ("--time", "t", "--time-unit", "min", "--rotation", "phi_mrad")
+    options = ("--config", few, "--time", "t", "--time-unit", "min", "--rotation", "phi_mrad")
     done = identify(other, *options, "--offset", "--drift", "--output", shifted)
     assert done.returncode == 0, done.stderr
     found = json.loads(shifted.read_text())
@@ -279,12 +294,13 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(
     assert mine.read_text() == '{"mine": 1}'
 
 
-def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path) -> None:
+def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path, few: str) -> None:
     output = tmp_path / "found.json"
     output.write_text("mine")
-    assert main(["identify", str(EXAMPLE), "--output", str(output), "--force"]) == 0
+    arguments = ["identify", str(EXAMPLE), "--config", few, "--output", str(output)]
+    assert main([*arguments, "--force"]) == 0
     written = output.read_bytes()
-    assert main(["identify", str(EXAMPLE), "--output", str(output)]) == 0
+    assert main(arguments) == 0
     assert output.read_bytes() == written
 
 
@@ -327,7 +343,7 @@ def test_nobody_reading_on_is_no_error(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
-def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path) -> None:
+def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) -> None:
     """The bad are skipped, listed with their reasons, and make the status 1."""
     good = [shutil.copy(EXAMPLE, tmp_path / name) for name in ("a.csv", "b.csv")]
     bad = tmp_path / "bad.csv"
@@ -335,7 +351,8 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path) -> None:
     page, table = tmp_path / "out.html", tmp_path / "out.csv"
     missing = tmp_path / "c.csv"
     # Of a folder there is no name to write beside.
-    done = identify(*good, good[0], bad, missing, "/", "--report", page, "--csv", table)
+    options = ("--config", few, "--report", page, "--csv", table)
+    done = identify(*good, good[0], bad, missing, "/", *options)
     assert done.returncode == 1, done.stderr
     assert "Traceback" not in done.stderr
     rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
@@ -351,7 +368,7 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path) -> None:
         assert "found &#39;" in text or "found '" in text
     assert page.read_text().count("<img") == 6
     assert "http" not in page.read_text()
-    again = identify(good[0], "--report", page, "--csv", table)
+    again = identify(good[0], *options)
     assert again.returncode == 0, again.stderr
 
 
@@ -434,10 +451,10 @@ def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "\x1b" not in side_by_side([found], {})
 
 
-def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path) -> None:
+def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> None:
     screen, terminal = pty.openpty()
     command = [sys.executable, "-m", "biogrip", "identify", str(EXAMPLE)]
-    command += ["--output", str(tmp_path / "found.json")]
+    command += ["--config", few, "--output", str(tmp_path / "found.json")]
     environment = {name: value for name, value in os.environ.items() if name != "NO_COLOR"}
     with subprocess.Popen(command, stdout=terminal, stderr=terminal, env=environment) as running:
         os.close(terminal)

@@ -21,6 +21,10 @@ posterior:
 model_selection: {models: [maxwell, liquid_drop]}
 identifiability: {confidence: 0.9}
 """
+SHORT = """
+posterior: {walkers: 20, most_steps: 1000}
+model_selection: {models: [maxwell]}
+"""
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +71,10 @@ def test_a_prior_and_the_evidence(trace: Path, capsys: pytest.CaptureFixture[str
         assert 4000 < len(columns[name]) <= 10_000
         assert np.median(columns[name]) == pytest.approx(told[label]["median"], rel=0.1)
     # Ours is replaced, and others' samples are not.
+    before = samples.read_bytes()
+    config.write_text(SHORT)
     assert main(arguments) == 0
+    assert samples.read_bytes() != before
     samples.write_bytes(b"mine")
     assert main(arguments) == 1
     assert "drop.identified.parquet: is there, and biogrip did not write it" in (
