@@ -8,15 +8,17 @@ References
 """
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from scipy import optimize
 
 from biogrip.arrays import Array
 from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.problem import Problem
 from biogrip.keys import Key
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,8 @@ def identify(
     progress
         Is told after every generation.
     """
+    from scipy.optimize import Bounds, differential_evolution
+
     rows: list[tuple[Array, float, float, int]] = []
     evaluations = 0
 
@@ -64,7 +68,7 @@ def identify(
         evaluations += columns.shape[1]
         return problem.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
-    def record(intermediate_result: optimize.OptimizeResult) -> None:
+    def record(intermediate_result: "OptimizeResult") -> None:
         lowest, middle = (
             float(intermediate_result.fun),
             float(np.median(intermediate_result.population_energies)),
@@ -72,9 +76,9 @@ def identify(
         rows.append((np.exp(intermediate_result.x), lowest, middle, evaluations))
         progress(evaluations, lowest)
 
-    found = optimize.differential_evolution(
+    found = differential_evolution(
         ranking,
-        optimize.Bounds(problem.low, problem.high),
+        Bounds(problem.low, problem.high),
         popsize=settings.popsize,
         maxiter=settings.maxiter,
         tol=settings.tol,

@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
@@ -281,6 +280,8 @@ def _first_below(
                 before, last = float(times[at - 1]), float(values[at - 1])
             if before is None or last <= 0:
                 return before or 0.0
+            from scipy.optimize import brentq
+
             return float(
                 brentq(
                     lambda t: float(margin(np.array([t]))[0]),

@@ -22,8 +22,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import nnls
-from scipy.special import chdtri, fdtri
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -199,6 +197,8 @@ def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
     white noise about zero, where the arm stands until the torque sets in,
     would give as large a fit: an F test, with known noise a chi-squared one.
     """
+    from scipy.special import chdtri, fdtri
+
     explained = np.sum(fit.response_rad**2)
     left_over = np.sum((trace - fit.response_rad) ** 2)
     if np.ptp(trace) == 0 or np.sum((trace - trace.mean()) ** 2) <= left_over:
@@ -253,6 +253,8 @@ def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
 
 def _left_over(trace: Array, responses: Array) -> float:
     """Sum of squares that no sum of the responses with weights of at least 0 explains."""
+    from scipy.optimize import nnls
+
     scale = np.linalg.norm(responses, axis=1)
     count = np.count_nonzero(scale)
     triangle: Array = np.zeros((0, count + 1))

@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
-from scipy.ndimage import gaussian_filter
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import Parameter, Sample, with_fixed
@@ -155,6 +154,8 @@ def _alone(axes: Axes, logs: Array, edges: Array, interval: Mapping[str, Any]) -
 
 
 def _pair(axes: Axes, x: Array, y: Array, x_edges: Array, y_edges: Array) -> None:
+    from scipy.ndimage import gaussian_filter
+
     counts, _, _ = np.histogram2d(x, y, [x_edges, y_edges])
     density = gaussian_filter(counts.T, _SMOOTH)
     half, most = (_level(density, share) for share in (_HALF, _MOST))

@@ -11,7 +11,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
@@ -103,6 +102,8 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
 
     They do not overshoot (Fritsch & Carlson 1980), and a parabola is a straight line to them.
     """
+    from scipy.interpolate import PchipInterpolator
+
     # Rounded values may coincide.
     values, places = np.unique(np.array(profile["values"]), return_index=True)
     roots = np.sqrt(np.clip(np.array(profile["rises"])[places], 0.0, 4 * _HIGHEST))

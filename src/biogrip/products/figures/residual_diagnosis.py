@@ -3,8 +3,6 @@
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.special import ndtri
 
 from biogrip.arrays import Array
 from biogrip.products.figures.results import Fit
@@ -46,6 +44,8 @@ def _over_time(axes: Axes, time_s: Array, scaled: Array) -> None:
 
 
 def _correlation(axes: Axes, scaled: Array) -> None:
+    from scipy.fft import irfft, next_fast_len, rfft
+
     lags = np.arange(1, min(_LAGS, len(scaled) // 2) + 1)
     centred = scaled - scaled.mean()
     spectrum = np.abs(rfft(centred, next_fast_len(2 * len(centred)))) ** 2
@@ -59,6 +59,8 @@ def _correlation(axes: Axes, scaled: Array) -> None:
 
 
 def _quantiles(axes: Axes, scaled: Array) -> None:
+    from scipy.special import ndtri
+
     shares = (np.arange(min(_QUANTILES, len(scaled))) + 0.5) / min(_QUANTILES, len(scaled))
     expected = ndtri(shares)
     axes.plot(expected, expected, color=TARGET, linewidth=0.6)
