@@ -108,7 +108,7 @@ def _load() -> dict[str, Callable[[], Any]]:
 
     # What either imports only when it is needed.
     get_argument_parser()
-    for name in ("smart_open", "snakemake.report"):
+    for name in ("smart_open", "snakemake.report", "scipy.interpolate", "scipy.ndimage"):
         import_module(name)
     for product in products().values():
         fingerprint(product.module)

@@ -22,7 +22,7 @@ METHOD = ("--method", "least_squares")
 WATCHED = """
 import cProfile, gc, json, os, sys
 from pathlib import Path
-import pandas, pyarrow.parquet
+import pandas, pyarrow.parquet, scipy.interpolate
 import matplotlib.backends.backend_agg, matplotlib.backends.backend_pdf
 import biogrip
 from biogrip.products.catalogue import products
