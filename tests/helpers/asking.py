@@ -1,4 +1,4 @@
-"""Asks the process of `loaded.py` for a call, as `biogrip`: loaded in no time, for each job."""
+"""Asks the process of `loaded.py` for a call of a program, and is itself loaded in no time."""
 
 import json
 import os
@@ -47,5 +47,5 @@ def answer(connection: socket.socket, status: int) -> None:
 
 
 if __name__ == "__main__":
-    status = ask(sys.argv[1], ["biogrip", *sys.argv[2:]], os.getcwd(), os.environ, range(_FILES))
+    status = ask(sys.argv[1], sys.argv[2:], os.getcwd(), os.environ, range(_FILES))
     sys.exit(status if status >= 0 else 128 - status)

@@ -2,7 +2,8 @@
 
 Loading them takes longer than most of what tests call them for. So a process loads both, and
 forks for each call: folder, environment and output of a call are its own, as those of a program
-that is started. The jobs of a run ask it, too: for their shell `biogrip` is `asking.py`.
+that is started. The jobs of a run ask it, too: for their shell `biogrip` is `asking.py`; and so
+does `biogrip run` for Snakemake.
 """
 
 import atexit
@@ -26,6 +27,11 @@ from typing import IO, Any, NoReturn
 from tests.helpers import asking
 
 _SECONDS = 600
+# Python as `biogrip` knows it, which starts Snakemake by it.
+PYTHON = """#!/bin/sh
+case "$2" in biogrip.running.snakemake_process) shift 2; exec {client} snakemake "$@" ;; esac
+exec {python} "$@"
+"""
 
 
 def call(
@@ -66,7 +72,10 @@ def _place() -> str:
     folder = tempfile.mkdtemp(prefix="biogrip-loaded-")
     atexit.register(shutil.rmtree, folder)
     client = shlex.join([sys.executable, "-I", "-S", asking.__file__, f"{folder}/socket"])
-    Path(folder, "functions").write_text(f'biogrip() {{ {client} "$@"; }}\n')
+    Path(folder, "functions").write_text(f'biogrip() {{ {client} biogrip "$@"; }}\n')
+    python = Path(folder, "python")
+    python.write_text(PYTHON.format(python=shlex.quote(sys.executable), client=client))
+    python.chmod(0o755)
     # Its standard input is closed when this process ends, however it does.
     process = subprocess.Popen(
         [sys.executable, "-m", __name__, f"{folder}/socket"],
@@ -93,7 +102,7 @@ def _serve(place: str) -> None:
             with connection:
                 if not os.fork():
                     listening.close()
-                    _answer(connection, programs)
+                    _answer(connection, programs, Path(place).parent)
             _reap()
 
 
@@ -120,7 +129,9 @@ def _load() -> dict[str, Callable[[], Any]]:
     return {"biogrip": main, "snakemake": snakemake_main}
 
 
-def _answer(connection: socket.socket, programs: Mapping[str, Callable[[], Any]]) -> None:
+def _answer(
+    connection: socket.socket, programs: Mapping[str, Callable[[], Any]], place: Path
+) -> None:
     """Run what is asked for in a process of its own, and say how that ended."""
     (program, *arguments), folder, environment, files = asking.asked(connection)
     child = os.fork()
@@ -133,6 +144,8 @@ def _answer(connection: socket.socket, programs: Mapping[str, Callable[[], Any]]
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [program, *arguments]
+        if program == "biogrip":
+            sys.executable = f"{place}/python"
         _end(programs[program])
     asking.answer(connection, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     os._exit(0)
