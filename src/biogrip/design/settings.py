@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
 _Value = Annotated[float, Key(above=0, high=1e12)]
@@ -35,11 +36,30 @@ class DesignSettings:
     ] = None
     shortest_step_s: Annotated[
         float,
-        Key("All steps last whole multiples of this. By default 0.01 s.", "s", low=1e-6, high=1e6),
+        Key(
+            "All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s.",
+            "s",
+            low=1e-6,
+            high=1e6,
+        ),
     ] = 0.01
     most_steps: Annotated[
-        int, Key("How many steps there are at most. By default 40.", low=2, high=1000)
+        int,
+        Key(
+            "How many steps, ramps and sinusoids there are at most. By default 40.",
+            low=2,
+            high=1000,
+        ),
     ] = 40
+    shapes: Annotated[
+        tuple[Annotated[str, Key(choices=tuple(SHAPES))], ...],
+        Key(
+            "What the generator can make: trains of `steps`, trains of `ramps` that never jump, "
+            "`sinusoids` on held torques; the best of them is taken. By default steps.",
+            fewest=1,
+            unique=True,
+        ),
+    ] = ("steps",)
     criterion: Annotated[
         str,
         Key(
@@ -78,7 +98,11 @@ class DesignSettings:
         Key("Plausible samples, spread evenly over these ranges. By default 8.", low=2, high=256),
     ] = 8
     tried: Annotated[
-        int, Key("Torques that the search tries, about. By default 2000.", low=128, high=1_000_000)
+        int, Key(
+            "Torques of each shape that the search tries, about. By default 2000.",
+            low=128,
+            high=1_000_000,
+        ),
     ] = 2000
 
     def problems(self) -> Iterator[Problem]:

@@ -86,7 +86,7 @@ def designed(
     again = told @ told.swapaxes(1, 2) / wanted.noise_rad**2
     before = relative_bounds(again + wanted.before)
     network = wanted.model.network(wanted.parameters)
-    time_s, force_N = forces(wanted.gripper, network, plan.torque)
+    time_s, force_N = forces(wanted.gripper, network, plan.phases)
     return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
 
 
