@@ -1,7 +1,6 @@
 """Readings of cells as bursts of a camera."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -94,10 +93,11 @@ def _repeated(own: Cells, counts: IntArray) -> list[_Run]:
 def _runs(slots: Sequence[int]) -> list[_Run]:
     """Divide ascending slots into runs that are evenly spaced."""
     runs: list[_Run] = []
-    for before, slot in pairwise((None, *slots)):
-        stride = slot - before if before is not None else 1
-        if runs and (runs[-1][2] == 1 or runs[-1][1] == stride):
-            runs[-1] = (runs[-1][0], stride, runs[-1][2] + 1)
+    for slot in slots:
+        first, stride, count = runs[-1] if runs else (slot, 0, 0)
+        apart = slot - (first + stride * (count - 1))
+        if count == 1 or (count > 1 and apart == stride):
+            runs[-1] = (first, slot - first if count == 1 else stride, count + 1)
         else:
             runs.append((slot, 1, 1))
     return runs

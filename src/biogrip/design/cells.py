@@ -43,7 +43,7 @@ class Cells:
 
     @property
     def middle(self) -> Array:
-        """Geometric means of the first and the last slot, those of the middle period, (n_cells,)."""
+        """Geometric means of the first and the last slot, in the middle period, (n_cells,)."""
         first = self.first + self.stride * ((self.repeats - 1) // 2)
         return np.sqrt(first * (first + self.slots - 1.0))
 

@@ -115,7 +115,7 @@ def best_torques(
     wanted
         What is to be designed.
     tried
-        How many torques of each shape are tried, about.
+        How many torques are tried, about, as many of each shape.
     rng
         The only source of randomness.
     progress
@@ -128,6 +128,7 @@ def best_torques(
     """
     from scipy.optimize import differential_evolution
 
+    rounds = max(1, round(tried / len(wanted.shapes) / _CROWD))
     count, lowest = 0, np.inf
     found: list[tuple[float, TorqueSearch, Array]] = []
     for name, shape in SHAPES.items():
@@ -146,7 +147,7 @@ def best_torques(
         last = differential_evolution(
             objective,
             [(0.0, 1.0)] * shape.shares,
-            maxiter=max(0, round(tried / _CROWD) - 1),
+            maxiter=rounds - 1,
             popsize=_CROWD / shape.shares,
             init="sobol",
             tol=1e-3,

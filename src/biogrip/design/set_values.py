@@ -53,7 +53,11 @@ def set_values(wanted: Wanted, torque: Torque) -> Setting:
     periods = np.round(np.where(swings, waveform.periods_s, 0.0) * rate).astype(np.intp)
     phases = []
     for count, level, end, amplitude, period in zip(
-        slots.tolist(), levels.tolist(), ends.tolist(), amplitudes.tolist(), periods.tolist(),
+        slots.tolist(),
+        levels.tolist(),
+        ends.tolist(),
+        amplitudes.tolist(),
+        periods.tolist(),
         strict=True,
     ):
         # Of as many digits as are written.

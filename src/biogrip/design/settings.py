@@ -98,8 +98,9 @@ class DesignSettings:
         Key("Plausible samples, spread evenly over these ranges. By default 8.", low=2, high=256),
     ] = 8
     tried: Annotated[
-        int, Key(
-            "Torques of each shape that the search tries, about. By default 2000.",
+        int,
+        Key(
+            "Torques that the search tries, about, as many of each shape. By default 2000.",
             low=128,
             high=1_000_000,
         ),
@@ -114,9 +115,10 @@ class DesignSettings:
         if self.shortest_step_s * self.fastest_Hz < 2:
             text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
             yield ("shortest_step_s",), f"{text}{2 / self.fastest_Hz:g} s."
-        if 2 * self.shortest_step_s > self.longest_s:
-            text = f"found {self.longest_s}, allowed is at least two steps, "
-            yield ("longest_s",), f"{text}{2 * self.shortest_step_s:g} s."
+        fewest, words = (4, "four ramps") if "ramps" in self.shapes else (2, "two steps")
+        if fewest * self.shortest_step_s > self.longest_s:
+            text = f"found {self.longest_s}, allowed is at least {words}, "
+            yield ("longest_s",), f"{text}{fewest * self.shortest_step_s:g} s."
         for name, (low, high) in (self.ranges or {}).items():
             if not low <= high:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."

@@ -96,7 +96,7 @@ class Views:
         self.functions = self.functions_at(elapsed_s)
 
     def functions_at(self, elapsed_s: Array) -> Array:
-        """Real parts of e^(r e) - 1, e^(r e) and e e^(r e), then imaginary ones, (n, 6 m, n_times)."""
+        """e^(r e) - 1, e^(r e), e e^(r e): real parts, then imaginary ones, (n, 6 m, n_times)."""
         z = self.rates[..., None] * elapsed_s
         decay = np.exp(z)
         functions = np.concatenate((np.expm1(z), decay, elapsed_s * decay), axis=1)
@@ -134,9 +134,7 @@ class Moving:
         swung = a * (q * w * (1 + growing) - q * r * sine - q * w * cosine)
         added = s * (growing / r - d) + swung
         added_slope = s * (d * (1 + growing) / r - growing / r**2) + a * (
-            (q_slope + q * d) * w * (1 + growing)
-            - (q_slope * r + q) * sine
-            - q_slope * w * cosine
+            (q_slope + q * d) * w * (1 + growing) - (q_slope * r + q) * sine - q_slope * w * cosine
         )
         before, slope_before = _carried(waveform, growing, added, added_slope)
         amplitude = before + v

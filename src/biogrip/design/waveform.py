@@ -86,9 +86,7 @@ def linear(durations_s: Array, levels: Array, ends: Array) -> Waveform:
     return Waveform(durations_s, levels, ends, np.zeros_like(levels), np.full_like(levels, np.inf))
 
 
-def swinging(
-    durations_s: Array, levels: Array, amplitudes: Array, periods_s: Array
-) -> Waveform:
+def swinging(durations_s: Array, levels: Array, amplitudes: Array, periods_s: Array) -> Waveform:
     """Hold torques one after the other, with a sinusoid on top where the amplitude is not zero."""
     periods_s = np.where(amplitudes > 0, periods_s, np.inf)
     return Waveform(durations_s, levels, levels, amplitudes, periods_s)

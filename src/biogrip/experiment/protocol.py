@@ -88,7 +88,7 @@ class TorqueHistory:
         and tau_4 jump then.
     harmonic_time_s, omega_rad_per_s : (n_harmonics,)
         When a sinusoid Re(a e^(i omega (t - start))) sets in; switching off is
-        setting in with the opposite sign.
+        setting in with the opposite sign, and follows each.
     harmonic_left, harmonic_right : (n_harmonics,)
         Complex amplitudes a in N m.
     end_s
@@ -127,6 +127,23 @@ class TorqueHistory:
         amplitudes = drives(self.harmonic_left, self.harmonic_right, self.symmetric)
         rows = zip(self.harmonic_time_s, self.omega_rad_per_s, amplitudes.T, strict=True)
         return [(float(start), float(omega), a) for start, omega, a in rows]
+
+    @cached_property
+    def within_phases(self) -> tuple[Array, list[list[tuple[float, ComplexArray]]]]:
+        """Torque of each drive within phases: (n_phases, n_drives, 3) and sinusoids of each phase.
+
+        Value, slope and curvature at the start; angular frequency and amplitudes.
+        """
+        jumps = np.moveaxis(drives(self.left, self.right, self.symmetric), 1, 0)
+        powers = jumps.copy()
+        for k, gap in enumerate(np.diff(self.time_s)):
+            value, slope, curvature = powers[k].T
+            carried = (value + slope * gap + curvature * gap**2 / 2, slope + curvature * gap)
+            powers[k + 1] += np.stack((*carried, curvature), axis=1)
+        harmonics: list[list[tuple[float, ComplexArray]]] = [[] for _ in self.time_s]
+        for start, omega, amplitudes in self.swings[::2]:
+            harmonics[self.time_s.searchsorted(start)].append((omega, amplitudes))
+        return powers, harmonics
 
     @cached_property
     def only_steps(self) -> bool:

@@ -1,6 +1,7 @@
 """A case's experiment, designed, beside the one that its config has."""
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.design.experiment import Wanted, relative_bounds
 from biogrip.design.schedule import Plan, forces, planned
 from biogrip.design.search import best_torques
-from biogrip.experiment.protocol import torque_history
+from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.own_design.asked import wanted_of
 from biogrip.own_design.earlier import Earlier
@@ -108,11 +109,30 @@ def in_words(found: Designed) -> str:
 
 def _setting(found: Designed) -> str:
     plan = found.plan
-    torques = [phase.left.value_Nm for phase in plan.phases]
     return (
-        f"{len(torques)} steps of up to {1e9 * max(torques):.4g} nN m over "
-        f"{plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
+        f"{in_numbers(plan.phases)} of up to {1e9 * max(map(largest_Nm, plan.phases)):.4g} nN m "
+        f"over {plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
     )
+
+
+def in_numbers(phases: Sequence[Phase]) -> str:
+    """Say how many phases of which kind there are, as ``4 sinusoids, 1 step``."""
+    kinds = Counter(map(kind, phases))
+    return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in kinds.items())
+
+
+def kind(phase: Phase) -> str:
+    """Whether a phase is a sinusoid, a ramp or a step."""
+    if phase.left.harmonics:
+        return "sinusoid"
+    return "ramp" if phase.left.slope_Nm_per_s else "step"
+
+
+def largest_Nm(phase: Phase) -> float:
+    """Largest torque of a phase."""
+    load = phase.left
+    swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
+    return max(load.value_Nm + swing, load.value_Nm + load.slope_Nm_per_s * phase.duration_s)
 
 
 def percent(bound: float) -> str:
