@@ -12,7 +12,7 @@ from biogrip.design.experiment import Wanted
 from biogrip.design.few_cells import in_few_cells
 from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
-from biogrip.design.set_values import Setting, set_values
+from biogrip.design.set_values import set_values
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
@@ -102,9 +102,9 @@ def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
         If with all of them the jaws would have to pull.
     """
     for torque in torques:
-        setting = set_values(wanted, torque)
-        if presses(wanted, setting.phases):
-            return _sampled(wanted, setting)
+        phases = set_values(wanted, torque)
+        if presses(wanted, phases):
+            return _sampled(wanted, phases)
     raise BiogripError(
         "design: with all torques that were found the jaws would have to pull at some instant; "
         "allowed are more torques to be tried (`tried`)."
@@ -118,24 +118,30 @@ def presses(wanted: Wanted, phases: Sequence[Phase]) -> bool:
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
-def sampling_problem(wanted: Wanted, setting: Setting) -> SamplingProblem:
+def sampling_problem(wanted: Wanted, phases: tuple[Phase, ...]) -> SamplingProblem:
     """Divide the time of an experiment, and see what a reading tells there."""
+    slots = [round(phase.duration_s * wanted.fastest_Hz) for phase in phases]
     each = tuple(
-        swinging_cells(slots, period, _PARTS, _PERIODS) if period else cells(slots, _GROWTH)
-        for slots, period in zip(setting.slots.tolist(), setting.periods.tolist(), strict=True)
+        _cells(count, phase, wanted.fastest_Hz) for count, phase in zip(slots, phases, strict=True)
     )
-    starts = np.concatenate(([0], np.cumsum(setting.slots)[:-1]))
+    starts = np.cumsum([0, *slots[:-1]])
     middle = np.concatenate([start + own.middle for start, own in zip(starts, each, strict=True)])
     order = np.argsort(middle, kind="stable")
     told = np.empty((*wanted.parameters.shape, len(middle)))
     times_s = middle[order] / wanted.fastest_Hz
-    told[..., order] = _told(wanted, torque_history(setting.phases), times_s)
+    told[..., order] = _told(wanted, torque_history(phases), times_s)
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
     return SamplingProblem(each, starts, told, capacity)
 
 
-def _sampled(wanted: Wanted, setting: Setting) -> Plan:
-    problem = sampling_problem(wanted, setting)
+def _cells(slots: int, phase: Phase, fastest_Hz: float) -> Cells:
+    for harmonic in phase.left.harmonics:
+        return swinging_cells(slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS)
+    return cells(slots, _GROWTH)
+
+
+def _sampled(wanted: Wanted, phases: tuple[Phase, ...]) -> Plan:
+    problem = sampling_problem(wanted, phases)
     told, capacity = problem.told, problem.capacity
     best = best_sampling(
         told,
@@ -149,10 +155,10 @@ def _sampled(wanted: Wanted, setting: Setting) -> Plan:
     few = in_few_cells(told, best.samples, capacity, _late(problem.each), wanted.before)
     counts = whole(few, capacity)
     bursts = bursts_of(problem.each, problem.starts, counts, wanted.fastest_Hz)
-    history = torque_history(setting.phases)
+    history = torque_history(phases)
     seen = _told(wanted, history, Sampling(bursts=bursts).over(history.end_s))
     information = seen @ seen.swapaxes(1, 2) + wanted.before
-    return Plan(setting.phases, bursts, information, best.gap)
+    return Plan(phases, bursts, information, best.gap)
 
 
 def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:

@@ -18,6 +18,10 @@ from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Case
 
 
+NO_BOUND = 10.0
+"""Of which nobody would say that something is known: a factor of e to the tenth."""
+
+
 @dataclass(frozen=True)
 class Designed:
     """A designed experiment.
@@ -137,8 +141,4 @@ def largest_Nm(phase: Phase) -> float:
 
 def percent(bound: float) -> str:
     """Print a relative bound."""
-    return "none" if bound > _NO_BOUND else f"{100 * bound:.2g} %"
-
-
-# Of which nobody would say that it is known: a factor of e to the tenth.
-_NO_BOUND = 10.0
+    return "none" if bound > NO_BOUND else f"{100 * bound:.2g} %"
