@@ -17,7 +17,6 @@ from biogrip.own_design.earlier import Earlier
 from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Case
 
-
 NO_BOUND = 10.0
 """Of which nobody would say that something is known: a factor of e to the tenth."""
 
