@@ -4,10 +4,10 @@ A number stands between two comments, of which the first says where it comes fro
 
     <!--= methods[case=liquid_drop_1, method=genetic].responses | .3g -->5400<!--/-->
 
-It names a table, or a section of the benchmarks, rows by their columns (``=``, ``!=``, and ``|`` between alternatives), a column
-and a format of Python's; ``%`` formats shares. Of several rows the lowest and the highest are
-shown, or, with ``| each``, all that differ in the order of the table. ``count`` in the place of a
-column is the number of rows.
+It names a table, or a section of the benchmarks, rows by their columns (``=``, ``!=``, and ``|``
+between alternatives), a column and a format of Python's; ``%`` formats shares. Of several rows the
+lowest and the highest are shown, or, with ``| each``, all that differ in the order of the table.
+``count`` in the place of a column is the number of rows.
 """
 
 import json
