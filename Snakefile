@@ -29,6 +29,11 @@ rule all_designs:
         [file for file in ALL_FILES if Path(file).name.startswith("designed")],
 
 
+rule all_sequences:
+    input:
+        [file for file in ALL_FILES if Path(file).name.startswith("sequential")],
+
+
 rule all_posteriors:
     input:
         [file for file in ALL_FILES if Path(file).name.startswith("posterior")],

@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.sampling import best_sampling
 from biogrip.design.schedule import SamplingProblem, sampling_problem
-from biogrip.own_design.asked import wanted_of
+from biogrip.study.asked_design import wanted_of
 from biogrip.study.load import load_study, read_configs
 
 OURS, CLOSER = "biogrip, as it designs", "biogrip, to 0.01 %"

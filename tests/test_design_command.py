@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 
 from biogrip.cli import main
+from biogrip.design.experiment import Wanted
+from biogrip.design.search import Torque, TorqueSearch
+from biogrip.design.shapes import SHAPES
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
-from biogrip.own_design.asked import plausible, wanted_of
+from biogrip.own_design import designed
 from biogrip.response.simulation import simulated_rotation
+from biogrip.study.asked_design import plausible, wanted_of
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from tests.helpers.default import study_of
@@ -127,28 +131,71 @@ def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
     assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
 
 
+def seldom_sampled() -> Case:
+    """The paper's protocol, with a tenth of its samples."""
+    return study_of(f"{ASKED}measurement: {{rate_Hz: 1.0}}\n").cases["liquid_drop_2"]
+
+
+def write_trace(case: Case, file: Path) -> Path:
+    """Write a trace of a case, as its protocol and sampling have it."""
+    times = case.sampling.over(case.problem.torque.end_s)
+    network = case.sample.model.sample(case.parameters)
+    clean = simulated_rotation(case.gripper, network, case.problem.torque, times, nonlinear=False)
+    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
+    columns = np.column_stack((times, clean[0] + noise))
+    np.savetxt(file, columns, "%.12g", ",", header="time_s,rotation_rad", comments="")
+    return file
+
+
+def bounds_after(place: Path, *traces: str) -> dict[str, tuple[str, str]]:
+    """Ask what is next after traces; bounds as printed, with the config's and the designed."""
+    (place / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(place, *traces) == 0
+    lines = re.findall(r"^  (k|k_p|c|c_p) +(\S+) .*\| (\S+)", said.getvalue(), re.MULTILINE)
+    assert len(lines) == 4
+    return {name: (before, after) for name, before, after in lines}
+
+
 def test_after_a_trace(tmp_path: Path) -> None:
     """A trace as the paper's tells c + c_p and k_p; the next experiment tells them all.
 
     The same again would leave k, c and c_p without a bound.
     """
-    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
-    case = study_of(ASKED).cases["liquid_drop_2"]
-    times = np.arange(4001) / 10.0
-    network = case.sample.model.sample(case.parameters)
-    clean = simulated_rotation(case.gripper, network, case.problem.torque, times, nonlinear=False)
-    noise = 3e-6 * np.random.default_rng(0).standard_normal(len(times))
-    columns = np.column_stack((times, clean[0] + noise))
-    trace = tmp_path / "trace.csv"
-    head = "time_s,rotation_rad"
-    np.savetxt(trace, columns, "%.12g", ",", header=head, comments="")
-    said = StringIO()
-    with redirect_stdout(said):
-        assert design(tmp_path, "--after", str(trace)) == 0
-    bounds = dict(re.findall(r"^  (k|k_p|c|c_p) .* \| (\S+)", said.getvalue(), re.MULTILINE))
-    assert set(bounds) == {"k", "k_p", "c", "c_p"}
-    assert "none" not in bounds.values()
-    assert re.search(r"^  c_p +none", said.getvalue(), re.MULTILINE)
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
+    bounds = bounds_after(tmp_path, "--after", str(trace))
+    assert "none" not in [after for _, after in bounds.values()]
+    assert bounds["c_p"][0] == "none"
+
+
+def test_after_a_trace_of_the_study_and_one_that_was_designed(
+    folder: tuple[Path, str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """What the designed one tells is known even if the study's experiment is done again.
+
+    Read by the protocol that it was not recorded with, the same file is refused.
+    """
+    monkeypatch.setattr(designed, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    first = write_trace(seldom_sampled(), tmp_path / "first.csv")
+    second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
+    over = str(folder[0] / "out.yaml")
+    bounds = bounds_after(tmp_path, "--after", str(first), "--after", str(second), over)
+    for name, bound in re.findall(r"^  (k|k_p|c|c_p) .*\| (\S+) %", folder[1], re.MULTILINE):
+        # Of samples near the truth, by what a bound changes with them, and as printed.
+        assert float(bounds[name][0]) < 1.5 * float(bound)
+    assert design(tmp_path, "--force", "--after", str(second)) == 1
+    assert "second.csv" in capsys.readouterr().err
+
+
+def one_torque(wanted: Wanted) -> Torque:
+    """Any torque; a search takes seconds."""
+    return TorqueSearch(wanted, SHAPES["steps"]).torque(
+        np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
+    )
 
 
 @pytest.mark.parametrize(

@@ -198,8 +198,12 @@ def _design_parser(stages: Any) -> None:
     design.add_argument(
         "--after",
         type=Path,
-        metavar="TRACE",
-        help="CSV file with time_s and rotation_rad, recorded as the config says: what to do next",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar=("TRACE", "CONFIG"),
+        help="CSV file with time_s and rotation_rad: what to do next; recorded as the config says, "
+        "or as YAML files say that are laid over it; again for every trace of the sample",
     )
     design.add_argument(
         "--output",

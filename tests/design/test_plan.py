@@ -115,16 +115,18 @@ def test_the_search_repeats_itself_and_looking_longer_is_no_worse() -> None:
     assert longer < 1.05 * relative_bounds(again.information).max()
 
 
-def test_of_several_shapes_the_best_is_taken_and_comes_again() -> None:
-    """For a drop, sinusoids: as many torques of each as when they are asked for alone."""
+def test_sinusoids_repeat_themselves() -> None:
+    first, again = _plan(shape="sinusoids"), _plan.__wrapped__(shape="sinusoids")
+    assert first.phases == again.phases
+    assert first.bursts == again.bursts
+
+
+def test_of_several_shapes_the_best_is_taken() -> None:
+    """For a drop, sinusoids."""
     wanted = replace(DROP, shapes=("steps", "sinusoids"))
-    found = [best_torques(wanted, 256, np.random.default_rng(1), silent) for _ in range(2)]
-    plans = [planned(wanted, torques) for torques in found]
-    assert plans[0].phases == plans[1].phases
-    assert plans[0].bursts == plans[1].bursts
-    assert any(phase.left.harmonics for phase in plans[0].phases)
-    bounds = [relative_bounds(plan.information).max() for plan in (plans[0], _plan())]
-    assert bounds[0] < bounds[1]
+    plan = planned(wanted, best_torques(wanted, 256, np.random.default_rng(1), silent))
+    assert any(phase.left.harmonics for phase in plan.phases)
+    assert relative_bounds(plan.information).max() < relative_bounds(_plan().information).max()
 
 
 def test_what_is_known_already_is_not_asked_again() -> None:

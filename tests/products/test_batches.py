@@ -51,8 +51,8 @@ def test_every_seed_is_covered_once_whatever_exists(seeds: int, size: int) -> No
 
 
 def test_very_many_seeds_make_larger_batches_not_more() -> None:
-    assert seeds_a_batch(1) == seeds_a_batch(1000) == 125
-    for seeds in (1_001, 2_999, 8_000):
+    assert seeds_a_batch(1) == seeds_a_batch(2000) == 250
+    for seeds in (2_001, 2_999, 8_000):
         assert len(plan_batches(seeds, seeds_a_batch(seeds))) == 8
     # But none that would take much memory.
     assert seeds_a_batch(100_000) == seeds_a_batch(1_000_000) == 1000

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import biogrip.products
 from biogrip.errors import BiogripError
@@ -20,6 +21,7 @@ from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
 from biogrip.running.sheet import Sheet, files_of, sheets_of
+from biogrip.study.source import overlaid, read_config
 from tests.helpers.default import plan_of
 from tests.helpers.places import ROOT
 
@@ -39,6 +41,11 @@ cases:
     sample: {model: generalized_maxwell}
     measurement: {file: data/example_trace.csv, time: time_s, rotation: rotation_rad}
 """
+OVERLAYS = [
+    (file.name,)
+    for file in sorted((ROOT / "config").glob("*.yaml"))
+    if file.name not in ("config.yaml", "designed.yaml")
+] + [("design.yaml", "designed.yaml")]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 
@@ -104,6 +111,20 @@ def test_the_sheets_make_every_job_of_every_product_once(everything: list[Sheet]
         made = [dict(job) for sheet in sheets for job in sheet.jobs]
         plan = everything[0].plan
         assert sorted(made, key=str) == sorted(map(dict, product.jobs(plan)), key=str), product.name
+
+
+@pytest.mark.parametrize("overlay", OVERLAYS, ids=" ".join)
+def test_every_overlay_is_planned(
+    overlay: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the products that it alone asks for, and what each of their jobs depends on."""
+    monkeypatch.chdir(ROOT)
+    over: dict[str, Any] = {}
+    for name in overlay:
+        over = overlaid(over, read_config(ROOT / "config" / name))
+    sheets = sheets_of(products().values(), plan_of(yaml.safe_dump(over)))
+    told_apart = [sheet.digest(job) for sheet in sheets for job in sheet.jobs]
+    assert len(set(told_apart)) > 10
 
 
 def test_no_command_nor_parameter_is_long(everything: list[Sheet]) -> None:

@@ -8,6 +8,7 @@ OVERLAYS = {
     "robustness": (["robustness"], "all_maps", "robustness_*"),
     "readings": (["readings"], "readings", "readings"),
     "design": (["design", "designed"], "all_designs", "designed*"),
+    "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
@@ -16,7 +17,7 @@ CONFIGS = Path(workflow.basedir) / "config"
 RUN_AFRESH = (
     "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
     "snakemake -j {threads} --snakefile {params.snakefile:q} "
-    '--directory "$scratch" --quiet all {params.config} -- {params.targets} >> {log:q} 2>&1'
+    '--directory "$scratch" --quiet rules progress host reason {params.config} -- {params.targets} >> {log:q} 2>&1'
 )
 
 

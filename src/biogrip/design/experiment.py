@@ -37,7 +37,7 @@ class Wanted:
         How far the arms may turn.
     criterion
         What is to be small.
-    before : (n_parameters, n_parameters)
+    before : (n, n_parameters, n_parameters) or (1, n_parameters, n_parameters)
         Information on the log-parameters that earlier experiments gave.
     """
 

@@ -33,7 +33,7 @@ def in_few_cells(
         How many a cell has room for.
     cost : (n_cells,)
         What a sample costs there.
-    before : (n_parameters, n_parameters)
+    before : (n or 1, n_parameters, n_parameters)
         Information that is there already.
 
     Returns

@@ -80,7 +80,7 @@ def best_sampling(
         Small enough.
     most
         Fillings that are tried at most.
-    before : (n_parameters, n_parameters)
+    before : (n or 1, n_parameters, n_parameters)
         Information that is there already, from other experiments.
     """
     room = min(float(samples), float(capacity.sum()))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
@@ -105,9 +106,13 @@ class DesignSettings:
             high=1_000_000,
         ),
     ] = 2000
+    sequence: Annotated[SequenceSettings | None, Key()] = None
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that do not go together."""
+        if self.sequence and not self.ranges:
+            text = "found no design.ranges, which cells are drawn from; allowed is one at least."
+            yield ("sequence",), text
         given = [key for key in ("largest_torque_Nm", "largest_voltage_V") if getattr(self, key)]
         if len(given) != 1:
             text = f"found {' and '.join(given) or 'neither'}, allowed is one of largest_torque_Nm "

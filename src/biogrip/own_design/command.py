@@ -1,13 +1,14 @@
 """What the command does."""
 
 from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
 from biogrip.own_design.as_config import as_config
 from biogrip.own_design.designed import designed, in_words
-from biogrip.own_design.earlier import told_by
+from biogrip.own_design.earlier import Recorded, told_by_recorded
 from biogrip.own_traces.outputs import check_output
 from biogrip.progress import Progress
 from biogrip.study.defaults import default_config
@@ -20,7 +21,7 @@ def design(
     names: Sequence[str],
     output: Path,
     *,
-    after: Path | None = None,
+    after: Sequence[Sequence[Path]] = (),
     force: bool = False,
 ) -> None:
     """Design the experiments of cases, write them as a config and as a page, and print them.
@@ -34,7 +35,8 @@ def design(
     output
         YAML file; the page stands beside it.
     after
-        CSV file of a trace of one case, recorded as the config says: what it told is used.
+        Traces of one sample, whose telling is used: a CSV file, and, if it was not recorded as the
+        config says, the YAML files to be laid over that. In the order of the experiments.
     force
         Whether to replace files that this program did not write.
 
@@ -49,15 +51,16 @@ def design(
     page = output.with_suffix(".html")
     if page == output:
         raise BiogripError(f"{output}: allowed is the name of a YAML file; the page is beside it.")
-    if after is not None and len(chosen) > 1:
+    if after and len(chosen) > 1:
         raise BiogripError("--after: is of one case; choose it with --case.")
-    refuse_inputs([output, page], [*configs, *([after] if after else [])])
+    refuse_inputs([output, page], [*configs, *chain.from_iterable(after)])
     for path in (output, page):
         check_output(path, force=force)
     found = []
     with Progress("designs", len(chosen), live=True) as progress:
         for case in chosen:
-            told = None if after is None else told_by(case, after, study.study_seed)
+            traces = [_recorded(files, own, case.name) for own in after]
+            told = told_by_recorded(traces, study.study_seed) if traces else None
 
             def tried(count: int, bound: float, title: str = case.title) -> None:
                 progress.doing(f"{title}: {count} torques tried, bound {100 * bound:.3g} %")
@@ -71,6 +74,13 @@ def design(
     write_page(found, page)
     print("\n".join(map(in_words, found)))
     print(f"Written to {output}, {page}.")
+
+
+def _recorded(files: Sequence[Path], own: Sequence[Path], name: str) -> Recorded:
+    """Read how a trace was recorded."""
+    trace, *over = own
+    laid = [*files, *over]
+    return Recorded(load_study(read_configs(laid), laid, for_workflow=False).cases[name], trace)
 
 
 def _chosen(cases: dict[str, Case], names: Sequence[str]) -> list[Case]:

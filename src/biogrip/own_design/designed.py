@@ -10,11 +10,11 @@ from biogrip.arrays import Array
 from biogrip.design.experiment import Wanted, relative_bounds
 from biogrip.design.schedule import Plan, forces, planned
 from biogrip.design.search import best_torques
+from biogrip.design.told import Earlier
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
-from biogrip.own_design.asked import wanted_of
-from biogrip.own_design.earlier import Earlier
 from biogrip.response.ringing import ringing_responses
+from biogrip.study.asked_design import wanted_of
 from biogrip.study.study import Case
 
 NO_BOUND = 10.0
@@ -66,8 +66,8 @@ def designed(
     progress
         Is told how many torques were tried, and the lowest typical relative bound.
     earlier
-        What an earlier trace told. All bounds are then with it: the first, of its experiment done
-        again as the config has it.
+        What earlier traces told. All bounds are then with it: the first, of the experiment that the
+        config has done again.
 
     Raises
     ------

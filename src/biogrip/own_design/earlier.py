@@ -1,79 +1,87 @@
-"""What a trace has told already, for the experiment that comes next."""
+"""What recorded traces have told already, for the experiment that comes next."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
-from biogrip.arrays import Array
+from biogrip.design.told import Earlier, told_by
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
-from biogrip.identify.answer import silent
-from biogrip.identify.methods import identifier
+from biogrip.groups.replicates import joint_problem
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.methods import best_fit
+from biogrip.identify.problem import Problem
 from biogrip.products.stages import recording
+from biogrip.study.asked_design import plausible_ends
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import Columns
 
-# Of the search range's length in logarithms, the standard deviation of what nothing tells.
-_UNTOLD = 0.25
+# What a fit may leave of traces, in units of the noise, before they are of something else.
+_UNLIKE = 2.0
 
 
-@dataclass(frozen=True, eq=False)
-class Earlier:
-    """What a trace told.
-
-    Parameters
-    ----------
-    parameters : (n, n_parameters)
-        Samples that are plausible after it, the best fit first.
-    information : (n_parameters, n_parameters)
-        Fisher information of the log-parameters at the best fit.
-    """
-
-    parameters: Array
-    information: Array
-
-
-def told_by(case: Case, trace: Path, study_seed: int) -> Earlier:
-    """Fit a trace, and draw samples from what is plausible after it.
-
-    Around the best fit the likelihood is taken for Gaussian, and what the trace does not tell lies
-    anywhere in the search range.
+@dataclass(frozen=True)
+class Recorded:
+    """A trace, and how it was recorded.
 
     Parameters
     ----------
     case
-        Gripper, protocol, search range and least squares; its block `design` has the noise.
-    trace
+        Its protocol and gripper are the trace's.
+    file
         CSV file with the columns time_s and rotation_rad.
+    """
+
+    case: Case
+    file: Path
+
+
+def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
+    """Fit the traces of one sample together, one more after the other.
+
+    Parameters
+    ----------
+    traces
+        In the order of their experiments. Search range, least squares, and the block `design` with
+        the noise, are those of the first one's case.
     study_seed
         Of starting points and draws.
 
     Raises
     ------
     BiogripError
-        With file and line, if the trace cannot be used.
+        With file and line, if a trace cannot be used, or is not what the configs say.
     """
+    case = traces[0].case
     asked = case.block.design
     assert asked is not None
-    if wrong := trace_file_problem(trace):
-        raise BiogripError(f"--after: {wrong}")
-    posed = replace(case.problem, inertia=True, noise_rad=asked.noise_rad)
-    columns = Columns("time_s", "rotation_rad")
-    recorded = recording.read_checked(recording.Settings(case.gripper, posed, columns), trace)
-    problem = posed.of(recorded.time_s, recorded.rotation_rad[0])
-    identify = identifier("least_squares", case.method("least_squares"))
+    problems = [_posed(each, asked.noise_rad) for each in traces]
     rng = stream(study_seed, case.name, 0, "after")
-    (found,) = identify([problem], [rng], silent)
-    best = np.log(found.parameters)
-    _, slopes = problem.residuals(best)
-    information = slopes @ slopes.T / asked.noise_rad**2
-    untold = np.diag((_UNTOLD * (problem.high - problem.low)) ** -2)
-    # Of R with R^T R the precision, R^-1 z has its covariance.
-    root = np.linalg.cholesky(information + untold).T
-    around = np.linalg.solve(root, rng.standard_normal((len(best), asked.drawn - 1))).T
-    drawn = np.clip(
-        best + np.concatenate((np.zeros((1, len(best))), around)), problem.low, problem.high
-    )
-    return Earlier(np.exp(drawn), information)
+
+    def identify(problem: Problem) -> Identification:
+        return best_fit(problem, case.method("least_squares"), rng, silent)
+
+    told, ends = None, plausible_ends(case)
+    for count, recorded in enumerate(traces, 1):
+        joint = joint_problem(problems[:count], count * [asked.noise_rad])
+        told = told_by(joint, asked.noise_rad, identify, ends, asked.drawn, rng, told)
+        if told.misfit_rad > _UNLIKE * asked.noise_rad:
+            raise BiogripError(
+                f"--after: {recorded.file}: found {told.misfit_rad:.3g} rad that the best fit "
+                f"leaves, allowed is at most {_UNLIKE:g} times design.noise_rad: is it of this "
+                "sample, and was it recorded as the configs say?"
+            )
+    assert told is not None
+    return told
+
+
+def _posed(recorded: Recorded, noise_rad: float) -> Problem:
+    if wrong := trace_file_problem(recorded.file):
+        raise BiogripError(f"--after: {wrong}")
+    case = recorded.case
+    posed = replace(case.problem, inertia=True, noise_rad=noise_rad)
+    columns = Columns("time_s", "rotation_rad")
+    settings = recording.Settings(case.gripper, posed, columns)
+    trace = recording.read_checked(settings, recorded.file)
+    return posed.of(trace.time_s, trace.rotation_rad[0])

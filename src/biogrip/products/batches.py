@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-_SMALLEST, _LARGEST = 125, 1000
+_SMALLEST, _LARGEST = 250, 1000
 _BATCHES = 8
 
 

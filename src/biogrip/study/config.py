@@ -92,7 +92,7 @@ class StudyConfig(Shared):
     batch_size: Annotated[
         int | None,
         Key(
-            "How many seeds one job takes. If it is not given, 125; for more than 1000 seeds, an "
+            "How many seeds one job takes. If it is not given, 250; for more than 2000 seeds, an "
             "eighth of them, for more than 8000, 1000. Changes no result, only how much of a job "
             "is start-up.",
             low=1,

@@ -12,7 +12,8 @@ from tests.products.tables.test_designed import OVERLAY
 
 
 def test_the_map_is_of_bounds_over_two_parameters() -> None:
-    case = of_case(study_of(OVERLAY.replace("SEEDS", "0")), "endothelial_cell")
+    study = study_of(OVERLAY.replace("SEEDS", "0"))
+    case = of_case(study, study.cases["endothelial_cell"])
     samples = samples_of(case)
     names = case.model.names
     for name in ("k", "c_p"):

@@ -15,16 +15,17 @@ from matplotlib.testing.compare import compare_images
 
 from biogrip.experiment.sample import MODELS
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared, designed_map
+from biogrip.products.figures import declared, designed_map, sequential
 from biogrip.products.figures import robustness as heat_map
 from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
-from tests.helpers.default import plan_of, study_of
+from tests.helpers.default import STUDY, plan_of, study_of
 from tests.helpers.runs import SMALL
 from tests.products.tables.test_designed import OVERLAY
+from tests.products.tables.test_sequential import made_up
 
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures, in which a line is still a line.
@@ -69,6 +70,7 @@ OTHERS = {
     HEAT_MAPS: "robustness_map",
     "posterior_made_up": "corner",
     "designed_map": "designed_map",
+    "sequential": "sequential_cells",
 }
 NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
@@ -130,7 +132,12 @@ def difference(name: str, figure: Figure, folder: Path) -> str | None:
 
 
 @pytest.fixture(scope="module")
-def figure(request: pytest.FixtureRequest, draw: Draw, judged: list[Path]) -> Figure:
+def figure(
+    request: pytest.FixtureRequest,
+    draw: Draw,
+    judged: list[Path],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Figure:
     """The figure that two tests are about, drawn; the second changes it."""
     if request.param not in OTHERS:
         return draw(request.param)
@@ -140,7 +147,13 @@ def figure(request: pytest.FixtureRequest, draw: Draw, judged: list[Path]) -> Fi
             return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
         if request.param == "designed_map":
             designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed_map.of_case(designed, "endothelial_cell"))
+            return designed_map.draw(
+                designed_map.of_case(designed, designed.case("endothelial_cell"))
+            )
+        if request.param == "sequential":
+            cell = STUDY.cases["endothelial_cell"]
+            rows = made_up(tmp_path_factory.mktemp("cells"))
+            return sequential.draw(sequential.of_case(STUDY, cell), rows)
         return _corner()
 
 

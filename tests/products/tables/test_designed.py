@@ -8,7 +8,11 @@ import pytest
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.products.designed_cases import settings
 from biogrip.products.files.intervals import INTERVALS
+from biogrip.products.stages.judgement import expect, expected_settings
+from biogrip.products.stages.target import settings as target_settings
+from biogrip.products.stages.target import simulate
 from biogrip.products.tables.designed import designed
+from biogrip.study.study import Study
 from tests.helpers.default import study_of
 
 OVERLAY = """
@@ -31,23 +35,32 @@ cases:
 """
 
 
-def test_bounds_before_and_after() -> None:
+def expected(study: Study, folder: Path) -> Path:
+    """Verdicts of the case's trace without noise."""
+    job, target, verdicts = {"case": "endothelial_cell"}, folder / "target", folder / "verdicts"
+    simulate(target_settings(study, job), target)
+    expect(expected_settings(study, job), target, [], verdicts)
+    return verdicts
+
+
+def test_bounds_before_and_after(tmp_path: Path) -> None:
     study = study_of(OVERLAY.replace("SEEDS", "0"))
-    table = designed(settings(study), [])
+    table = designed(settings(study), [expected(study, tmp_path)], [])
     rows = {row[1]: row for row in table.rows}
     assert list(rows) == ["k", "k_p", "c", "c_p"]
     # Jump, rate and plateau at 10 Hz: three observables for four parameters.
     assert [rows[name][5] for name in ("k", "c", "c_p")] == [None] * 3
     assert 0 < float(rows["k_p"][5] or 0) < 1
+    assert [rows[name][7] for name in rows] == ["determined"] * 4
     case = study.cases["endothelial_cell"]
     times = case.sampling.over(case.problem.torque.end_s)
     bounds = bounds_percent(case.problem, case.noise, case.parameters, times)
     for quantity, bound in bounds[:4]:
         assert rows[quantity.label][6] == pytest.approx(bound, rel=1e-6)
-        assert rows[quantity.label][7:11] == (None,) * 4
+        assert rows[quantity.label][8:12] == (None,) * 4
     # Force follows the torque of what springs back: a quarter of it, less what the hinges pull.
     lever = case.gripper.lever_m
-    assert 0.5 < float(rows["k"][11] or 0) / (1e9 * 4e-10 / lever) < 1
+    assert 0.5 < float(rows["k"][12] or 0) / (1e9 * 4e-10 / lever) < 1
 
 
 def test_seeds_beside_it(tmp_path: Path) -> None:
@@ -61,12 +74,12 @@ def test_seeds_beside_it(tmp_path: Path) -> None:
         for seed, line in enumerate(lines)
     ]
     INTERVALS.write(file, rows)
-    table = designed(settings(study), [file])
+    table = designed(settings(study), [expected(study, tmp_path)], [file])
     row = next(row for row in table.rows if row[1] == "k")
     spread = 100 * np.std(logs, ddof=1)
-    assert row[7] == pytest.approx(spread, rel=1e-6)
-    assert row[8] == pytest.approx(spread / float(row[6] or 0), rel=1e-6)
-    assert row[9:11] == (75.0, 4)
+    assert row[8] == pytest.approx(spread, rel=1e-6)
+    assert row[9] == pytest.approx(spread / float(row[6] or 0), rel=1e-6)
+    assert row[10:12] == (75.0, 4)
 
 
 def test_the_default_study_has_none() -> None:

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 WELL = 0.1
 """A parameter that is known to this share of itself counts as determined."""
@@ -20,9 +20,9 @@ _DAMPINGS = np.geomspace(1e-2, 1e3, 16)
 _SHOWN_PERCENT = (0.1, 1000.0)
 
 
-def of_case(study: Study, case: str) -> CaseSettings:
+def of_case(study: Study, case: Case) -> CaseSettings:
     """Choose what a case's map depends on."""
-    return settings(study)[case]
+    return settings(study)[case.name]
 
 
 def draw(case: CaseSettings) -> Figure:

@@ -42,7 +42,6 @@ _STYLE: dict[Any, Any] = {
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
-    "axes.formatter.use_mathtext": True,
     "lines.linewidth": 1.2,
     "legend.frameon": False,
     "legend.fontsize": 7,

@@ -10,6 +10,7 @@ from biogrip.design.schedule import forces
 from biogrip.experiment.protocol import torque_history
 from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
 from biogrip.products.files.intervals import INTERVALS
+from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
@@ -22,6 +23,7 @@ _COLUMNS = (
     Column("noise_urad", "Noise (µrad)"),
     Column("before_percent", "Bound with the study's protocol %"),
     Column("bound_percent", "Bound with its own %"),
+    Column("expected_verdict", "Expected verdict"),
     Column("spread_percent", "Spread of seeds %"),
     Column("spread_over_bound", "Spread / bound"),
     Column("coverage_percent", "Intervals that hold the truth %"),
@@ -30,19 +32,24 @@ _COLUMNS = (
 )
 
 
-def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Table:
+def designed(
+    settings: Mapping[str, CaseSettings], expected: list[Path], intervals: list[Path]
+) -> Table:
     """Hold bounds of both experiments, and estimates of many seeds, against one another.
 
     Parameters
     ----------
     settings
         The experiments, by case.
+    expected
+        Verdicts of their traces without noise, JSON, in their order.
     intervals
         Estimates and limits of those cases that have them, CSV, in their order.
     """
     files = iter(intervals)
     rows: list[tuple[Cell, ...]] = []
-    for name, case in settings.items():
+    for (name, case), foreseen in zip(settings.items(), expected, strict=True):
+        verdicts = {each["quantity"]: each for each in read_verdicts(foreseen)["quantities"]}
         found = INTERVALS.read(next(files)) if case.covered else None
         truths = np.array([[case.parameters[name] for name in case.model.names]])
         before, after = (
@@ -53,12 +60,14 @@ def designed(settings: Mapping[str, CaseSettings], intervals: list[Path]) -> Tab
             truth = case.parameters[parameter.name]
             head = (name, parameter.name, parameter.unit, truth, 1e6 * case.noise_rad)
             both = (_percent(before[index]), _percent(after[index]))
+            verdict = verdicts[parameter.name]["verdict"]
             seen = _of_seeds(found, parameter.name, truth, float(after[index]))
-            rows.append((*head, *both, *seen, 1e9 * least_N))
+            rows.append((*head, *both, verdict, *seen, 1e9 * least_N))
     caption = (
         "Cramér-Rao bounds, one standard deviation, with all parameters free and the arms' "
         "inertia in the model, at the same noise: with the protocol and the sampling of the study, "
-        "and with the case's own. Without a number: no finite bound. Beside it the standard "
+        "and with the case's own. Without a number: no finite bound. Beside it what the "
+        "case's experiment is to tell by the profile of a trace without noise, the standard "
         "deviation of what least squares finds in many seeds, and how often its intervals, of the "
         "study's confidence, hold the truth."
     )
@@ -99,10 +108,11 @@ DESIGNED = table(
     "identified on them keep that promise.",
     settings=settings,
     reads={
+        "expected": of_cases(EXPECTED, designed_cases),
         "intervals": of_cases(
             INTERVALS.path,
             lambda study: [n for n in designed_cases(study) if study.cases[n].coverage_seeds > 0],
-        )
+        ),
     },
     when=lambda study: bool(designed_cases(study)),
 )

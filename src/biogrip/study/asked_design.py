@@ -8,10 +8,10 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.experiment import Wanted
 from biogrip.design.settings import DesignSettings
+from biogrip.design.told import Earlier
 from biogrip.design.waveform import Limits
 from biogrip.errors import BiogripError
 from biogrip.instrument.actuator import torque
-from biogrip.own_design.earlier import Earlier
 from biogrip.study.study import Case
 
 
@@ -23,7 +23,7 @@ def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
     case
         With a block `design`.
     earlier
-        What an earlier trace told; its samples then are the plausible ones.
+        What earlier traces told; their samples then are the plausible ones.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
             asked.over,
             tuple(model.names.index(name) for name in asked.quantities or model.names),
         ),
-        before=earlier.information if earlier else np.zeros(2 * (len(model.names),)),
+        before=earlier.information if earlier else np.zeros((1, *2 * (len(model.names),))),
     )
 
 
@@ -82,6 +82,22 @@ def plausible(case: Case, asked: DesignSettings) -> Array:
     spread = qmc.Halton(len(names), scramble=False).random(asked.drawn + 1)[1:]
     drawn: Array = np.exp(low + (high - low) * spread)
     return drawn
+
+
+def plausible_ends(case: Case) -> tuple[Array, Array]:
+    """Logarithms between which parameters lie, (n_parameters,) each, if traces tell nothing.
+
+    The ranges that are asked for, and the search range of those without one.
+    """
+    asked, searched, ranges = case.block.design, case.problem.searched, case.ranges
+    assert asked is not None
+    ends: list[tuple[float, float]] = []
+    for parameter in searched.parameters:
+        genes = ranges[parameter.range_name]
+        low, high = (asked.ranges or {}).get(parameter.name, (genes.low, genes.high))
+        ends.append((max(low, genes.low), min(high, genes.high)))
+    low, high = np.log(ends).T
+    return low, high
 
 
 def _largest(case: Case, asked: DesignSettings) -> float:

@@ -1,0 +1,17 @@
+"""What is asked of simulated sequences of experiments, as the config says it."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from biogrip.keys import Key
+
+
+@dataclass(frozen=True)
+class SequenceSettings:
+    """Simulated cells with one experiment after another: how many it takes, see docs/design.md."""
+
+    cells: Annotated[
+        int,
+        Key("Cells, drawn uniformly in the logarithms within `design.ranges`.", low=2, high=10_000),
+    ]
+    experiments: Annotated[int, Key("Experiments with each, in every way.", low=2, high=20)]

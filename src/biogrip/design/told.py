@@ -1,0 +1,164 @@
+"""What traces have told already, for the experiment that comes next.
+
+Which samples are plausible is drawn from the likelihood. What traces tell well is taken for
+Gaussian around the best fit. Of what they tell badly, a damper that only has to be small, say, a
+Gaussian says nothing: such parameters are drawn from anywhere, the others fitted with these held,
+and a draw is kept as often as it is as likely as the best.
+
+References
+----------
+.. [1] K. Chaloner and I. Verdinelli, Bayesian experimental design: a review, Statistical Science 10
+   (1995), 273-304: information of earlier experiments adds to that of the next.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.local_fit import FAIR
+from biogrip.identify.many_fits import ManyFits
+from biogrip.identify.many_starts import best_of_many_starts
+from biogrip.identify.problem import Problem
+
+# Standard deviation of a logarithm from which on a Gaussian is not trusted.
+_BADLY = 0.25
+# Draws of what is told badly, of which some are kept.
+_TRIED = 128
+
+
+@dataclass(frozen=True, eq=False)
+class Earlier:
+    """What traces told.
+
+    Parameters
+    ----------
+    parameters : (n, n_parameters)
+        Samples that are plausible after them, the best fit first.
+    information : (n, n_parameters, n_parameters)
+        Fisher information of the log-parameters that these experiments give of each of them.
+    misfit_rad
+        Of the best fit.
+    """
+
+    parameters: Array
+    information: Array
+    misfit_rad: float
+
+    @property
+    def best(self) -> Array:
+        """Log-parameters of the best fit, (n_parameters,)."""
+        logs: Array = np.log(self.parameters[0])
+        return logs
+
+
+def told_by(
+    problem: Problem,
+    noise_rad: float,
+    identify: Callable[[Problem], Identification],
+    within: tuple[Array, Array],
+    drawn: int,
+    rng: np.random.Generator,
+    before: Earlier | None = None,
+) -> Earlier:
+    """Fit a trace, or several at once, and draw samples from what is plausible after that.
+
+    Parameters
+    ----------
+    problem
+        One trace, or several of `biogrip.groups.replicates.joint_problem`.
+    noise_rad
+        Standard deviation of the noise, the same in all of them.
+    identify
+        Finds the global optimum.
+    within : (n_parameters,) each
+        Logarithms between which parameters are plausible of which traces tell little.
+    drawn
+        How many samples; fewer where fewer are found.
+    rng
+        Of the draws.
+    before
+        What all but the last trace told; the fit starts from there, too.
+    """
+    found = identify(problem)
+    if before is not None:
+        starts = np.log(np.concatenate((found.parameters[None], before.parameters)))
+        row = found.parameters, found.misfit_rad, found.misfit_rad, found.evaluations
+        (found,) = best_of_many_starts([problem], [starts], [row], silent)
+    best = np.log(found.parameters)
+    around = _drawn(problem, noise_rad, found, within, drawn - 1, rng)
+    logs = np.concatenate((best[None], around))
+    return Earlier(np.exp(logs), information_at(problem, noise_rad, logs), found.misfit_rad)
+
+
+def information_at(problem: Problem, noise_rad: float, log_parameters: Array) -> Array:
+    """Fisher information of log-parameters, that of several traces being the sum of each one's.
+
+    Parameters
+    ----------
+    problem
+        The traces.
+    noise_rad
+        Standard deviation of the noise.
+    log_parameters : (n, n_parameters)
+        At which samples.
+
+    Returns
+    -------
+    (n, n_parameters, n_parameters)
+    """
+    slopes = np.array([problem.residuals.condensed(x)[1] for x in log_parameters]) / noise_rad
+    information: Array = slopes @ slopes.swapaxes(1, 2)
+    return information
+
+
+def _drawn(
+    problem: Problem,
+    noise_rad: float,
+    found: Identification,
+    within: tuple[Array, Array],
+    count: int,
+    rng: np.random.Generator,
+) -> Array:
+    """Draw log-parameters, (at most count, n_parameters)."""
+    best = np.log(found.parameters)
+    held = _told_badly(information_at(problem, noise_rad, best[None])[0], problem)
+    tried = _TRIED if held.any() else count
+    x = np.tile(best, (tried, 1))
+    if held.any():
+        low, high = within
+        x[:, held] = rng.uniform(low[held], high[held], (tried, int(held.sum())))
+        fits = ManyFits([problem])
+        bounds = np.where(held, x, problem.low), np.where(held, x, problem.high)
+        trace = np.zeros(tried, dtype=np.intp)
+        fitted = fits.fitted(x, trace, FAIR, low=bounds[0], high=bounds[1])
+        x, misfit = fitted.x, fitted.misfit_rad
+        rise = problem.residuals.samples * (misfit**2 - misfit.min() ** 2) / noise_rad**2
+        x = x[rng.random(tried) < np.exp(-0.5 * rise)][:count]
+    free = ~held
+    if not free.any():
+        return x
+    # Of R with R^T R the precision, R^-1 z has its covariance.
+    told = information_at(problem, noise_rad, x)[:, free][:, :, free]
+    roots = np.linalg.cholesky(told + np.eye(int(free.sum()))).swapaxes(1, 2)
+    z = rng.standard_normal((len(x), int(free.sum()), 1))
+    x[:, free] += np.linalg.solve(roots, z)[..., 0]
+    drawn: Array = np.clip(x, problem.low, problem.high)
+    return drawn
+
+
+def _told_badly(information: Array, problem: Problem) -> BoolArray:
+    """Find parameters with which held, the others are told well; those told worst first."""
+    held = np.zeros(len(information), dtype=bool)
+    # Nothing lies further away than the search range is long.
+    precision = information + np.diag((problem.high - problem.low) ** -2)
+    while not held.all():
+        free = np.flatnonzero(~held)
+        variance = np.diag(np.linalg.inv(precision[np.ix_(free, free)]))
+        worst = int(np.argmax(variance))
+        if variance[worst] <= _BADLY**2:
+            break
+        held[free[worst]] = True
+    return held

@@ -1,0 +1,286 @@
+"""One experiment after another with a simulated cell: each designed from those before, or not."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from math import sqrt
+from pathlib import Path
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.design.experiment import Wanted
+from biogrip.design.schedule import planned, presses
+from biogrip.design.search import best_torques
+from biogrip.design.told import Earlier, told_by
+from biogrip.experiment.protocol import Phase
+from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sampling import Sampling
+from biogrip.groups.replicates import joint_problem
+from biogrip.identifiability.many_limits import limits_of
+from biogrip.identifiability.profile import MISSED, likelihood_of
+from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identify.answer import Identification, silent
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.problem import Problem
+from biogrip.products.files.sequences import SEQUENCES
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product, Weight
+from biogrip.progress import Progress
+from biogrip.response.simulation import simulated_rotation
+from biogrip.study.asked_design import plausible_ends, wanted_of
+from biogrip.study.study import Case, Study
+
+REPEATED, AFTER, BEFOREHAND, TRUTH = WAYS = ("repeated", "after", "beforehand", "truth")
+"""The config's experiment again and again; that once, and then each designed after all before;
+one designed for the ranges, again and again; and one designed for the cell itself."""
+
+Experiment = tuple[tuple[Phase, ...], Sampling]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a sequence of experiments depends on.
+
+    Parameters
+    ----------
+    study_seed, case
+        Whose random streams.
+    problem
+        What is identified, with inertia and known noise; its protocol is the first one.
+    sampling
+        Of the first experiment.
+    wanted
+        Designs, for the ranges.
+    low, high
+        Logarithms between which cells lie.
+    within
+        Logarithms between which lies what traces do not tell.
+    tried, drawn
+        Torques that a search tries, and plausible samples that it is for.
+    least_squares
+        By how many fits the best is found.
+    confidence
+        Of the limits.
+    experiments
+        How many there are.
+    """
+
+    study_seed: int
+    case: str
+    problem: CaseProblem
+    sampling: Sampling
+    wanted: Wanted
+    low: Array
+    high: Array
+    within: tuple[Array, Array]
+    tried: int
+    drawn: int
+    least_squares: object
+    confidence: float
+    experiments: int
+
+    @property
+    def noise_rad(self) -> float:
+        """Standard deviation of the sensor's noise."""
+        return self.wanted.noise_rad
+
+
+def sequenced(study: Study) -> list[str]:
+    """Name the simulated cases of which sequences are asked for."""
+    return [name for name in study.simulated if cells_of(study.cases[name])]
+
+
+def cells_of(case: Case) -> int:
+    """Return how many cells a case has, of which sequences are asked for."""
+    asked = case.block.design
+    return asked.sequence.cells if asked and asked.sequence else 0
+
+
+def settings(study: Study, job: Wildcards) -> Settings:
+    """Choose what a cell's experiments depend on."""
+    case = study.case(job["case"])
+    asked = case.block.design
+    assert asked is not None
+    assert asked.sequence is not None
+    low, high = plausible_ends(case)
+    names = case.problem.searched.names
+    spread = np.array([name in (asked.ranges or {}) for name in names])
+    as_in_config = np.log([case.parameters[name] for name in names])
+    return Settings(
+        study.study_seed,
+        case.name,
+        replace(case.problem, inertia=True, noise_rad=asked.noise_rad),
+        case.sampling,
+        wanted_of(case),
+        np.where(spread, low, as_in_config),
+        np.where(spread, high, as_in_config),
+        (low, high),
+        asked.tried,
+        asked.drawn,
+        case.method("least_squares"),
+        case.confidence,
+        asked.sequence.experiments,
+    )
+
+
+def sequence(settings: Settings, seed: int, rows: Path) -> None:
+    """Do experiments one after the other with a simulated cell, in every way.
+
+    Parameters
+    ----------
+    settings
+        How.
+    seed
+        Which cell.
+    rows
+        What is known after each experiment, CSV.
+    """
+    SEQUENCES.write(rows, _Cell(settings, seed).rows())
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What traces are told to be, together: their problem, its noise, and the best fit."""
+
+    problem: Problem
+    noise_rad: float
+    best: Array
+    misfit_rad: float
+
+
+class _Cell:
+    """A simulated cell."""
+
+    def __init__(self, settings: Settings, number: int) -> None:
+        self._settings, self._number = settings, number
+        self._truth = self._stream("cell").uniform(settings.low, settings.high)
+
+    def rows(self) -> Iterator[tuple[str | int, ...]]:
+        settings = self._settings
+        first = settings.problem.phases, settings.sampling
+        progress = Progress(f"{settings.case}, cell {self._number}", len(WAYS))
+        yield from self._rows_of(REPEATED, [first], self._repeated(REPEATED, first))
+        progress.done()
+        planned: list[Experiment] = [first]
+        yield from self._rows_of(AFTER, planned, self._one_after_another(planned))
+        progress.done()
+        for way, samples in (
+            (BEFOREHAND, settings.wanted.parameters),
+            (TRUTH, np.exp(self._truth)[None]),
+        ):
+            best = self._designed(way, replace(settings.wanted, parameters=samples))
+            yield from self._rows_of(way, [best], self._repeated(way, best))
+            progress.done()
+
+    def _repeated(self, way: str, experiment: Experiment) -> Iterator[_Known]:
+        """The same experiment again and again: of its traces the mean tells all they tell."""
+        settings, total = self._settings, np.zeros(())
+        for count in range(1, settings.experiments + 1):
+            problem, time_s, trace = self._trace(way, count, experiment)
+            total = total + trace
+            noise_rad = settings.noise_rad / sqrt(count)
+            mean = problem.of(time_s, total / count, noise_rad=noise_rad)
+            found = self._identify(way, count, mean)
+            yield _Known(mean, noise_rad, np.log(found.parameters), found.misfit_rad)
+
+    def _one_after_another(self, done: list[Experiment]) -> Iterator[_Known]:
+        """Each experiment, but the first, is designed after all before, and added to them."""
+        settings = self._settings
+        problems: list[Problem] = []
+        told: Earlier | None = None
+        for count in range(1, settings.experiments + 1):
+            if told is not None:
+                wanted = replace(
+                    settings.wanted, parameters=told.parameters, before=told.information
+                )
+                done.append(self._designed(f"{AFTER} {count}", wanted))
+            posed, time_s, trace = self._trace(AFTER, count, done[-1])
+            problems.append(posed.of(time_s, trace))
+            joint = joint_problem(problems, count * [settings.noise_rad])
+            told = told_by(
+                joint,
+                settings.noise_rad,
+                partial(self._identify, AFTER, count),
+                settings.within,
+                settings.drawn,
+                self._stream(f"{AFTER} {count}, drawn"),
+                told,
+            )
+            yield _Known(joint, settings.noise_rad, told.best, told.misfit_rad)
+
+    def _trace(
+        self, way: str, count: int, experiment: Experiment
+    ) -> tuple[CaseProblem, Array, Array]:
+        """Simulate a trace; the problem is that of its protocol."""
+        phases, sampling = experiment
+        posed = replace(self._settings.problem, phases=phases)
+        time_s = sampling.over(posed.torque.end_s)
+        network = posed.searched.network(np.exp(self._truth)[None])
+        clean = simulated_rotation(posed.gripper, network, posed.torque, time_s, nonlinear=False)
+        # Ways that begin with the same experiment begin with the same trace.
+        rng = self._stream(f"{way if count > 1 else 'first'} {count}, noise")
+        return posed, time_s, clean[0] + self._settings.noise_rad * rng.standard_normal(len(time_s))
+
+    def _designed(self, purpose: str, wanted: Wanted) -> Experiment:
+        rng = self._stream(f"{purpose}, design")
+        plan = planned(wanted, best_torques(wanted, self._settings.tried, rng, lambda *_: None))
+        return plan.phases, Sampling(bursts=plan.bursts)
+
+    def _identify(self, way: str, count: int, problem: Problem) -> Identification:
+        rng = self._stream(f"{way} {count}, starts")
+        return best_fit(problem, self._settings.least_squares, rng, silent)
+
+    def _rows_of(
+        self, way: str, done: list[Experiment], known: Iterator[_Known]
+    ) -> Iterator[tuple[str | int, ...]]:
+        settings = self._settings
+        quantities = parameters_and_sum(settings.problem.searched)[: len(self._truth)]
+        for count, each in enumerate(known, 1):
+            likelihood = likelihood_of(
+                each.problem,
+                each.best,
+                each.misfit_rad,
+                confidence=settings.confidence,
+                noise_rad=each.noise_rad,
+            )
+            limits = limits_of([likelihood], quantities)[0]
+            deeper = fitted_from(each.problem, self._truth)
+            missed = int(likelihood.rise(deeper.misfit_rad) < -MISSED)
+            pressed = int(all(self._pressed(experiment) for experiment in done))
+            head = settings.case, self._number, way, count
+            for quantity, ends in zip(quantities, limits, strict=True):
+                logs = (quantity.log(self._truth), quantity.log(each.best), *ends)
+                numbers = ["" if np.isnan(one) else f"{np.exp(one):.6g}" for one in logs]
+                yield (*head, quantity.label, *numbers, missed, pressed)
+
+    def _pressed(self, experiment: Experiment) -> bool:
+        """Whether the jaws press the cell throughout an experiment."""
+        wanted = replace(self._settings.wanted, parameters=np.exp(self._truth)[None])
+        return presses(wanted, experiment[0])
+
+    def _stream(self, purpose: str) -> np.random.Generator:
+        settings = self._settings
+        return stream(settings.study_seed, settings.case, self._number, f"sequence, {purpose}")
+
+
+def _jobs(plan: Plan) -> list[Wildcards]:
+    return [
+        {"case": name, "seed": str(cell)}
+        for name in sequenced(plan.study)
+        for cell in range(cells_of(plan.study.cases[name]))
+    ]
+
+
+SEQUENCE = Product(
+    "sequence",
+    {"rows": SEQUENCES.path},
+    sequence,
+    settings,
+    _jobs,
+    message="Experiments one after another with cell {seed} of {case}",
+    weight=Weight(20, 1000),
+    modules=lambda _: (METHODS["least_squares"].module,),
+)
