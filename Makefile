@@ -80,9 +80,10 @@ format: $(READY)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
+# All of it, or only what SECTIONS names, the rest of the report staying as it is.
 bench: $(BENCH_READY)
 	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
-	$(BENCH_BIN)/python -m benchmarks
+	$(BENCH_BIN)/python -m benchmarks $(SECTIONS)
 
 bench-field: $(FIELD_READY)
 	PYTHONPATH=src $(FIELD_BIN)/python -m benchmarks.field
@@ -102,12 +103,13 @@ site: $(SITE_READY)
 pinned: $(READY)
 	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
 
-# Needs uv. The other locks hold only what running on Slurm, and benchmarks, add to the first.
+# Needs uv. The other locks hold only what running on Slurm, and benchmarks, add to the first, of
+# which they may need what is there for PyPy only.
 lock:
 	$(LOCK) pyproject.toml --extra dev --output-file requirements.lock
 	for extra in slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
 	  $(LOCK) pyproject.toml --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
-	    $$(sed -n 's/^\([^ ]*\)==.*/--no-emit-package \1/p' requirements.lock) || exit 1; \
+	    $$(sed -n "/'pypy'/! s/^\([^ ]*\)==.*/--no-emit-package \1/p" requirements.lock) || exit 1; \
 	done
 	$(subst 3.11,3.12,$(LOCK)) pyproject.toml benchmarks/field/requirements.in \
 	  --output-file benchmarks/field/requirements.lock

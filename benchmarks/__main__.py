@@ -1,6 +1,7 @@
-"""Runs every benchmark and writes `benchmarks/results`."""
+"""Runs every benchmark, or those named, and writes `benchmarks/results`."""
 
 import os
+import sys
 
 # One thread for every competitor. BLAS libraries read this once, while numpy is imported.
 for variable in (
@@ -15,4 +16,4 @@ for variable in (
 if __name__ == "__main__":
     from benchmarks.report import run
 
-    run()
+    run(sys.argv[1:])

@@ -41,6 +41,28 @@ class Section:
         return markdown(cells)
 
 
+def written(section: Section) -> str:
+    """Return a section as Markdown."""
+    parts = [f"## {section.title}", section.text, section.table()]
+    if section.figure is not None:
+        parts.append(f"![{section.title}]({section.name}.png)")
+    return "\n\n".join(parts)
+
+
+def renewed(text: str, described: Mapping[str, str], sections: Sequence[Section]) -> str:
+    """Return a report with some sections in the place of those of the same title, or at its end."""
+    parts = text.rstrip("\n").split("\n\n## ")
+    for section in sections:
+        new = f"{written(section)}\n\nRun by itself:\n\n{markdown([described])}"
+        new = new.removeprefix("## ")
+        titles = [part.partition("\n")[0] for part in parts]
+        if section.title in titles:
+            parts[titles.index(section.title)] = new
+        else:
+            parts.append(new)
+    return "\n\n## ".join(parts) + "\n"
+
+
 def markdown(rows: Sequence[Mapping[str, str]]) -> str:
     """Return rows of text as a Markdown table."""
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))

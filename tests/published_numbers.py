@@ -4,12 +4,13 @@ A number stands between two comments, of which the first says where it comes fro
 
     <!--= methods[case=liquid_drop_1, method=genetic].responses | .3g -->5400<!--/-->
 
-It names a table, rows by their columns (``=``, ``!=``, and ``|`` between alternatives), a column
-and a format of Python's; ``%`` formats shares. Of several rows the lowest and the highest are
-shown, or, with ``| each``, all that differ in the order of the table. ``count`` in the place of a
-column is the number of rows.
+It names a table, or a section of the benchmarks, rows by their columns (``=``, ``!=``, and ``|``
+between alternatives), a column and a format of Python's; ``%`` formats shares. Of several rows the
+lowest and the highest are shown, or, with ``| each``, all that differ in the order of the table.
+``count`` in the place of a column is the number of rows.
 """
 
+import json
 import re
 from pathlib import Path
 
@@ -17,6 +18,7 @@ import pandas as pd
 
 ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
+BENCHMARKS = ROOT / "benchmarks" / "results" / "benchmarks.json"
 
 _NUMBER = re.compile(r"(<!--= *(?P<what>.*?) *-->)(?P<shown>.*?)(<!--/-->)", re.DOTALL)
 _WHAT = re.compile(
@@ -69,10 +71,7 @@ def _number(what: str, published: Path) -> str:
 
 
 def _rows(table: str, conditions: str, published: Path) -> pd.DataFrame:
-    files = sorted(published.rglob(f"{table}.csv"))
-    if not files:
-        raise ValueError(f"{table}: no such table")
-    rows = pd.read_csv(files[0], dtype=str, keep_default_na=False, na_values=[""])
+    rows = _table(table, published)
     for condition in filter(None, re.split(r", *(?=\w+!?=)", conditions)):
         match = _CONDITION.fullmatch(condition)
         if match is None or match["column"] not in rows:
@@ -80,6 +79,16 @@ def _rows(table: str, conditions: str, published: Path) -> pd.DataFrame:
         there = rows[match["column"]].isin(match["values"].split("|"))
         rows = rows[there if match["sign"] == "=" else ~there]
     return rows
+
+
+def _table(table: str, published: Path) -> pd.DataFrame:
+    files = sorted(published.rglob(f"{table}.csv"))
+    if files:
+        return pd.read_csv(files[0], dtype=str, keep_default_na=False, na_values=[""])
+    sections = json.loads(BENCHMARKS.read_text(encoding="utf-8"))
+    if table not in sections:
+        raise ValueError(f"{table}: no such table")
+    return pd.DataFrame(sections[table]).astype(str)
 
 
 def _formatted(value: float, how: str) -> str:

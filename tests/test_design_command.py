@@ -11,11 +11,12 @@ import pytest
 from biogrip.cli import main
 from biogrip.design.experiment import Wanted
 from biogrip.design.search import Torque, TorqueSearch
+from biogrip.design.shapes import SHAPES
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.instrument.actuator import torque
+from biogrip.instrument.actuator import torque, voltage
 from biogrip.own_design import designed
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.asked_design import plausible, wanted_of
@@ -69,6 +70,31 @@ def test_a_study_takes_it_and_has_the_bounds_that_were_promised(folder: tuple[Pa
         # In print it has two digits.
         assert float(promised[1]) == pytest.approx(bound, rel=0.06)
         assert bound < 50
+
+
+@pytest.mark.parametrize("shape", ["ramps", "sinusoids"])
+def test_a_study_takes_other_shapes_with_the_bounds_that_were_promised(
+    shape: str, tmp_path: Path
+) -> None:
+    """What the plan promises of its own torque, the study finds from its file."""
+    text = ASKED.replace("tried: 128", f"tried: 128, shapes: [{shape}], shortest_step_s: 1.0e-4")
+    (tmp_path / "asked.yaml").write_text(text)
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path) == 0
+    case = designed_case(tmp_path)
+    times = case.sampling.over(case.problem.torque.end_s)
+    for quantity, bound in bounds_percent(case.problem, case.noise, case.parameters, times)[:4]:
+        promised = re.search(rf"^  {quantity.label} .*\| (\S+) %$", said.getvalue(), re.MULTILINE)
+        assert promised
+        assert float(promised[1]) == pytest.approx(bound, rel=0.06)
+    page = (tmp_path / "out.html").read_text()
+    assert re.search(rf"[1-9]\d* {shape[:-1]}", page)
+    heads = {"ramps": ["to (nN m)"], "sinusoids": ["amplitude (nN m)", "frequency (Hz)"]}
+    for name, columns in heads.items():
+        assert all((f"<th>{column}</th>" in page) == (name == shape) for column in columns)
+    largest = max(float(volts) for volts in re.findall(r"<td>[\d.]+ to ([\d.]+)</td>", page))
+    assert largest <= float(voltage(case.actuator, 8e-9)) + 1e-3
 
 
 def test_seeds_on_it_come_as_close_as_promised(folder: tuple[Path, str]) -> None:
@@ -167,7 +193,9 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
 
 def one_torque(wanted: Wanted) -> Torque:
     """Any torque; a search takes seconds."""
-    return TorqueSearch(wanted).torque(np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8]))
+    return TorqueSearch(wanted, SHAPES["steps"]).torque(
+        np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
+    )
 
 
 @pytest.mark.parametrize(
@@ -179,6 +207,12 @@ def one_torque(wanted: Wanted) -> Torque:
         (ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""), [], "found neither, allowed is one of"),
         (ASKED.replace("tried: 128", "quantities: [k, q]"), [], "found 'q', allowed are k, k_p"),
         (ASKED.replace("tried: 128", "ranges: {c: [2.0, 1.0]}"), [], "the lower one first"),
+        (ASKED.replace("tried: 128", "shapes: [step]"), [], "Did you mean 'steps'"),
+        (
+            ASKED.replace("tried: 128", "shapes: [ramps], shortest_step_s: 20.0"),
+            [],
+            "at least four ramps, 80 s",
+        ),
         (ASKED.replace("tried: 128", "shortest_step_s: 1.0e-6"), [], "at least two samples long"),
         (
             f"{ASKED}cases: {{liquid_drop_2: {{sample: {{c_p: 0.0}}}}}}\n",

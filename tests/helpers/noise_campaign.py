@@ -68,6 +68,7 @@ KINDS = {
     "white": Kind("white", noise()),
     "fast": Kind("AR(1), all of it, 0.2 s", noise(Relaxing(1.0, 0.2))),
     "slow": Kind("AR(1), a tenth, 10 s", noise(Relaxing(0.1, 10.0))),
+    "faint": Kind("AR(1), a fiftieth, 10 s", noise(Relaxing(0.02, 10.0))),
     "flicker": Kind("1/f, three tenths", noise(flicker=Flicker(0.3))),
     "drift": Kind("drift of 0.4 standard deviations", noise(drift=Drift(0.4))),
     "outliers": Kind("one in a hundred ten times as large", noise(outliers=Outliers(0.01, 10.0))),
@@ -181,15 +182,15 @@ def counted(kind: Kind, found: Sequence[Seen]) -> pd.DataFrame:
 
 
 def main(traces: int, names: Sequence[str]) -> None:
-    """Write the table, and print it."""
-    tables = []
+    """Write the table, other kinds as they are there, and print it."""
+    tables = dict(iter(pd.read_csv(TABLE).groupby("noise")))
     with ProcessPoolExecutor() as processes:
         for name in names:
             kind = KINDS[name]
             found = list(processes.map(seen, [kind] * traces, range(traces), chunksize=5))
-            tables.append(counted(kind, found))
-            print(tables[-1].to_string(index=False), flush=True)
-            write(pd.concat(tables), TABLE)
+            tables[kind.title] = counted(kind, found)
+            print(tables[kind.title].to_string(index=False), flush=True)
+            write(pd.concat([tables[k.title] for k in KINDS.values() if k.title in tables]), TABLE)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
-from biogrip.design.steps import Limits
+from biogrip.design.waveform import Limits
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 
@@ -28,7 +28,9 @@ class Wanted:
     fastest_Hz
         How often at most in a second.
     limits
-        Of the steps.
+        Of the torque's steps, ramps and sinusoids.
+    shapes
+        Which of `biogrip.design.shapes.SHAPES` the torque may be of.
     largest_Nm
         Torque.
     stroke_rad
@@ -46,6 +48,7 @@ class Wanted:
     samples: int
     fastest_Hz: float
     limits: Limits
+    shapes: tuple[str, ...]
     largest_Nm: float
     stroke_rad: float
     criterion: Criterion

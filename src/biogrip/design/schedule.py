@@ -6,13 +6,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.design.cells import Cells, cells
+from biogrip.design.bursts import bursts_of, whole
+from biogrip.design.cells import Cells, cells, swinging_cells
 from biogrip.design.experiment import Wanted
 from biogrip.design.few_cells import in_few_cells
 from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
+from biogrip.design.set_values import set_values
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import Gripper
@@ -20,9 +22,12 @@ from biogrip.response.jaw_force import jaw_force
 from biogrip.response.ringing import ringing_responses
 
 _GROWTH, _GAP, _FILLINGS = 1.12, 0.005, 200
-_DIGITS = 4
+# Where the torque swings: parts of a period, and how the number of periods of a cell grows.
+_PARTS, _PERIODS = 24, 1.4
 # Instants after a step at which the force is looked at, and what of the largest is rounding.
 _INSTANTS, _EARLIEST_S, _NOTHING = 400, 1e-8, 1e-9
+# Of a period, and how the number of periods between those that are looked at grows.
+_OF_A_PERIOD, _FURTHER = 64, 1.3
 
 
 @dataclass(frozen=True)
@@ -59,6 +64,28 @@ class Plan:
         return Sampling(bursts=self.bursts).over(self.torque.end_s)
 
 
+@dataclass(frozen=True)
+class SamplingProblem:
+    """Cells of time of an experiment, among which readings are to be spread.
+
+    Parameters
+    ----------
+    each
+        Cells after each step.
+    starts : (n_steps,)
+        Slots at which steps begin.
+    told : (n, n_parameters, n_cells)
+        Sensitivities to the log-parameters in units of the noise.
+    capacity : (n_cells,)
+        How many readings a cell has room for.
+    """
+
+    each: tuple[Cells, ...]
+    starts: IntArray
+    told: Array
+    capacity: Array
+
+
 def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
     """Sample the first torque with which the jaws press throughout, as well as can be.
 
@@ -75,40 +102,47 @@ def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
         If with all of them the jaws would have to pull.
     """
     for torque in torques:
-        phases, slots = _set(wanted, torque)
-        if presses(wanted, torque_history(phases)):
-            return _sampled(wanted, phases, slots)
+        phases = set_values(wanted, torque)
+        if presses(wanted, phases):
+            return _sampled(wanted, phases)
     raise BiogripError(
         "design: with all torques that were found the jaws would have to pull at some instant; "
         "allowed are more torques to be tried (`tried`)."
     )
 
 
-def _set(wanted: Wanted, torque: Torque) -> tuple[tuple[Phase, ...], IntArray]:
-    """Phases as they can be set, and how many slots each has."""
-    levels = [_rounded_down(torque.largest_Nm * share) for share in torque.steps.levels]
-    slots = np.round(torque.steps.durations_s * wanted.fastest_Hz).astype(np.intp)
-    phases = tuple(
-        held(int(count) / wanted.fastest_Hz, level)
-        for count, level in zip(slots, levels, strict=True)
-    )
-    return phases, slots
-
-
-def presses(wanted: Wanted, history: TorqueHistory) -> bool:
+def presses(wanted: Wanted, phases: Sequence[Phase]) -> bool:
     """Whether the jaws press plausible samples at all instants that are looked at."""
     network = wanted.model.network(wanted.parameters)
-    _, force = forces(wanted.gripper, network, history)
+    _, force = forces(wanted.gripper, network, phases)
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
-def _sampled(wanted: Wanted, phases: tuple[Phase, ...], slots: IntArray) -> Plan:
-    history = torque_history(phases)
-    each = [cells(int(count), _GROWTH) for count in slots]
-    starts = np.concatenate(([0], np.cumsum(slots)[:-1]))
+def sampling_problem(wanted: Wanted, phases: tuple[Phase, ...]) -> SamplingProblem:
+    """Divide the time of an experiment, and see what a reading tells there."""
+    slots = [round(phase.duration_s * wanted.fastest_Hz) for phase in phases]
+    each = tuple(
+        _cells(count, phase, wanted.fastest_Hz) for count, phase in zip(slots, phases, strict=True)
+    )
+    starts = np.cumsum([0, *slots[:-1]])
     middle = np.concatenate([start + own.middle for start, own in zip(starts, each, strict=True)])
-    capacity = np.concatenate([own.slots for own in each]).astype(float)
-    told = _told(wanted, history, middle / wanted.fastest_Hz)
+    order = np.argsort(middle, kind="stable")
+    told = np.empty((*wanted.parameters.shape, len(middle)))
+    times_s = middle[order] / wanted.fastest_Hz
+    told[..., order] = _told(wanted, torque_history(phases), times_s)
+    capacity = np.concatenate([own.capacity for own in each]).astype(float)
+    return SamplingProblem(each, starts, told, capacity)
+
+
+def _cells(slots: int, phase: Phase, fastest_Hz: float) -> Cells:
+    for harmonic in phase.left.harmonics:
+        return swinging_cells(slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS)
+    return cells(slots, _GROWTH)
+
+
+def _sampled(wanted: Wanted, phases: tuple[Phase, ...]) -> Plan:
+    problem = sampling_problem(wanted, phases)
+    told, capacity = problem.told, problem.capacity
     best = best_sampling(
         told,
         capacity,
@@ -118,14 +152,16 @@ def _sampled(wanted: Wanted, phases: tuple[Phase, ...], slots: IntArray) -> Plan
         most=_FILLINGS,
         before=wanted.before,
     )
-    few = in_few_cells(told, best.samples, capacity, _late(each), wanted.before)
-    counts = _whole(few, capacity)
-    bursts = _bursts(wanted, starts, each, counts)
+    few = in_few_cells(told, best.samples, capacity, _late(problem.each), wanted.before)
+    counts = whole(few, capacity)
+    bursts = bursts_of(problem.each, problem.starts, counts, wanted.fastest_Hz)
+    history = torque_history(phases)
     seen = _told(wanted, history, Sampling(bursts=bursts).over(history.end_s))
-    return Plan(phases, bursts, seen @ seen.swapaxes(1, 2) + wanted.before, best.gap)
+    information = seen @ seen.swapaxes(1, 2) + wanted.before
+    return Plan(phases, bursts, information, best.gap)
 
 
-def forces(gripper: Gripper, network: Network, history: TorqueHistory) -> tuple[Array, Array]:
+def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:
     """Jaw force of samples, with inertia, at instants dense after each step.
 
     Returns
@@ -135,15 +171,31 @@ def forces(gripper: Gripper, network: Network, history: TorqueHistory) -> tuple[
     force : (n, n_times)
         In N.
     """
+    history = torque_history(tuple(phases))
     lengths = np.diff(np.append(history.time_s, history.end_s))
     after = np.geomspace(_EARLIEST_S, lengths, _INSTANTS, axis=1)
     # At the very end of a step the next begins.
     after[:, -1] *= 1 - 1e-9
-    time_s = np.unique(history.time_s[:, None] + after)
+    instants = [(history.time_s[:, None] + after).ravel()]
+    for start_s, phase in zip(history.time_s, phases, strict=True):
+        for harmonic in phase.left.harmonics:
+            period_s = 2 * np.pi / harmonic.omega_rad_per_s
+            instants.append(start_s + _swings(period_s, phase.duration_s))
+    time_s = np.unique(np.concatenate(instants))
     return time_s, jaw_force(gripper, network, history, time_s, nonlinear=False)
 
 
-def _late(each: list[Cells]) -> Array:
+def _swings(period_s: float, duration_s: float) -> Array:
+    """Instants dense in some periods, ever fewer of them, and in the last."""
+    count = duration_s / period_s
+    begins = np.unique(np.floor(_FURTHER ** np.arange(np.log(count + 1) / np.log(_FURTHER))) - 1)
+    begins = np.append(begins, count - 1)
+    instants = begins[:, None] + np.arange(_OF_A_PERIOD) / _OF_A_PERIOD
+    inside: Array = instants[(instants > 0) & (instants < count * (1 - 1e-9))]
+    return period_s * inside
+
+
+def _late(each: Sequence[Cells]) -> Array:
     """How late after their steps cells are, from 0 to 1."""
     return np.concatenate([np.arange(len(own.first)) / len(own.first) for own in each])
 
@@ -151,45 +203,3 @@ def _late(each: list[Cells]) -> Array:
 def _told(wanted: Wanted, history: TorqueHistory, time_s: Array) -> Array:
     rows = ringing_responses(wanted.gripper, wanted.model, history, time_s, wanted.parameters)
     return rows[:, 1:] / wanted.noise_rad
-
-
-def _rounded_down(value: float) -> float:
-    """So many digits of a torque, which must not become larger."""
-    if value <= 0:
-        return 0.0
-    exponent = int(np.floor(np.log10(value))) - _DIGITS + 1
-    return float(f"{np.floor(value / 10.0**exponent * (1 + 1e-12)):.0f}e{exponent}")
-
-
-def _whole(samples: Array, capacity: Array) -> IntArray:
-    """Round numbers of samples, so that their sum stays."""
-    counts = np.floor(samples + 1e-9)
-    missing = round(float(samples.sum() - counts.sum()))
-    room = counts < capacity
-    order = np.argsort(-np.where(room, samples - counts, -1.0), kind="stable")
-    counts[order[:missing]] += 1
-    whole: IntArray = counts.astype(np.intp)
-    return whole
-
-
-def _bursts(
-    wanted: Wanted, starts: IntArray, each: list[Cells], counts: IntArray
-) -> tuple[Burst, ...]:
-    """Bursts of cells; those that are full and follow one another are one."""
-    runs: list[list[int]] = []
-    place = 0
-    for start, own in zip(starts.tolist(), each, strict=True):
-        here = counts[place : place + len(own.first)]
-        place += len(own.first)
-        for first, slots, count in zip(own.first, own.slots, here, strict=True):
-            if count == 0:
-                continue
-            stride = int(slots) // int(count)
-            begins = start + int(first) + (int(slots) - 1 - stride * (int(count) - 1)) // 2
-            last = runs[-1] if runs else None
-            if last and last[1] == stride and begins == last[0] + stride * last[2]:
-                last[2] += int(count)
-            else:
-                runs.append([begins, stride, int(count)])
-    rate = wanted.fastest_Hz
-    return tuple(Burst(begins / rate, rate / stride, count) for begins, stride, count in runs)

@@ -1,4 +1,4 @@
-"""The best torque: a global search over trains of steps, each with its best sampling.
+"""The best torque: a global search over families of torques, each with its best sampling.
 
 References
 ----------
@@ -11,12 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array
 from biogrip.design.cells import cells
 from biogrip.design.experiment import Wanted
+from biogrip.design.looked import Looked, looked
 from biogrip.design.sampling import best_sampling
-from biogrip.design.steps import SHARES, Steps, train
-from biogrip.design.views import View, Views
+from biogrip.design.shapes import SHAPES, Shape
+from biogrip.design.views import Views
+from biogrip.design.waveform import Waveform
 from biogrip.errors import BiogripError
 
 # Cells of the search are this much longer than those before, and its samplings this far from the
@@ -24,8 +26,6 @@ from biogrip.errors import BiogripError
 _GROWTH, _GAP, _FILLINGS = 1.35, 0.03, 8
 # Torques that are tried in a round; of Sobol's sequence, a power of two.
 _CROWD = 128
-# While the search looks at few instants, the force must not come nearer to zero than this.
-_MARGIN = 2e-3
 _LOST = 1e3
 # Of a logarithm, so that the last bits of a processor decide nothing.
 _DECIMALS = 8
@@ -33,69 +33,55 @@ _DECIMALS = 8
 
 @dataclass(frozen=True)
 class Torque:
-    """Steps of torque.
+    """A torque against time.
 
     Parameters
     ----------
-    steps
-        Durations, and levels as shares of the largest.
+    waveform
+        In shares of the largest.
     largest_Nm
         The largest.
     """
 
-    steps: Steps
+    waveform: Waveform
     largest_Nm: float
 
 
 class TorqueSearch:
-    """Torques, and how good they are with their best sampling.
+    """Torques of a family, and how good they are with their best sampling.
 
     Parameters
     ----------
     wanted
         What is to be designed.
+    shape
+        The family.
     """
 
-    def __init__(self, wanted: Wanted) -> None:
-        self._wanted = wanted
+    def __init__(self, wanted: Wanted, shape: Shape) -> None:
+        self._wanted, self._shape = wanted, shape
         self._cells = cells(round(wanted.limits.longest_s * wanted.fastest_Hz), _GROWTH)
-        self._elapsed_s = self._cells.middle / wanted.fastest_Hz
-        self._views = Views(wanted.gripper, wanted.model, wanted.parameters, self._elapsed_s)
+        elapsed_s = self._cells.middle / wanted.fastest_Hz
+        self._views = Views(wanted.gripper, wanted.model, wanted.parameters, elapsed_s)
 
     def torque(self, shares: Array) -> Torque:
         """Return the torque of so many shares, as large as torque and stroke allow."""
-        steps = train(shares, self._wanted.limits)
-        return self._scaled(steps, self._views.under(steps))
-
-    def _scaled(self, steps: Steps, view: View) -> Torque:
-        seen = self._elapsed_s < steps.durations_s[:, None]
-        turned = float(np.max(np.abs(view.rotation), where=seen, initial=0.0))
-        turned = max(turned, float(np.max(np.abs(view.last_rotation))))
-        stroke, highest = self._wanted.stroke_rad, float(steps.levels.max())
-        allowed = min(self._wanted.largest_Nm / highest if highest else 0.0, stroke / turned)
-        return Torque(Steps(steps.durations_s, steps.levels / highest), allowed * highest)
+        waveform = self._shape.waveform(shares, self._wanted.limits)
+        return self._scaled(waveform, self._looked(waveform))
 
     def logarithm(self, shares: Array) -> float:
         """Logarithm of the typical relative bound; where contact is lost, more than any of them."""
         wanted = self._wanted
-        steps = train(shares, wanted.limits)
-        if not steps.levels.any():
+        waveform = self._shape.waveform(shares, wanted.limits)
+        if not waveform.highest:
             return 2 * _LOST
-        view = self._views.under(steps)
-        slots = np.round(steps.durations_s * wanted.fastest_Hz)[:, None]
-        seen = self._cells.middle < slots
-        pull = _pull(view, seen)
-        if pull > 0:
-            return _LOST * (1 + pull)
-        torque = self._scaled(steps, view)
-        scale = torque.largest_Nm / float(steps.levels.max()) / wanted.noise_rad
-        capacity = np.clip(slots - self._cells.first, 0, self._cells.slots) * seen
-        told = scale * view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
-        room = capacity.ravel()
-        there = room > 0
+        seen = self._looked(waveform)
+        if seen.pull > 0:
+            return _LOST * (1 + seen.pull)
+        scale = self._scaled(waveform, seen).largest_Nm / waveform.highest / wanted.noise_rad
         best = best_sampling(
-            told[..., there],
-            room[there],
+            scale * seen.sensitivity,
+            seen.capacity,
             wanted.samples,
             wanted.criterion,
             gap=_GAP,
@@ -105,18 +91,22 @@ class TorqueSearch:
         bound = wanted.criterion.typical_bound(best.covariances)
         return round(float(np.log(bound)), _DECIMALS) if bound > 0 else _LOST
 
+    def _looked(self, waveform: Waveform) -> Looked:
+        return looked(self._views, self._cells, waveform, self._wanted.fastest_Hz)
 
-def _pull(view: View, seen: BoolArray) -> float:
-    """How far the force of a sample comes below its margin, as a share of its largest."""
-    largest = np.max(view.force, axis=(1, 2), where=seen, initial=0.0)
-    lowest = np.min(view.force, axis=2, where=seen, initial=np.inf)
-    lowest = np.minimum(lowest, view.last_force)
-    margin = np.where(np.arange(lowest.shape[1]) > 0, _MARGIN, 0.0) * largest[:, None]
-    return float(np.max((margin - lowest) / largest[:, None]))
+    def _scaled(self, waveform: Waveform, seen: Looked) -> Torque:
+        stroke, highest = self._wanted.stroke_rad, waveform.highest
+        allowed = min(
+            self._wanted.largest_Nm / highest if highest else 0.0, stroke / seen.turned_rad
+        )
+        return Torque(waveform.in_shares, allowed * highest)
 
 
 def best_torques(
-    wanted: Wanted, tried: int, rng: np.random.Generator, progress: Callable[[int, float], None]
+    wanted: Wanted,
+    tried: int,
+    rng: np.random.Generator,
+    progress: Callable[[int, float], None],
 ) -> list[Torque]:
     """Search for torques with which plausible samples show best; the best comes first.
 
@@ -125,7 +115,7 @@ def best_torques(
     wanted
         What is to be designed.
     tried
-        How many torques are tried, about.
+        How many torques are tried, about, as many of each shape.
     rng
         The only source of randomness.
     progress
@@ -138,32 +128,41 @@ def best_torques(
     """
     from scipy.optimize import differential_evolution
 
-    search = TorqueSearch(wanted)
+    rounds = max(1, round(tried / len(wanted.shapes) / _CROWD))
     count, lowest = 0, np.inf
+    found: list[tuple[float, TorqueSearch, Array]] = []
+    for name, shape in SHAPES.items():
+        if name not in wanted.shapes:
+            continue
+        search = TorqueSearch(wanted, shape)
 
-    def objective(shares: Array) -> float:
-        nonlocal count, lowest
-        value = search.logarithm(shares)
-        count, lowest = count + 1, min(lowest, value)
-        if lowest < _LOST:
-            progress(count, float(np.exp(lowest)))
-        return value
+        def objective(shares: Array, search: TorqueSearch = search) -> float:
+            nonlocal count, lowest
+            value = search.logarithm(shares)
+            count, lowest = count + 1, min(lowest, value)
+            if lowest < _LOST:
+                progress(count, float(np.exp(lowest)))
+            return value
 
-    found = differential_evolution(
-        objective,
-        [(0.0, 1.0)] * SHARES,
-        maxiter=max(0, round(tried / _CROWD) - 1),
-        popsize=_CROWD / SHARES,
-        init="sobol",
-        tol=1e-3,
-        polish=False,
-        rng=rng,
-    )
-    order = np.argsort(found.population_energies, kind="stable")
-    kept = [row for row in order if found.population_energies[row] < _LOST]
-    if not kept:
+        last = differential_evolution(
+            objective,
+            [(0.0, 1.0)] * shape.shares,
+            maxiter=rounds - 1,
+            popsize=_CROWD / shape.shares,
+            init="sobol",
+            tol=1e-3,
+            polish=False,
+            rng=rng,
+        )
+        found += [
+            (float(value), search, shares)
+            for value, shares in zip(last.population_energies, last.population, strict=True)
+            if value < _LOST
+        ]
+    if not found:
         raise BiogripError(
             f"design: with none of {count} torques do the jaws press throughout; allowed are more "
             "(`tried`), or samples that are less different."
         )
-    return [search.torque(found.population[row]) for row in kept]
+    found.sort(key=lambda each: each[0])
+    return [search.torque(shares) for _, search, shares in found]

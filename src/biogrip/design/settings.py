@@ -6,6 +6,7 @@ from typing import Annotated
 
 from biogrip.design.criteria import CRITERIA, OVER
 from biogrip.design.sequence_settings import SequenceSettings
+from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
 _Value = Annotated[float, Key(above=0, high=1e12)]
@@ -36,11 +37,30 @@ class DesignSettings:
     ] = None
     shortest_step_s: Annotated[
         float,
-        Key("All steps last whole multiples of this. By default 0.01 s.", "s", low=1e-6, high=1e6),
+        Key(
+            "All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s.",
+            "s",
+            low=1e-6,
+            high=1e6,
+        ),
     ] = 0.01
     most_steps: Annotated[
-        int, Key("How many steps there are at most. By default 40.", low=2, high=1000)
+        int,
+        Key(
+            "How many steps, ramps and sinusoids there are at most. By default 40.",
+            low=2,
+            high=1000,
+        ),
     ] = 40
+    shapes: Annotated[
+        tuple[Annotated[str, Key(choices=tuple(SHAPES))], ...],
+        Key(
+            "What the generator can make: trains of `steps`, trains of `ramps` that never jump, "
+            "`sinusoids` on held torques; the best of them is taken. By default steps.",
+            fewest=1,
+            unique=True,
+        ),
+    ] = ("steps",)
     criterion: Annotated[
         str,
         Key(
@@ -79,7 +99,12 @@ class DesignSettings:
         Key("Plausible samples, spread evenly over these ranges. By default 8.", low=2, high=256),
     ] = 8
     tried: Annotated[
-        int, Key("Torques that the search tries, about. By default 2000.", low=128, high=1_000_000)
+        int,
+        Key(
+            "Torques that the search tries, about, as many of each shape. By default 2000.",
+            low=128,
+            high=1_000_000,
+        ),
     ] = 2000
     sequence: Annotated[SequenceSettings | None, Key()] = None
 
@@ -95,9 +120,10 @@ class DesignSettings:
         if self.shortest_step_s * self.fastest_Hz < 2:
             text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
             yield ("shortest_step_s",), f"{text}{2 / self.fastest_Hz:g} s."
-        if 2 * self.shortest_step_s > self.longest_s:
-            text = f"found {self.longest_s}, allowed is at least two steps, "
-            yield ("longest_s",), f"{text}{2 * self.shortest_step_s:g} s."
+        fewest, words = (4, "four ramps") if "ramps" in self.shapes else (2, "two steps")
+        if fewest * self.shortest_step_s > self.longest_s:
+            text = f"found {self.longest_s}, allowed is at least {words}, "
+            yield ("longest_s",), f"{text}{fewest * self.shortest_step_s:g} s."
         for name, (low, high) in (self.ranges or {}).items():
             if not low <= high:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."

@@ -3,15 +3,23 @@
 Their modes do not depend on the torque (`biogrip.response.ringing`). From step to step a mode is
 carried on as in `biogrip.response.mode_growth`, and within a step everything is a product of what
 it has done before and of functions of the time since, which are known before any torque is.
-The left arm's equation gives the force: b F = tau - I phi'' - c phi' - k phi.
+With r a rate, v, s and a the torque, its slope and its amplitude at a step, w the angular
+frequency, e the time since, G what the mode has done before, and q = r / (r^2 + w^2), it has done
+
+    g = G + (G + v) (e^(r e) - 1) + s [(e^(r e) - 1) / r - e]
+          + a q [w e^(r e) - r sin(w e) - w cos(w e)]
+
+The left arm's equation gives the force: b F = tau - I phi'' - c phi' - k phi, where a mode's
+phi' is r times its weight, g and the torque together; the torque's own slope drops out, for arms
+with inertia do not start to turn at once.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array, ComplexArray
-from biogrip.design.steps import Steps
+from biogrip.arrays import Array, ComplexArray, IntArray
+from biogrip.design.waveform import Waveform
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.modes import Modes
@@ -20,7 +28,7 @@ from biogrip.response.ringing import ringing_modes
 
 @dataclass(frozen=True)
 class View:
-    """What is seen under a torque whose largest is 1 N m.
+    """What is seen after some steps of a torque whose largest is 1 N m.
 
     Parameters
     ----------
@@ -30,19 +38,36 @@ class View:
         In rad.
     force : (n, n_steps, n_times)
         Jaw force in N.
-    last_rotation, last_force : (n, n_steps)
-        At the end of each step.
     """
 
     sensitivity: Array
     rotation: Array
     force: Array
-    last_rotation: Array
-    last_force: Array
+
+
+@dataclass(frozen=True)
+class _Factors:
+    """By what functions of the time since a step are to be multiplied.
+
+    Parameters
+    ----------
+    growing, decaying, lasting : (n_steps, n, n_modes)
+        e^(r e) - 1, e^(r e) and e e^(r e).
+    resting, linear, sine, cosine : (n_steps, n, n_modes)
+        1, e, sin(w e) and cos(w e).
+    """
+
+    growing: ComplexArray
+    decaying: ComplexArray
+    lasting: ComplexArray
+    resting: ComplexArray
+    linear: ComplexArray
+    sine: ComplexArray
+    cosine: ComplexArray
 
 
 class Views:
-    """Views of plausible samples at given times after each step.
+    """Plausible samples, of which something is to be seen.
 
     Parameters
     ----------
@@ -51,68 +76,163 @@ class Views:
     parameters : (n, n_parameters)
         Of the plausible samples.
     elapsed_s : (n_times,)
-        Times after a step.
+        Times after a step at which it is looked at, if nothing else is said.
     """
 
     def __init__(
         self, gripper: Gripper, model: SampleModel, parameters: Array, elapsed_s: Array
     ) -> None:
-        arm, self._lever_m = gripper.left, gripper.lever_m
-        self._stiffness = arm.stiffness_Nm_per_rad
-        rates, weights, rate_slopes, weight_slopes = _side_by_side(gripper, model, parameters)
-        self._rates, self._weights = rates, weights
+        arm, self.lever_m = gripper.left, gripper.lever_m
+        self.stiffness = arm.stiffness_Nm_per_rad
+        self.rates, self.weights, rate_slopes, weight_slopes = _side_by_side(
+            gripper, model, parameters
+        )
         # By which what a mode does, and how that changes with its rate, is seen: (n, p, m).
-        self._by_growth, self._by_slope = weight_slopes, weights[:, None] * rate_slopes
-        self._inert = weights * (arm.inertia_kgm2 * rates**2 + arm.damping_Nms_per_rad * rates)
-        z = rates[..., None] * elapsed_s
+        self.by_growth, self.by_slope = weight_slopes, self.weights[:, None] * rate_slopes
+        self.inert = self.weights * (
+            arm.inertia_kgm2 * self.rates**2 + arm.damping_Nms_per_rad * self.rates
+        )
+        self.elapsed_s = elapsed_s
+        self.functions = self.functions_at(elapsed_s)
+
+    def functions_at(self, elapsed_s: Array) -> Array:
+        """e^(r e) - 1, e^(r e), e e^(r e): real parts, then imaginary ones, (n, 6 m, n_times)."""
+        z = self.rates[..., None] * elapsed_s
         decay = np.exp(z)
         functions = np.concatenate((np.expm1(z), decay, elapsed_s * decay), axis=1)
-        self._functions = np.concatenate((functions.real, -functions.imag), axis=1)
+        return np.concatenate((functions.real, -functions.imag), axis=1)
 
-    def under(self, steps: Steps) -> View:
-        """See the samples under steps."""
-        growing = np.expm1(self._rates * steps.durations_s[:, None, None])
-        reached, slanted = _carried(steps, growing)
-        amplitude = reached + steps.levels[:, None, None]
-        last = amplitude * growing
-        last_rotation = np.sum(self._weights * (reached + last), axis=2).real
-        inert = np.sum(self._inert * (amplitude + last), axis=2).real
-        pushing = steps.levels[:, None] - inert - self._stiffness * last_rotation
-        last_force = pushing.T / self._lever_m
-        # (n, rows, n_steps, 3 m): of e^(r e) - 1, e^(r e) and e e^(r e).
-        n, p, m = self._by_growth.shape
-        count = len(steps.levels)
-        mixing = np.zeros((n, p + 2, count, 3 * m), dtype=complex)
-        rest = np.empty((n, p + 2, count))
-        amplitude, reached, slanted = (
-            part.swapaxes(0, 1)[:, None] for part in (amplitude, reached, slanted)
+    def under(self, waveform: Waveform) -> "Moving":
+        """Move the samples."""
+        return Moving(self, waveform)
+
+
+class Moving:
+    """Samples under a torque.
+
+    Parameters
+    ----------
+    views
+        Of the samples.
+    waveform
+        The torque in N m.
+    """
+
+    def __init__(self, views: Views, waveform: Waveform) -> None:
+        self._views, self._waveform = views, waveform
+        r = views.rates
+        v, s, a = (
+            part[:, None, None] for part in (waveform.levels, waveform.slopes, waveform.amplitudes)
         )
-        by_growth, by_slope = self._by_growth[:, :, None], self._by_slope[:, :, None]
-        mixing[:, :p, :, :m] = by_growth * amplitude
-        mixing[:, :p, :, m : 2 * m] = by_slope * slanted
-        mixing[:, :p, :, 2 * m :] = by_slope * amplitude
-        rest[:, :p] = np.sum(by_growth * reached, axis=-1).real
-        turned = self._weights[:, None] * amplitude[:, 0]
-        mixing[:, p, :, :m] = turned
-        rest[:, p] = np.sum(self._weights[:, None] * reached[:, 0], axis=-1).real
-        mixing[:, p + 1, :, :m] = -self._stiffness / self._lever_m * turned
-        mixing[:, p + 1, :, m : 2 * m] = -self._inert[:, None] / self._lever_m * amplitude[:, 0]
-        rest[:, p + 1] = (steps.levels - self._stiffness * rest[:, p]) / self._lever_m
+        self._omega = 2 * np.pi / waveform.periods_s
+        w, d = self._omega[:, None, None], waveform.durations_s[:, None, None]
+        squares = r**2 + w**2
+        q, q_slope = r / squares, (w**2 - r**2) / squares**2
+        growing = np.expm1(r * d)
+        sine, cosine = np.sin(w * d), np.cos(w * d)
+        # What a step adds by itself, whatever came before.
+        swung = a * (q * w * (1 + growing) - q * r * sine - q * w * cosine)
+        added = s * (growing / r - d) + swung
+        added_slope = s * (d * (1 + growing) / r - growing / r**2) + a * (
+            (q_slope + q * d) * w * (1 + growing) - (q_slope * r + q) * sine - q_slope * w * cosine
+        )
+        before, slope_before = _carried(waveform, growing, added, added_slope)
+        amplitude = before + v
+        zero = np.zeros_like(amplitude)
+        self._growth = _Factors(
+            amplitude + s / r, a * q * w + zero, zero, before, zero - s, -a * q * r, -a * q * w
+        )
+        self._slope = _Factors(
+            -s / r**2,
+            slope_before + a * q_slope * w,
+            amplitude + s / r + a * q * w,
+            zero,
+            zero,
+            -a * (q_slope * r + q),
+            -a * q_slope * w,
+        )
+        self._pushed = _Factors(
+            s / r, amplitude + a * q * w, zero, zero, zero, a * (1 - q * r), -a * q * w
+        )
+        last = before + amplitude * growing + added
+        pushed = (
+            amplitude * (1 + growing)
+            + s * growing / r
+            + a * (q * w * (1 + growing) + (1 - q * r) * sine - q * w * cosine)
+        )
+        rotation = np.sum(views.weights * last, axis=2).real
+        torque = (v + s * d + a * sine)[..., 0]
+        force = torque - np.sum(views.inert * pushed, axis=2).real - views.stiffness * rotation
+        self.last_rotation: Array = rotation.T
+        """At the end of each step, (n, n_steps)."""
+        self.last_force: Array = force.T / views.lever_m
+        """Jaw force there."""
+
+    def seen(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
+        """See them after some steps.
+
+        Parameters
+        ----------
+        steps : (n_seen,)
+            Which steps.
+        elapsed_s : (n_times,)
+            Times since each; by default those of all views.
+        """
+        views = self._views
+        functions = views.functions
+        if elapsed_s is None:
+            elapsed_s = views.elapsed_s
+        else:
+            functions = views.functions_at(elapsed_s)
+        growth, slope, pushed = (
+            _Factors(*(part[steps].swapaxes(0, 1)[:, None] for part in vars(factors).values()))
+            for factors in (self._growth, self._slope, self._pushed)
+        )
+        n, p, m = views.by_growth.shape
+        by_growth, by_slope = views.by_growth[:, :, None], views.by_slope[:, :, None]
+        weights, inert = views.weights[:, None, None], views.inert[:, None, None] / views.lever_m
+        pulling = views.stiffness / views.lever_m * weights
+
+        def rows(name: str) -> ComplexArray:
+            g, by_rate, moved = (getattr(factors, name) for factors in (growth, slope, pushed))
+            told = by_growth * g + by_slope * by_rate
+            return np.concatenate((told, weights * g, -pulling * g - inert * moved), axis=1)
+
+        # (n, rows, n_seen, 3 m): of e^(r e) - 1, e^(r e) and e e^(r e).
+        mixing = np.concatenate([rows(name) for name in ("growing", "decaying", "lasting")], axis=3)
         parts = np.concatenate((mixing.real, mixing.imag), axis=-1)
-        rows = parts.reshape(n, -1, 6 * m) @ self._functions
-        seen = rows.reshape(n, p + 2, count, -1) + rest[..., None]
-        return View(seen[:, :p], seen[:, p], seen[:, p + 1], last_rotation.T, last_force)
+        count = len(steps)
+        found = (parts.reshape(n, -1, 6 * m) @ functions).reshape(n, p + 2, count, -1)
+
+        def add(name: str, function: Array) -> None:
+            found[...] += rows(name).sum(axis=-1).real[..., None] * function
+
+        waveform = self._waveform
+        levels, slopes = waveform.levels[steps, None], waveform.slopes[steps, None]
+        add("resting", np.ones(1))
+        found[:, p + 1] += levels / views.lever_m
+        if slopes.any():
+            add("linear", elapsed_s)
+            found[:, p + 1] += slopes * elapsed_s / views.lever_m
+        if waveform.amplitudes[steps].any():
+            angle = self._omega[steps, None] * elapsed_s
+            add("sine", np.sin(angle))
+            add("cosine", np.cos(angle))
+            found[:, p + 1] += waveform.amplitudes[steps, None] * np.sin(angle) / views.lever_m
+        return View(found[:, :p], found[:, p], found[:, p + 1])
 
 
-def _carried(steps: Steps, growing: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+def _carried(
+    waveform: Waveform, growing: ComplexArray, added: ComplexArray, added_slope: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
     """What modes have done when a step comes, and its derivative, (n_steps, n, n_modes)."""
     reached = np.zeros(growing.shape, dtype=complex)
     slanted = np.zeros_like(reached)
-    before = zip(steps.durations_s[:-1].tolist(), steps.levels[:-1].tolist(), strict=True)
+    before = zip(waveform.durations_s[:-1].tolist(), waveform.levels[:-1].tolist(), strict=True)
     for k, (duration_s, level) in enumerate(before):
         amplitude = reached[k] + level
-        reached[k + 1] = reached[k] + amplitude * growing[k]
-        slanted[k + 1] = (slanted[k] + amplitude * duration_s) * (1 + growing[k])
+        reached[k + 1] = reached[k] + amplitude * growing[k] + added[k]
+        slanted[k + 1] = (slanted[k] + amplitude * duration_s) * (1 + growing[k]) + added_slope[k]
     return reached, slanted
 
 

@@ -25,6 +25,11 @@ class Harmonic:
     omega_rad_per_s: float
     phase_rad: float
 
+    @property
+    def frequency_Hz(self) -> float:
+        """Periods in a second."""
+        return self.omega_rad_per_s / (2 * math.pi)
+
 
 @dataclass(frozen=True)
 class Load:
@@ -42,6 +47,14 @@ class Load:
     slope_Nm_per_s: float = 0.0
     curvature_Nm_per_s2: float = 0.0
     harmonics: tuple[Harmonic, ...] = ()
+
+    def at(self, elapsed: ArrayLike) -> Array:
+        """Torque in N m so many s after the start of the phase."""
+        t = np.asarray(elapsed, dtype=float)
+        torque = self.value_Nm + self.slope_Nm_per_s * t + self.curvature_Nm_per_s2 * t**2 / 2
+        for h in self.harmonics:
+            torque = torque + h.amplitude_Nm * np.cos(h.omega_rad_per_s * t + h.phase_rad)
+        return torque
 
 
 @dataclass(frozen=True)
@@ -75,7 +88,7 @@ class TorqueHistory:
         and tau_4 jump then.
     harmonic_time_s, omega_rad_per_s : (n_harmonics,)
         When a sinusoid Re(a e^(i omega (t - start))) sets in; switching off is
-        setting in with the opposite sign.
+        setting in with the opposite sign, and follows each.
     harmonic_left, harmonic_right : (n_harmonics,)
         Complex amplitudes a in N m.
     end_s
@@ -116,6 +129,23 @@ class TorqueHistory:
         return [(float(start), float(omega), a) for start, omega, a in rows]
 
     @cached_property
+    def within_phases(self) -> tuple[Array, list[list[tuple[float, ComplexArray]]]]:
+        """Torque of each drive within phases: (n_phases, n_drives, 3) and sinusoids of each phase.
+
+        Value, slope and curvature at the start; angular frequency and amplitudes.
+        """
+        jumps = np.moveaxis(drives(self.left, self.right, self.symmetric), 1, 0)
+        powers = jumps.copy()
+        for k, gap in enumerate(np.diff(self.time_s)):
+            value, slope, curvature = powers[k].T
+            carried = (value + slope * gap + curvature * gap**2 / 2, slope + curvature * gap)
+            powers[k + 1] += np.stack((*carried, curvature), axis=1)
+        harmonics: list[list[tuple[float, ComplexArray]]] = [[] for _ in self.time_s]
+        for start, omega, amplitudes in self.swings[::2]:
+            harmonics[self.time_s.searchsorted(start)].append((omega, amplitudes))
+        return powers, harmonics
+
+    @cached_property
     def only_steps(self) -> bool:
         """Whether the torque is piecewise constant."""
         ramps = np.any(self.left[:, 1:]) or np.any(self.right[:, 1:])
@@ -126,6 +156,31 @@ def held(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None
     """Return a phase that holds a torque, the same on both arms unless a right one is given."""
     right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
     return Phase(duration_s, Load(torque_left_Nm), Load(right))
+
+
+def load(
+    duration_s: float,
+    torque_Nm: float,
+    to_torque_Nm: float | None = None,
+    amplitude_Nm: float | None = None,
+    frequency_Hz: float | None = None,
+) -> Load:
+    """Return a torque that is held, changes linearly, or has a sinusoid on top.
+
+    Parameters
+    ----------
+    duration_s, torque_Nm
+        Of the phase; at its start.
+    to_torque_Nm
+        At its end, where it changes.
+    amplitude_Nm, frequency_Hz
+        Of a sinusoid that starts at its mean, rising.
+    """
+    slope = ((torque_Nm if to_torque_Nm is None else to_torque_Nm) - torque_Nm) / duration_s
+    harmonics: tuple[Harmonic, ...] = ()
+    if amplitude_Nm is not None and frequency_Hz is not None:
+        harmonics = (Harmonic(amplitude_Nm, 2 * math.pi * frequency_Hz, -math.pi / 2),)
+    return Load(torque_Nm, slope, 0.0, harmonics)
 
 
 def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:

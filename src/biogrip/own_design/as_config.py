@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator
 
 from biogrip import __version__
+from biogrip.experiment.protocol import Phase
 from biogrip.own_design.designed import Designed
 from biogrip.own_traces.outputs import WRITTEN_BY
 
@@ -24,14 +25,25 @@ def _case(found: Designed) -> Iterator[str]:
     yield "    protocol:"
     yield "      phases:"
     for phase in found.plan.phases:
-        duration, torque = _number(phase.duration_s), _number(phase.left.value_Nm)
-        yield f"        - {{ duration_s: {duration}, torque_Nm: {torque} }}"
+        keys = ", ".join(f"{key}: {_number(value)}" for key, value in _keys(phase))
+        yield f"        - {{ {keys} }}"
     yield "    measurement:"
     yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.wanted.noise_rad)} }}"
     yield "      bursts:"
     for burst in found.plan.bursts:
         start, rate = _number(burst.from_s), _number(burst.rate_Hz)
         yield f"        - {{ from_s: {start}, rate_Hz: {rate}, samples: {burst.samples} }}"
+
+
+def _keys(phase: Phase) -> Iterator[tuple[str, float]]:
+    """Keys of a phase, and what they are; of what is computed, as many digits as were set."""
+    yield "duration_s", phase.duration_s
+    yield "torque_Nm", phase.left.value_Nm
+    if phase.left.slope_Nm_per_s:
+        yield "to_torque_Nm", float(f"{phase.left.at(phase.duration_s):.12g}")
+    for harmonic in phase.left.harmonics:
+        yield "amplitude_Nm", harmonic.amplitude_Nm
+        yield "frequency_Hz", float(f"{harmonic.frequency_Hz:.12g}")
 
 
 def _number(value: float) -> str:

@@ -1,6 +1,7 @@
 """A case's experiment, designed, beside the one that its config has."""
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +11,14 @@ from biogrip.design.experiment import Wanted, relative_bounds
 from biogrip.design.schedule import Plan, forces, planned
 from biogrip.design.search import best_torques
 from biogrip.design.told import Earlier
-from biogrip.experiment.protocol import torque_history
+from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.response.ringing import ringing_responses
 from biogrip.study.asked_design import wanted_of
 from biogrip.study.study import Case
+
+NO_BOUND = 10.0
+"""Of which nobody would say that something is known: a factor of e to the tenth."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,7 @@ def designed(
     again = told @ told.swapaxes(1, 2) / wanted.noise_rad**2
     before = relative_bounds(again + wanted.before)
     network = wanted.model.network(wanted.parameters)
-    time_s, force_N = forces(wanted.gripper, network, plan.torque)
+    time_s, force_N = forces(wanted.gripper, network, plan.phases)
     return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
 
 
@@ -108,17 +112,32 @@ def in_words(found: Designed) -> str:
 
 def _setting(found: Designed) -> str:
     plan = found.plan
-    torques = [phase.left.value_Nm for phase in plan.phases]
     return (
-        f"{len(torques)} steps of up to {1e9 * max(torques):.4g} nN m over "
-        f"{plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
+        f"{in_numbers(plan.phases)} of up to {1e9 * max(map(largest_Nm, plan.phases)):.4g} nN m "
+        f"over {plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
     )
+
+
+def in_numbers(phases: Sequence[Phase]) -> str:
+    """Say how many phases of which kind there are, as ``4 sinusoids, 1 step``."""
+    kinds = Counter(map(kind, phases))
+    return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in kinds.items())
+
+
+def kind(phase: Phase) -> str:
+    """Whether a phase is a sinusoid, a ramp or a step."""
+    if phase.left.harmonics:
+        return "sinusoid"
+    return "ramp" if phase.left.slope_Nm_per_s else "step"
+
+
+def largest_Nm(phase: Phase) -> float:
+    """Largest torque of a phase."""
+    load = phase.left
+    swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
+    return max(load.value_Nm + swing, load.value_Nm + load.slope_Nm_per_s * phase.duration_s)
 
 
 def percent(bound: float) -> str:
     """Print a relative bound."""
-    return "none" if bound > _NO_BOUND else f"{100 * bound:.2g} %"
-
-
-# Of which nobody would say that it is known: a factor of e to the tenth.
-_NO_BOUND = 10.0
+    return "none" if bound > NO_BOUND else f"{100 * bound:.2g} %"

@@ -3,15 +3,18 @@
 from collections.abc import Iterator
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from biogrip.experiment.protocol import torque_at
-from biogrip.own_design.designed import Designed
+from biogrip.experiment.protocol import Phase
+from biogrip.own_design.designed import Designed, kind
 from biogrip.products.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, PURPLE, SKY, figure
 from biogrip.response.ringing import ringing_responses
 
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 _AFTER = 120
+# Periods of which each can be seen.
+_MOST_DRAWN = 40
 
 
 def draw_experiment(found: Designed) -> Figure:
@@ -20,8 +23,7 @@ def draw_experiment(found: Designed) -> Figure:
     history, times = plan.torque, plan.time_s
     drawn = figure(PAGE_IN, 4.6)
     upper, middle, lower = drawn.subplots(3, 1, sharex=True, height_ratios=[1.3, 0.7, 1.3])
-    edges = np.append(history.time_s, history.end_s)
-    upper.step(edges, 1e9 * np.append(torque_at(history, history.time_s), 0), where="post", lw=0.8)
+    _draw_torque(upper, found)
     upper.set_ylabel("torque (nN m)")
     counts, _ = np.histogram(times, np.linspace(0, history.end_s, 201))
     middle.stairs(counts, np.linspace(0, history.end_s, 201), fill=True, color=SKY)
@@ -36,36 +38,73 @@ def draw_experiment(found: Designed) -> Figure:
     return drawn
 
 
+def _draw_torque(axes: Axes, found: Designed) -> None:
+    """Draw the torque as a line, or, where many periods are on the page, what it sweeps over."""
+    history, phases = found.plan.torque, found.plan.phases
+    start_s, times, torques = 0.0, [0.0], [0.0]
+    for start_s, phase in zip(history.time_s, phases, strict=True):
+        load, instants = phase.left, np.array([0.0, phase.duration_s])
+        for harmonic in load.harmonics:
+            periods = phase.duration_s * harmonic.frequency_Hz
+            if periods < _MOST_DRAWN:
+                instants = np.linspace(0.0, phase.duration_s, max(2, int(30 * periods)))
+            else:
+                low, high = load.value_Nm + harmonic.amplitude_Nm * np.array([-1, 1])
+                span = [start_s, start_s + phase.duration_s]
+                axes.fill_between(span, 1e9 * low, 1e9 * high, color=SKY, lw=0.8)
+        times += (start_s + instants).tolist()
+        torques += (1e9 * load.at(instants)).tolist()
+    axes.plot([*times, times[-1]], [*torques, 0.0], lw=0.8)
+
+
 def draw_told(found: Designed) -> Figure:
-    """Draw sensitivities in units of the noise after the steps with the most readings."""
+    """Draw sensitivities in units of the noise after the steps with the most readings.
+
+    Of sinusoids the last whole period is drawn, with all of their readings.
+    """
     plan, wanted = found.plan, found.wanted
     history, times = plan.torque, plan.time_s
     step = history.time_s.searchsorted(times, side="left") - 1
     chosen = sorted(np.argsort(-np.bincount(step, minlength=len(history.time_s)))[:3].tolist())
-    ends = np.append(history.time_s[1:], history.end_s)
     drawn = figure(PAGE_IN, 2.6)
     panels = drawn.subplots(1, len(chosen), squeeze=False)[0]
     for axes, k in zip(panels, chosen, strict=True):
-        length = ends[k] - history.time_s[k]
-        after = np.geomspace(0.3 / wanted.fastest_Hz, length, _AFTER)
+        start_s, phase = history.time_s[k], plan.phases[k]
+        read = times[step == k] - start_s
+        period_s = _period_s(phase)
+        if period_s is None:
+            shown = after = np.geomspace(0.3 / wanted.fastest_Hz, phase.duration_s, _AFTER)
+            axes.set_xscale("log")
+            axes.set_xlabel("time since the step (s)")
+        else:
+            shown = np.linspace(0.0, 1.0, _AFTER)
+            after = (shown + phase.duration_s // period_s - 1) * period_s
+            read = read % period_s / period_s
+            axes.set_xlabel("part of the period")
         rows = ringing_responses(
             wanted.gripper,
             wanted.model,
             history,
-            history.time_s[k] + after * (1 - 1e-12),
+            start_s + after * (1 - 1e-12),
             wanted.parameters[:1],
         )[0]
         for index, name in enumerate(wanted.model.names):
             told = np.abs(rows[1 + index]) / wanted.noise_rad
-            axes.loglog(after, told, color=_COLOURS[index % len(_COLOURS)], label=name)
-        read = times[step == k] - history.time_s[k]
+            axes.semilogy(shown, told, color=_COLOURS[index % len(_COLOURS)], label=name)
         lowest = axes.get_ylim()[0]
         axes.plot(read, np.full(len(read), lowest), "|", color=BLACK, ms=5)
-        axes.set_title(f"step {k + 1}: {len(read)} readings")
-        axes.set_xlabel("time since the step (s)")
+        axes.set_title(f"{kind(phase)} {k + 1}: {len(read)} readings")
     panels[0].set_ylabel("|sensitivity| / noise")
     panels[0].legend()
     return drawn
+
+
+def _period_s(phase: Phase) -> float | None:
+    """Period of a sinusoid of which there is a whole one."""
+    for harmonic in phase.left.harmonics:
+        if phase.duration_s * harmonic.frequency_Hz >= 1:
+            return 1 / harmonic.frequency_Hz
+    return None
 
 
 def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
@@ -76,6 +115,6 @@ def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
     )
     yield (
         "What a reading tells of each parameter, in units of the noise, after the steps with the "
-        "most readings (ticks)",
+        "most readings (ticks); in the last period of a sinusoid",
         draw_told(found),
     )

@@ -1,21 +1,72 @@
 """Designed experiments on one page that needs nothing else."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import jinja2
+import numpy as np
 
 from biogrip import __version__
+from biogrip.experiment.protocol import Harmonic, Phase
 from biogrip.files import write_text
-from biogrip.instrument.actuator import voltage
-from biogrip.own_design.designed import Designed, percent
+from biogrip.instrument.actuator import CombDrive, voltage
+from biogrip.own_design.designed import Designed, in_numbers, kind, percent
 from biogrip.own_design.drawings import drawings
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import embedded
 from biogrip.products.figures.style import styled
 
 _SHOWN = 12
+
+
+@dataclass(frozen=True)
+class _Column:
+    """What is to be set on the generator: its heading, how it is printed, and of which kind."""
+
+    head: str
+    cell: Callable[[Phase, CombDrive], str]
+    only: str | None = None
+
+
+def _volts(phase: Phase, comb: CombDrive) -> str:
+    """Voltages from the start of a phase to its end, or the lowest and the highest."""
+    load = phase.left
+    swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
+    ends = [load.value_Nm - swing, load.value_Nm + swing]
+    if kind(phase) == "ramp":
+        ends[1] += load.slope_Nm_per_s * phase.duration_s
+    first, last = (f"{volt:.3f}" for volt in voltage(comb, np.maximum(ends, 0.0)))
+    return first if kind(phase) == "step" else f"{first} to {last}"
+
+
+def _swing(phase: Phase, of: Callable[[Harmonic], float]) -> str:
+    return "".join(f"{of(harmonic):.6g}" for harmonic in phase.left.harmonics)
+
+
+_COLUMNS = (
+    _Column("for (s)", lambda phase, _: f"{phase.duration_s:.6g}"),
+    _Column("torque (nN m)", lambda phase, _: f"{1e9 * phase.left.value_Nm:.4g}"),
+    _Column(
+        "to (nN m)",
+        lambda phase, _: (
+            f"{1e9 * float(phase.left.at(phase.duration_s)):.4g}" if kind(phase) == "ramp" else ""
+        ),
+        "ramp",
+    ),
+    _Column(
+        "amplitude (nN m)",
+        lambda phase, _: _swing(phase, lambda harmonic: 1e9 * harmonic.amplitude_Nm),
+        "sinusoid",
+    ),
+    _Column(
+        "frequency (Hz)",
+        lambda phase, _: _swing(phase, lambda harmonic: harmonic.frequency_Hz),
+        "sinusoid",
+    ),
+    _Column("voltage (V)", _volts),
+)
 
 
 def write_page(designs: Iterable[Designed], page: Path) -> None:
@@ -32,9 +83,8 @@ def _told(found: Designed) -> dict[str, Any]:
     plan, wanted = found.plan, found.wanted
     with styled():
         figures = [(title, embedded(drawn)) for title, drawn in drawings(found)]
-    torques = [phase.left.value_Nm for phase in plan.phases]
-    volts = voltage(found.case.actuator, torques)
-    steps = zip(plan.phases, torques, volts, strict=True)
+    kinds = {kind(phase) for phase in plan.phases}
+    shown = [column for column in _COLUMNS if column.only in (None, *kinds)]
     return {
         "title": found.case.title,
         "names": wanted.model.names,
@@ -55,9 +105,11 @@ def _told(found: Designed) -> dict[str, Any]:
         "noise_urad": f"{1e6 * wanted.noise_rad:.3g}",
         "readings": len(plan.time_s),
         "end_s": f"{plan.torque.end_s:g}",
+        "in_numbers": in_numbers(plan.phases),
+        "follows_root": kinds != {"step"},
+        "columns": [column.head for column in shown],
         "steps": [
-            (f"{phase.duration_s:.6g}", f"{1e9 * torque:.4g}", f"{volt:.3f}")
-            for phase, torque, volt in steps
+            [column.cell(phase, found.case.actuator) for column in shown] for phase in plan.phases
         ],
         "bursts": [
             (f"{burst.from_s:.6g}", f"{burst.rate_Hz:.6g}", str(burst.samples))

@@ -60,6 +60,9 @@ def growth_of_modes(
 
         g(e) = G + (G + T) (e^(r e) - 1)    dg/dr = [G' + (G + T) e] e^(r e)
 
+    So it is from ramp to ramp and from sinusoid to sinusoid, which superposed would lose what
+    they have grown to over what they are.
+
     Parameters
     ----------
     rates : (n, n_modes)
@@ -76,9 +79,7 @@ def growth_of_modes(
     """
     n, m = rates.shape
     if not torque.only_steps:
-        both = responses_of_modes(rates.ravel(), torque, time_s)
-        growth, slope = (rows.reshape(-1, n, m, len(time_s)).swapaxes(0, 1) for rows in both)
-        return growth, slope
+        return _from_phase_to_phase(rates, torque, time_s)
     levels = np.cumsum(drives(torque.left, torque.right, torque.symmetric)[..., 0], axis=1)
     reached, slanted = _at_steps(rates, torque.time_s, levels)
     firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
@@ -100,6 +101,41 @@ def growth_of_modes(
         growth[:, :, j, seen], slope[:, :, j, seen] = _carried_on(
             rates[:, j], reached[..., j], slanted[..., j], levels, phase[seen], elapsed[seen]
         )
+    return growth, slope
+
+
+def _from_phase_to_phase(
+    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Growth and slope of modes, (n, n_drives, n_modes, n_times), under any protocol."""
+    rate = rates[:, None, :, None]
+    powers, swings = torque.within_phases
+    shape = len(rates), powers.shape[1], rates.shape[1]
+    growth = np.empty((*shape, len(time_s)), dtype=rates.dtype)
+    slope = np.empty_like(growth)
+    reached = np.zeros((*shape, 1), dtype=rates.dtype)
+    slanted = np.zeros_like(reached)
+    starts = np.append(torque.time_s, torque.end_s)
+    firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
+    for k, start in enumerate(torque.time_s):
+        here = slice(firsts[k], firsts[k + 1])
+        # The next phase begins with what this one ends with.
+        elapsed = np.append(time_s[here], starts[k + 1]) - start
+        decay = 1 + _expm1(rate * elapsed)
+        grown, tilted = reached * decay, (slanted + reached * elapsed) * decay
+        sets_in = [
+            (heights, _growth(order, rate, elapsed))
+            for order, heights in enumerate(powers[k].T)
+            if heights.any()
+        ]
+        for heights, (one, its_slope) in sets_in:
+            grown = grown + heights[:, None, None] * one
+            tilted = tilted + heights[:, None, None] * its_slope
+        for omega, amplitudes in swings[k]:
+            swung = _swing(omega, rate, elapsed, amplitudes[:, None, None])
+            grown, tilted = grown + swung[0], tilted + swung[1]
+        growth[..., here], slope[..., here] = grown[..., :-1], tilted[..., :-1]
+        reached, slanted = grown[..., -1:], tilted[..., -1:]
     return growth, slope
 
 

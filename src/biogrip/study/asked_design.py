@@ -8,8 +8,8 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.experiment import Wanted
 from biogrip.design.settings import DesignSettings
-from biogrip.design.steps import Limits
 from biogrip.design.told import Earlier
+from biogrip.design.waveform import Limits
 from biogrip.errors import BiogripError
 from biogrip.instrument.actuator import torque
 from biogrip.study.study import Case
@@ -41,7 +41,10 @@ def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
         noise_rad=asked.noise_rad,
         samples=asked.samples,
         fastest_Hz=asked.fastest_Hz,
-        limits=Limits(asked.longest_s, slots / asked.fastest_Hz, asked.most_steps),
+        limits=Limits(
+            asked.longest_s, slots / asked.fastest_Hz, asked.most_steps, 1 / asked.fastest_Hz
+        ),
+        shapes=asked.shapes,
         largest_Nm=_largest(case, asked),
         stroke_rad=case.stroke_rad,
         criterion=Criterion(

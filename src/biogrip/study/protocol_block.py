@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-from biogrip.experiment.protocol import Harmonic, Load, Phase
+from biogrip.experiment.protocol import Harmonic, Load, Phase, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
 from biogrip.keys import Key, Problem
 
@@ -102,12 +102,7 @@ class PhaseBlock:
         return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
 
     def _load(self, value: float, to: float | None, amplitude: float | None) -> Load:
-        slope = ((value if to is None else to) - value) / self.duration_s
-        harmonics: tuple[Harmonic, ...] = ()
-        if amplitude is not None and self.frequency_Hz is not None:
-            omega = 2 * math.pi * self.frequency_Hz
-            harmonics = (Harmonic(amplitude, omega, -math.pi / 2),)
-        return Load(value, slope, 0.0, harmonics)
+        return load(self.duration_s, value, to, amplitude, self.frequency_Hz)
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that do not go together."""

@@ -11,6 +11,7 @@ import pytest
 
 from biogrip.design.experiment import Wanted
 from biogrip.design.search import Torque, TorqueSearch
+from biogrip.design.shapes import SHAPES
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.plan import Plan
 from biogrip.products.stages import sequence as stage
@@ -98,7 +99,7 @@ class OneTorque:
     def __call__(self, wanted: Wanted, *_: object) -> list[Torque]:
         self.wanted.append(wanted)
         shares = np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
-        return [TorqueSearch(wanted).torque(shares)]
+        return [TorqueSearch(wanted, SHAPES["steps"]).torque(shares)]
 
 
 def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

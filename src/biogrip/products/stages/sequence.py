@@ -13,7 +13,7 @@ from biogrip.design.experiment import Wanted
 from biogrip.design.schedule import planned, presses
 from biogrip.design.search import best_torques
 from biogrip.design.told import Earlier, told_by
-from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.protocol import Phase
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
@@ -259,7 +259,7 @@ class _Cell:
     def _pressed(self, experiment: Experiment) -> bool:
         """Whether the jaws press the cell throughout an experiment."""
         wanted = replace(self._settings.wanted, parameters=np.exp(self._truth)[None])
-        return presses(wanted, torque_history(experiment[0]))
+        return presses(wanted, experiment[0])
 
     def _stream(self, purpose: str) -> np.random.Generator:
         settings = self._settings

@@ -78,7 +78,7 @@ def _least_force(case: CaseSettings) -> float:
     """Least force of the jaws, in N, from the second step on: at first it has to rise."""
     torque = torque_history(case.after[0])
     values = [[case.parameters[name] for name in case.model.names]]
-    time_s, force = forces(case.gripper, case.model.network(values), torque)
+    time_s, force = forces(case.gripper, case.model.network(values), case.after[0])
     second_s = float(torque.time_s[min(1, len(torque.time_s) - 1)])
     return float(force[0, time_s > second_s].min())
 

@@ -1,0 +1,103 @@
+"""Readings of cells as bursts of a camera."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array, IntArray
+from biogrip.design.cells import Cells
+from biogrip.experiment.sampling import Burst
+
+_Run = tuple[int, int, int]
+"""First slot, slots from one reading to the next, readings."""
+
+
+def whole(samples: Array, capacity: Array) -> IntArray:
+    """Round numbers of samples, so that their sum stays."""
+    counts = np.floor(samples + 1e-9)
+    missing = round(float(samples.sum() - counts.sum()))
+    room = counts < capacity
+    order = np.argsort(-np.where(room, samples - counts, -1.0), kind="stable")
+    counts[order[:missing]] += 1
+    found: IntArray = counts.astype(np.intp)
+    return found
+
+
+def bursts_of(
+    each: Sequence[Cells], starts: IntArray, counts: IntArray, fastest_Hz: float
+) -> tuple[Burst, ...]:
+    """Put readings into bursts; cells that are full and follow one another share one.
+
+    Parameters
+    ----------
+    each
+        Cells after each step.
+    starts : (n_steps,)
+        Slots at which steps begin.
+    counts : (n_cells,)
+        Readings of all their cells.
+    fastest_Hz
+        How many slots a second has.
+    """
+    runs: list[_Run] = []
+    place = 0
+    for start, own in zip(starts.tolist(), each, strict=True):
+        here = counts[place : place + len(own.first)]
+        place += len(own.first)
+        found = _repeated(own, here) if own.stride else _once(own, here)
+        for first, stride, count in found:
+            begins = start + first
+            last = runs[-1] if runs else None
+            if last and last[1] == stride and begins == last[0] + stride * last[2]:
+                runs[-1] = (last[0], stride, last[2] + count)
+            else:
+                runs.append((begins, stride, count))
+    return tuple(
+        Burst(begins / fastest_Hz, fastest_Hz / stride, count) for begins, stride, count in runs
+    )
+
+
+def _once(own: Cells, counts: IntArray) -> Iterator[_Run]:
+    """Readings of cells that follow one another, in the middle of each."""
+    for first, slots, count in zip(
+        own.first.tolist(), own.slots.tolist(), counts.tolist(), strict=True
+    ):
+        if count:
+            stride = slots // count
+            yield first + (slots - 1 - stride * (count - 1)) // 2, stride, count
+
+
+def _repeated(own: Cells, counts: IntArray) -> list[_Run]:
+    """Readings of cells that come again after every period; of few, one cell's after another's."""
+    slots: list[int] = []
+    place, used = -1, 0
+    for first, length, repeats, count in zip(
+        own.first.tolist(), own.slots.tolist(), own.repeats.tolist(), counts.tolist(), strict=True
+    ):
+        if first // own.stride != place:
+            place, used = first // own.stride, 0
+        if not count:
+            continue
+        if used + count > repeats:
+            used = 0
+        for turn in range(min(count, repeats)):
+            several = (count - turn - 1) // repeats + 1
+            apart = length // several
+            begins = first + (length - 1 - apart * (several - 1)) // 2
+            begins += own.stride * (used + turn)
+            slots += range(begins, begins + apart * several, apart)
+        used += min(count, repeats)
+    return _runs(sorted(slots))
+
+
+def _runs(slots: Sequence[int]) -> list[_Run]:
+    """Divide ascending slots into runs that are evenly spaced."""
+    runs: list[_Run] = []
+    for slot in slots:
+        first, stride, count = runs[-1] if runs else (slot, 0, 0)
+        apart = slot - (first + stride * (count - 1))
+        if count == 1 or (count > 1 and apart == stride):
+            runs[-1] = (first, slot - first if count == 1 else stride, count + 1)
+        else:
+            runs.append((slot, 1, 1))
+    return runs

@@ -1,0 +1,45 @@
+"""Torques as they can be set: few digits, and whole slots of the camera."""
+
+import numpy as np
+
+from biogrip.design.experiment import Wanted
+from biogrip.design.search import Torque
+from biogrip.experiment.protocol import Phase, load
+
+_DIGITS = 4
+
+
+def set_values(wanted: Wanted, torque: Torque) -> tuple[Phase, ...]:
+    """Round a torque to what can be set, both arms alike; none becomes larger.
+
+    Parameters
+    ----------
+    wanted
+        What is designed, and how fast is read.
+    torque
+        To be rounded.
+    """
+    waveform, rate = torque.waveform, wanted.fastest_Hz
+    levels, ends, amplitudes = (
+        [_rounded_down(torque.largest_Nm * share) for share in shares]
+        for shares in (waveform.levels, waveform.ends, waveform.amplitudes)
+    )
+    columns = (waveform.durations_s, levels, ends, amplitudes, waveform.periods_s)
+    phases = []
+    for lasting_s, level, end, amplitude, period_s in zip(*columns, strict=True):
+        duration_s = round(lasting_s * rate) / rate
+        one = load(duration_s, level, end)
+        if amplitude > 0:
+            # Of as many digits as are written.
+            frequency_Hz = float(f"{rate / round(period_s * rate):.12g}")
+            one = load(duration_s, level, end, min(amplitude, level), frequency_Hz)
+        phases.append(Phase(duration_s, one, one))
+    return tuple(phases)
+
+
+def _rounded_down(value: float) -> float:
+    """So many digits of a torque, which must not become larger."""
+    if value <= 0:
+        return 0.0
+    exponent = int(np.floor(np.log10(value))) - _DIGITS + 1
+    return float(f"{np.floor(value / 10.0**exponent * (1 + 1e-12)):.0f}e{exponent}")

@@ -1,0 +1,73 @@
+"""What trains of steps, ramps and sinusoids tell of the samples of config/design.yaml.
+
+``python -m tests.helpers.shapes_campaign`` takes some ten minutes, and writes the table that
+docs/design.md takes its numbers from. The test suite makes a row with few torques.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from functools import cache
+
+import pandas as pd
+
+from biogrip.design.experiment import relative_bounds
+from biogrip.design.schedule import planned
+from biogrip.design.search import best_torques
+from biogrip.experiment.random_streams import stream
+from biogrip.identify.answer import silent
+from biogrip.own_design.designed import NO_BOUND
+from biogrip.study.asked_design import wanted_of
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import Study
+from tests.helpers.groups_campaign import write
+from tests.helpers.places import CONFIG, ROOT
+
+TABLE = ROOT / "results" / "published" / "shapes" / "tables" / "designed_shapes.csv"
+ASKED = [CONFIG, ROOT / "config" / "design.yaml"]
+TRIED = 2000
+
+KINDS = (("steps", 10.0), ("ramps", 10.0), ("ramps", 0.1), ("sinusoids", 10.0))
+"""Shapes, and the shortest of their parts in ms."""
+
+
+def told(case_name: str, shape: str, shortest_ms: float, tried: int) -> pd.DataFrame:
+    """Design with torques of one shape, and give what is told, a row a quantity."""
+    study = _study()
+    wanted = wanted_of(study.cases[case_name])
+    limits = replace(wanted.limits, shortest_s=1e-3 * shortest_ms)
+    wanted = replace(wanted, shapes=(shape,), limits=limits)
+    rng = stream(study.study_seed, case_name, 0, "design")
+    plan = planned(wanted, best_torques(wanted, tried, rng, silent))
+    bounds = relative_bounds(plan.information)[0]
+    return pd.DataFrame(
+        {
+            "case": case_name,
+            "shape": shape,
+            "shortest_ms": shortest_ms,
+            "quantity": wanted.model.names,
+            "bound_percent": [100 * bound if bound < NO_BOUND else None for bound in bounds],
+            "parts": len(plan.phases),
+            "bursts": len(plan.bursts),
+            "gap_percent": 100 * plan.gap,
+        }
+    )
+
+
+def main(cases: Sequence[str]) -> None:
+    """Write the table, and print it."""
+    jobs = [(case, *kind, TRIED) for case in cases for kind in KINDS]
+    with ProcessPoolExecutor() as processes:
+        tables = list(processes.map(told, *zip(*jobs, strict=True)))
+    found = pd.concat(tables)
+    print(found.to_string(index=False))
+    write(found, TABLE)
+
+
+@cache
+def _study() -> Study:
+    return load_study(read_configs(ASKED), ASKED)
+
+
+if __name__ == "__main__":
+    main(list(_study().simulated))
