@@ -28,8 +28,9 @@ QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conft
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
 
+# One worker more than there are processors: some wait for the programs that they have started.
 test: $(READY)
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
 
 # A small study and the quick tests, weekly and before a release: with the oldest versions that
 # pyproject.toml allows, and with whichever other Pythons there are.
