@@ -7,8 +7,14 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.waveform import Limits
+from biogrip.experiment.protocol import Phase, TorqueHistory
 from biogrip.experiment.sample import SampleModel
+from biogrip.experiment.sampling import Sampling
 from biogrip.instrument.gripper import Gripper
+from biogrip.response.ringing import ringing_responses
+
+Experiment = tuple[tuple[Phase, ...], Sampling]
+"""Protocol and sampling."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +59,41 @@ class Wanted:
     stroke_rad: float
     criterion: Criterion
     before: Array
+
+
+def told_at(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    parameters: Array,
+    noise_rad: float,
+) -> Array:
+    """Sensitivities to the log-parameters, with inertia, in units of the noise.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated.
+    time_s : (n_times,)
+        When the rotation is read, ascending.
+    parameters : (n, n_parameters)
+        Of the samples.
+    noise_rad
+        Standard deviation of the noise.
+
+    Returns
+    -------
+    (n, n_parameters, n_times)
+    """
+    rows = ringing_responses(gripper, model, torque, time_s, parameters)
+    return rows[:, 1:] / noise_rad
+
+
+def information_of(told: Array) -> Array:
+    """Fisher information, (n, n_parameters, n_parameters), of readings that tell so much."""
+    information: Array = told @ told.swapaxes(1, 2)
+    return information
 
 
 def relative_bounds(information: Array) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.design.bursts import bursts_of, whole
 from biogrip.design.cells import Cells, cells, swinging_cells
-from biogrip.design.experiment import Wanted
+from biogrip.design.experiment import Wanted, information_of, told_at
 from biogrip.design.few_cells import in_few_cells
 from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
@@ -19,7 +19,6 @@ from biogrip.experiment.sample import Network
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
-from biogrip.response.ringing import ringing_responses
 
 _GROWTH, _GAP, _FILLINGS = 1.12, 0.005, 200
 # Where the torque swings: parts of a period, and how the number of periods of a cell grows.
@@ -157,7 +156,7 @@ def _sampled(wanted: Wanted, phases: tuple[Phase, ...]) -> Plan:
     bursts = bursts_of(problem.each, problem.starts, counts, wanted.fastest_Hz)
     history = torque_history(phases)
     seen = _told(wanted, history, Sampling(bursts=bursts).over(history.end_s))
-    information = seen @ seen.swapaxes(1, 2) + wanted.before
+    information = information_of(seen) + wanted.before
     return Plan(phases, bursts, information, best.gap)
 
 
@@ -201,5 +200,6 @@ def _late(each: Sequence[Cells]) -> Array:
 
 
 def _told(wanted: Wanted, history: TorqueHistory, time_s: Array) -> Array:
-    rows = ringing_responses(wanted.gripper, wanted.model, history, time_s, wanted.parameters)
-    return rows[:, 1:] / wanted.noise_rad
+    return told_at(
+        wanted.gripper, wanted.model, history, time_s, wanted.parameters, wanted.noise_rad
+    )

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
+from biogrip.design.experiment import information_of
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fit import FAIR
 from biogrip.identify.many_fits import ManyFits
@@ -110,8 +111,7 @@ def information_at(problem: Problem, noise_rad: float, log_parameters: Array) ->
     (n, n_parameters, n_parameters)
     """
     slopes = np.array([problem.residuals.condensed(x)[1] for x in log_parameters]) / noise_rad
-    information: Array = slopes @ slopes.swapaxes(1, 2)
-    return information
+    return information_of(slopes)
 
 
 def _drawn(

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Wanted, relative_bounds
+from biogrip.design.experiment import Wanted, information_of, relative_bounds, told_at
 from biogrip.design.schedule import Plan, forces, planned
 from biogrip.design.search import best_torques
 from biogrip.design.told import Earlier
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
-from biogrip.response.ringing import ringing_responses
 from biogrip.study.asked_design import wanted_of
 from biogrip.study.study import Case
 
@@ -80,15 +79,15 @@ def designed(
     rng = stream(study_seed, case.name, 0, "design")
     plan = planned(wanted, best_torques(wanted, asked.tried, rng, progress))
     history = torque_history(case.phases)
-    told = ringing_responses(
+    told = told_at(
         wanted.gripper,
         wanted.model,
         history,
         case.sampling.over(history.end_s),
         wanted.parameters,
-    )[:, 1:]
-    again = told @ told.swapaxes(1, 2) / wanted.noise_rad**2
-    before = relative_bounds(again + wanted.before)
+        wanted.noise_rad,
+    )
+    before = relative_bounds(information_of(told) + wanted.before)
     network = wanted.model.network(wanted.parameters)
     time_s, force_N = forces(wanted.gripper, network, plan.phases)
     return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import relative_bounds
-from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.design.experiment import Experiment, information_of, relative_bounds, told_at
+from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import SampleModel
-from biogrip.experiment.sampling import Sampling
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Study
 
-Experiment = tuple[tuple[Phase, ...], Sampling]
-"""Protocol and sampling."""
+WELL = 0.1
+"""A parameter that is known to this share of itself counts as determined."""
 
 # Samples whose sensitivities are formed at once.
 _AT_ONCE = 20
@@ -56,7 +54,7 @@ def settings(study: Study) -> dict[str, CaseSettings]:
     shared = study.config
     before = (
         shared.protocol.torques(shared.actuator),
-        Sampling(shared.measurement.rate_Hz, shared.measurement.times_s, shared.measurement.bursts),
+        shared.measurement.sampling,
     )
     found = {}
     for name in designed_cases(study):
@@ -107,6 +105,6 @@ def bounds(case: CaseSettings, experiment: Experiment, parameters: Array) -> Arr
     found = []
     for start in range(0, len(parameters), _AT_ONCE):
         some = parameters[start : start + _AT_ONCE]
-        told = ringing_responses(case.gripper, case.model, torque, times, some)[:, 1:]
-        found.append(relative_bounds(told @ told.swapaxes(1, 2) / case.noise_rad**2))
+        told = told_at(case.gripper, case.model, torque, times, some, case.noise_rad)
+        found.append(relative_bounds(information_of(told)))
     return np.concatenate(found)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from biogrip.experiment.noise import Noise
-from biogrip.experiment.sampling import Burst
+from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.keys import Key, Problem
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
@@ -115,6 +115,11 @@ class MeasurementBlock:
     def coloured(self) -> bool:
         """Whether noise may be other than white."""
         return self.noise_model == COLOURED
+
+    @property
+    def sampling(self) -> Sampling:
+        """When the rotation is sampled."""
+        return Sampling(self.rate_Hz, self.times_s, self.bursts)
 
     def problems(self) -> Iterator[Problem]:
         """A recorded trace needs a file that is there, and the names of its columns."""

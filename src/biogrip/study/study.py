@@ -126,8 +126,7 @@ class Case:
     @property
     def sampling(self) -> Sampling:
         """When the rotation is sampled."""
-        block = self.block.measurement
-        return Sampling(block.rate_Hz, block.times_s, block.bursts)
+        return self.block.measurement.sampling
 
     @property
     def samples(self) -> int:

@@ -7,13 +7,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
+from biogrip.products.designed_cases import WELL, CaseSettings, bounds, designed_cases, settings
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
 from biogrip.study.study import Case, Study
-
-WELL = 0.1
-"""A parameter that is known to this share of itself counts as determined."""
 
 _STIFFNESSES = np.geomspace(1e-3, 1e2, 16)
 _DAMPINGS = np.geomspace(1e-2, 1e3, 16)

@@ -7,12 +7,13 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.products.designed_cases import WELL
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, GREY, ORANGE, PAGE_IN, PURPLE, figure, panel
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.product import Reads
 from biogrip.products.stages.sequence import AFTER, BEFOREHAND, REPEATED, TRUTH, sequenced
-from biogrip.products.tables.sequential import IN_WORDS, WELL, files_of, half_widths, known_well
+from biogrip.products.tables.sequential import IN_WORDS, files_of, half_widths, known_well
 from biogrip.study.study import Case, Study
 
 _STYLES: dict[str, dict[str, Any]] = {

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Wanted
+from biogrip.design.experiment import Experiment, Wanted
 from biogrip.design.schedule import planned, presses
 from biogrip.design.search import best_torques
 from biogrip.design.told import Earlier, told_by
-from biogrip.experiment.protocol import Phase
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
@@ -36,8 +35,6 @@ from biogrip.study.study import Case, Study
 REPEATED, AFTER, BEFOREHAND, TRUTH = WAYS = ("repeated", "after", "beforehand", "truth")
 """The config's experiment again and again; that once, and then each designed after all before;
 one designed for the ranges, again and again; and one designed for the cell itself."""
-
-Experiment = tuple[tuple[Phase, ...], Sampling]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 
 from biogrip.arrays import BoolArray
+from biogrip.products.designed_cases import WELL
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Reads
@@ -14,9 +15,6 @@ from biogrip.products.stages.sequence import AFTER, BEFOREHAND, REPEATED, TRUTH,
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
-
-WELL = 0.1
-"""What is known to this share of itself counts as determined."""
 
 IN_WORDS: Mapping[str, str] = {
     REPEATED: "the study's, repeated",
