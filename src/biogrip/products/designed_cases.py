@@ -6,10 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Experiment, information_of, relative_bounds, told_at
+from biogrip.design.experiment import Experiment, information_of, relative_bounds
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
+from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Study
 
 WELL = 0.1
@@ -105,6 +106,6 @@ def bounds(case: CaseSettings, experiment: Experiment, parameters: Array) -> Arr
     found = []
     for start in range(0, len(parameters), _AT_ONCE):
         some = parameters[start : start + _AT_ONCE]
-        told = told_at(case.gripper, case.model, torque, times, some, case.noise_rad)
-        found.append(relative_bounds(information_of(told)))
+        told = ringing_responses(case.gripper, case.model, torque, times, some)[:, 1:]
+        found.append(relative_bounds(information_of(told) / case.noise_rad**2))
     return np.concatenate(found)
