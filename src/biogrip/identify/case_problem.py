@@ -126,7 +126,7 @@ class CaseProblem:
         return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
 
     def in_noise(
-        self, time_s: Array, colour: Colour | None, uncertain: Array, freedom: float
+        self, time_s: Array, colour: Colour | None, uncertain: Array
     ) -> Condensed | EverySample:
         """Condense for noise that is not just white.
 
@@ -138,22 +138,19 @@ class CaseProblem:
             Of the noise, unless that is white.
         uncertain : (n_functions, n_samples)
             What is added with an amplitude that is known about, see `with_uncertain`.
-        freedom
-            Degrees of freedom with which the colour is known.
         """
         nuisance, whitening = self.nuisance(time_s), None
         if colour is not None:
             whitening = Whitening(time_s, colour, nuisance, uncertain)
         nuisance = with_uncertain(nuisance, uncertain) if whitening is None else whitening.nuisance
         if self.inertia:
-            return EverySample(time_s, nuisance, whitening, freedom)
+            return EverySample(time_s, nuisance, whitening)
         return Condensed(
             self.torque,
             time_s,
             nuisance,
             nonlinear=self.nonlinear,
             whitening=whitening,
-            freedom=freedom,
         )
 
     def _condensed_at(self, time_s: Array) -> Condensed | EverySample:

@@ -147,7 +147,7 @@ def _in_turn(
     posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
 ) -> tuple[Problem, Identification, Colour | None]:
     """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
-    problem, colour, freedom = plain, None, np.inf
+    problem, colour = plain, None
     for _ in range(_ROUNDS):
         residual, sensitivity = _left(plain, found)
         uncertain = gripper_functions(posed, time_s, found.parameters)
@@ -159,8 +159,7 @@ def _in_turn(
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = ColourLikelihood(time_s, residual, directions)
             colour = likelihood.best(near=before)
-            freedom = likelihood.freedom(colour, sensitivity / noise_rad, nuisance)
-        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, freedom)
+        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
         start = np.log(found.parameters)
         fit = settled(problem, local_fit(problem, start))
@@ -169,6 +168,9 @@ def _in_turn(
         found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
         if moved < _STAYED and _alike(before, colour):
             break
+    if colour is not None:
+        freedom = likelihood.freedom(colour, sensitivity / noise_rad, nuisance)
+        problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
     return problem, found, colour
 
 

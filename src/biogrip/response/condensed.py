@@ -58,8 +58,6 @@ class Condensed:
         Whether rows must also do for what the nonlinear model has over the linear one.
     whitening
         What makes the noise white, and takes the nuisance out, if noise is not white as it is.
-    freedom
-        Degrees of freedom with which the colour of the noise is known.
     """
 
     def __init__(
@@ -70,12 +68,10 @@ class Condensed:
         *,
         nonlinear: bool = False,
         whitening: Whitening | None = None,
-        freedom: float = np.inf,
     ) -> None:
         self.nuisance = nuisance if whitening is None else whitening.nuisance
         self.nonlinear = nonlinear
         self._whitening = whitening
-        self.freedom = freedom
         self._torque = torque
         self._all_s = time_s
 

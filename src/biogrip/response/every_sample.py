@@ -5,8 +5,6 @@ With inertia arms ring at any rate and frequency: no small space holds what they
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from biogrip.arrays import Array
 from biogrip.response.nuisance import without
 from biogrip.response.whitening import Whitening
@@ -24,14 +22,11 @@ class EverySample:
         What is taken out of trace and responses, see `nuisance_basis` and `with_uncertain`.
     whitening
         What makes the noise white, and takes the nuisance out, if noise is not white as it is.
-    freedom
-        Degrees of freedom with which the colour of the noise is known.
     """
 
     time_s: Array
     nuisance: Array
     whitening: Whitening | None = None
-    freedom: float = np.inf
 
     @property
     def coloured(self) -> bool:

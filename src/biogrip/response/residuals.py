@@ -70,6 +70,7 @@ class Residuals:
         if noise_rad is None:
             noise_rad = noise_of(self._rotation_rad)
         self.noise_scale_rad = noise_rad
+        self._freedom = np.inf
 
     @property
     def free(self) -> int:
@@ -85,6 +86,12 @@ class Residuals:
         """Return the same trace for another model."""
         other = copy(self)
         other.model = model
+        return other
+
+    def with_freedom(self, freedom: float) -> "Residuals":
+        """Return the same, the colour of the noise known with so many degrees of freedom."""
+        other = copy(self)
+        other._freedom = freedom
         return other
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
@@ -135,7 +142,7 @@ class Residuals:
     @property
     def freedom(self) -> float:
         """Degrees of freedom with which the colour of the noise is known."""
-        return self._condensed.freedom
+        return self._freedom
 
     @property
     def coloured(self) -> bool:
