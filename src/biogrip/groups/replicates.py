@@ -91,6 +91,10 @@ class JointResiduals(Residuals):
         """Of `condensed_responses`, what the linear model gives."""
         return self._side_by_side([part.condensed_linear(log_parameters) for part in self._parts])
 
+    def condensed_values(self, log_parameters: Array) -> Array:
+        """Of `condensed_responses`, the responses without derivatives, (n, n_rows)."""
+        return self._side_by_side([part.condensed_values(log_parameters) for part in self._parts])
+
     def condensed_corrections(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         return self._side_by_side(

@@ -106,7 +106,19 @@ def polynomials_of(
     """
     count = parameters.shape[1]
     tilts = _tilts(count) if slopes else np.ones((1, count))
-    tilted = (parameters * tilts[:, None]).reshape(-1, count)
+    return _tilted(gripper, model, parameters, tilts, symmetric=symmetric, inertia=inertia)
+
+
+def _tilted(
+    gripper: Gripper,
+    model: SampleModel,
+    parameters: Array,
+    tilts: NDArray[Any],
+    *,
+    symmetric: bool,
+    inertia: bool,
+) -> Polynomials:
+    tilted = (parameters * tilts[:, None]).reshape(-1, parameters.shape[1])
     transfer = transfer_functions(
         gripper, model.network(tilted), symmetric=symmetric, inertia=inertia
     )
@@ -145,16 +157,33 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
     )
 
 
-def modes_of(gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool) -> Modes:
-    """Modes of samples without inertia, all real; arguments as of `polynomials_of`."""
+def modes_of(
+    gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
+) -> Modes:
+    """Modes of samples without inertia, all real; arguments as of `polynomials_of`.
+
+    Where no slopes are wanted all are zero, and the rest is the same to the last bit.
+    """
+    count = parameters.shape[1]
+    # Without slopes still complex: so are quotients rounded.
+    tilts = _tilts(count) if slopes else _tilts(count)[:1]
     network = model.network(parameters[:1])
     if network.k.shape[1] > MOST_BRANCHES:
-        count = parameters.shape[1]
-        tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
-        parts = modes_with_slopes(gripper, model.network(tilted), _TILT, count, symmetric=symmetric)
-        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    polynomials = polynomials_of(gripper, model, parameters, symmetric=symmetric, inertia=False)
-    return modes_at(polynomials, poles(polynomials.denominator, real=True))
+        tilted = model.network((parameters * tilts[:, None]).reshape(-1, count))
+        parts = modes_with_slopes(gripper, tilted, _TILT, len(tilts) - 1, symmetric=symmetric)
+        modes = Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
+    else:
+        polynomials = _tilted(gripper, model, parameters, tilts, symmetric=symmetric, inertia=False)
+        modes = modes_at(polynomials, poles(polynomials.denominator, real=True))
+    return modes if slopes else _level(modes, count)
+
+
+def _level(modes: Modes, count: int) -> Modes:
+    """Give modes zero as the slopes of so many parameters."""
+    slopes = (
+        np.broadcast_to(0.0, (len(of), count, *of.shape[1:])) for of in (modes.rates, modes.weights)
+    )
+    return Modes(modes.rates, modes.weights, *slopes)
 
 
 def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:

@@ -190,6 +190,15 @@ class Residuals:
         modes = modes_of(self._gripper, self.model, parameters, symmetric=self._torque.symmetric)
         return condensed.of_modes(modes)
 
+    def condensed_values(self, log_parameters: Array) -> Array:
+        """Of `condensed_responses`, the responses without derivatives, (n, n_rows)."""
+        condensed = self._condensed
+        if self.nonlinear or isinstance(condensed, EverySample):
+            return self.condensed_responses(log_parameters)[:, 0]
+        parameters, symmetric = np.exp(log_parameters), self._torque.symmetric
+        modes = modes_of(self._gripper, self.model, parameters, symmetric=symmetric, slopes=False)
+        return condensed.of_modes(modes)[:, 0]
+
     def condensed_corrections(self, log_parameters: Array) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         # As many modes at once, about.
@@ -228,7 +237,7 @@ class Residuals:
         misfit = np.empty(len(parameters))
         for start in range(0, len(parameters), _AT_ONCE):
             some = slice(start, start + _AT_ONCE)
-            rows = self.condensed_responses(np.log(parameters[some]))[:, 0] - self.condensed_trace
+            rows = self.condensed_values(np.log(parameters[some])) - self.condensed_trace
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
         return misfit
 
