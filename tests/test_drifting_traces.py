@@ -83,7 +83,9 @@ def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
 def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
     file = written(tmp_path / "t.csv", trace(0, DRIFT))
     few = tmp_path / "few.yaml"
-    few.write_text("model_selection: {models: [damper]}\n")
+    few.write_text(
+        "model_selection: {models: [damper]}\nleast_squares: {candidates: 100, starts: 4}\n"
+    )
     for declared in (ReadAs(), ReadAs(offset=True, drift=True)):
         wanted = Wanted(file, "liquid_drop", declared, few)
         notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]

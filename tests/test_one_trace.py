@@ -63,11 +63,17 @@ def trace() -> tuple[Array, Array]:
     return times, response + noise
 
 
-def test_the_example_gives_its_truth(tmp_path: Path) -> None:
-    output = tmp_path / "found.json"
+@pytest.fixture(scope="module")
+def example(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, Any]]:
+    """What is said and what is written of the example, with the default study."""
+    output = tmp_path_factory.mktemp("example") / "found.json"
     done = identify(EXAMPLE, "--output", output)
     assert done.returncode == 0, done.stderr
-    found = json.loads(output.read_text())
+    return done.stdout, json.loads(output.read_text())
+
+
+def test_the_example_gives_its_truth(example: tuple[str, dict[str, Any]]) -> None:
+    said, found = example
     quantities = {item["quantity"]: item for item in found["quantities"]}
     truth = {name: value for name, value in TRUTH["sample"].items() if name != "model"}
     truth["c + c_p"] = truth["c"] + truth["c_p"]
@@ -77,8 +83,8 @@ def test_the_example_gives_its_truth(tmp_path: Path) -> None:
         # Three standard deviations on either side of the estimate.
         low, high = (item["value"] * (item[end] / item["value"]) ** 1.5 for end in ("low", "high"))
         assert low < truth[name] < high
-        assert f"{name:<7}" in done.stdout
-        assert item["in_words"] in done.stdout
+        assert f"{name:<7}" in said
+        assert item["in_words"] in said
     assert quantities["c_p"]["verdict"] == "bounded above"
     assert quantities["c_p"]["high"] > truth["c_p"]
     assert found["noise_rad"] == pytest.approx(0.05 * 6.7e-5, rel=0.3)
@@ -112,25 +118,26 @@ def test_units_separators_offset_and_drift(
     assert total["low"] < before["value"] < total["high"]
 
 
-def test_a_config_gives_gripper_and_protocol(tmp_path: Path, trace: tuple[Array, Array]) -> None:
+def test_a_config_gives_gripper_and_protocol(
+    tmp_path: Path, trace: tuple[Array, Array], few: str
+) -> None:
     """Half the torque and half the rotation are the same sample."""
     times, values = trace
     config = tmp_path / "mine.yaml"
     config.write_text(
         "protocol: {phases: [{duration_s: 200, torque_Nm: 0.8e-9},"
-        " {duration_s: 200, torque_Nm: 0.16e-9}]}\n"
+        f" {{duration_s: 200, torque_Nm: 0.16e-9}}]}}\n{FEW}"
     )
     files = [tmp_path / "whole.json", tmp_path / "half.json"]
-    assert (
-        identify(written(tmp_path / "a.csv", times, values), "--output", files[0]).returncode == 0
-    )
+    whole = written(tmp_path / "a.csv", times, values)
+    assert identify(whole, "--config", few, "--output", files[0]).returncode == 0
     half = written(tmp_path / "b.csv", times, values / 2)
     assert identify(half, "--config", config, "--output", files[1]).returncode == 0
-    whole, halved = (
+    one, other = (
         [q["value"] for q in json.loads(file.read_text())["quantities"]] for file in files
     )
-    assert whole[0] == pytest.approx(halved[0], rel=1e-3)
-    assert whole[4] == pytest.approx(halved[4], rel=1e-3)
+    assert one[0] == pytest.approx(other[0], rel=1e-3)
+    assert one[4] == pytest.approx(other[4], rel=1e-3)
     config.write_text("gripper: {arm_lenght_m: 2e-3}\n")
     done = identify(half, "--config", config)
     assert done.returncode == 1
@@ -372,11 +379,12 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     assert again.returncode == 0, again.stderr
 
 
-def test_what_is_said_is_enough_to_repeat_it(tmp_path: Path) -> None:
+def test_what_is_said_is_enough_to_repeat_it(
+    tmp_path: Path, example: tuple[str, dict[str, Any]]
+) -> None:
     """The assumed blocks, laid over the default study as a config, change nothing."""
-    first, second = tmp_path / "first.json", tmp_path / "second.json"
-    assert main(["identify", str(EXAMPLE), "--output", str(first)]) == 0
-    told = json.loads(first.read_text())
+    second = tmp_path / "second.json"
+    told = example[1]
     assert set(told["versions"]) == {"biogrip", "numpy", "scipy"}
     kept = {name: told["assumed"][name] for name in ("gripper", "protocol", "search_range")}
     config = tmp_path / "again.yaml"
@@ -389,15 +397,16 @@ def test_what_is_said_is_enough_to_repeat_it(tmp_path: Path) -> None:
 
 
 def test_the_chosen_model_is_held_against_others(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, example: tuple[str, dict[str, Any]]
 ) -> None:
     """The example is of a drop with a membrane; its parallel damper does not show."""
-    assert main(["identify", str(EXAMPLE), "--output", str(tmp_path / "a.json")]) == 0
-    assert "model is richer than the trace asks for: Maxwell liquid drop" in capsys.readouterr().out
+    assert "model is richer than the trace asks for: Maxwell liquid drop" in example[0]
+    few = tmp_path / "few.yaml"
+    few.write_text("least_squares: {candidates: 100, starts: 4}\n")
     for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
         output = tmp_path / f"{model}.json"
-        assert main(["identify", str(EXAMPLE), "--model", model, "--output", str(output)]) == 0
-        assert said in capsys.readouterr().out
+        done = identify(EXAMPLE, "--config", few, "--model", model, "--output", output)
+        assert said in done.stdout
         assert "generalized_maxwell_3" in [
             row["model"] for row in json.loads(output.read_text())["models"]
         ]

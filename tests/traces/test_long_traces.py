@@ -10,9 +10,12 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
+from biogrip.identifiability.diagnosis import diagnose
 from biogrip.instrument.gripper import Gripper
-from biogrip.own_traces.one_trace import Wanted, identify_trace
+from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.stages import judgement
 from biogrip.response.linear import rotation, step_response
 
 SAMPLES, MEANS_OF = 200_000, 50
@@ -31,9 +34,17 @@ def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
     return path
 
 
-def found_in(path: Path) -> dict[str, Any]:
-    wanted = Wanted(path, MODEL.name, ReadAs(), None)
-    return identify_trace(wanted, path.with_suffix(".json")).data
+def wanted(path: Path) -> Wanted:
+    return Wanted(path, MODEL.name, ReadAs(), None)
+
+
+def judged(path: Path, time_s: Array, rotation_rad: Array) -> dict[str, Any]:
+    """What `identify_trace` finds of the sample, without a word on other models."""
+    study = study_of(wanted(path))
+    (case,) = study.cases.values()
+    fit = judgement.settings_of(study, case).fit(case.problem, time_s, rotation_rad, 0)
+    searched, confidence = case.problem.searched, case.confidence
+    return diagnosis_data(diagnose(fit.problem, searched, fit.found, confidence=confidence))
 
 
 @pytest.mark.parametrize("times", TIMES)
@@ -48,7 +59,7 @@ def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Pat
     trace = clean + 0.1 * clean.max() * _RNG.standard_normal(len(time_s))
     path = written(tmp_path / "every.csv", time_s, trace)
     tracemalloc.start()
-    every = found_in(path)
+    every = identify_trace(wanted(path), tmp_path / "every.json").data
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 400 * len(time_s)
@@ -60,7 +71,7 @@ def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Pat
         np.concatenate([values[group].mean(axis=1) for group in groups])
         for values in (time_s, trace)
     ]
-    fewer = found_in(written(tmp_path / "means.csv", *means))
+    fewer = judged(path, *means)
     for one, other in zip(every["quantities"], fewer["quantities"], strict=True):
         assert one["verdict"] == other["verdict"] == "determined"
         width = np.log(one["high"] / one["low"])
