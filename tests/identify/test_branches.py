@@ -1,11 +1,13 @@
 """Branches are exchangeable; everywhere they are counted from the one that relaxes fastest."""
 
+import functools
+
 import numpy as np
 import pytest
 
 from biogrip.experiment.sample import SampleModel, model_named, with_fixed
 from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.many_profiles import profiles_of
+from biogrip.identifiability.many_profiles import profiles_of, profiles_of_many
 from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
@@ -79,8 +81,10 @@ def test_a_branch_that_is_partly_known_keeps_its_name() -> None:
     np.testing.assert_array_equal(model.in_order(slow_first), np.arange(5)[None])
 
 
-def likelihoods(count: int) -> list[Likelihood]:
-    each = problems(TWO, SAMPLE, count, 3e-3)
+@functools.cache
+def likelihoods() -> list[Likelihood]:
+    """Of three traces."""
+    each = problems(TWO, SAMPLE, 3, 3e-3)
     return [
         likelihood_of(p, np.log(a.parameters), a.misfit_rad, confidence=0.95)
         for p, a in zip(each, identified("least_squares", each), strict=True)
@@ -90,7 +94,7 @@ def likelihoods(count: int) -> list[Likelihood]:
 def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
     """With names free, the fit with a branch at the value of the other is as good as the best."""
     every = parameters_and_sum(TWO)
-    fits = HeldFits(likelihoods(3), every)
+    fits = HeldFits(likelihoods(), every)
     swapped = fits.best[:, [1, 0, 2, 4, 3, 5]]
     for which in (0, 1, 3, 4):
         targets = swapped[:, which]
@@ -100,8 +104,8 @@ def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
 
 def test_intervals_are_those_of_one_branch() -> None:
     quantities = parameters_and_sum(TWO)
-    for likelihood in likelihoods(3):
-        for quantity, found in zip(quantities, profiles_of(likelihood, quantities), strict=True):
+    for profiles in profiles_of_many(likelihoods(), quantities, smooth=False):
+        for quantity, found in zip(quantities, profiles, strict=True):
             if quantity.label in ("k_1", "k_2", "c_1", "c_2"):
                 assert found.low is not None
                 assert found.high is not None
@@ -110,7 +114,7 @@ def test_intervals_are_those_of_one_branch() -> None:
 
 
 def test_one_by_one_profiles_end_where_those_at_once_do() -> None:
-    (likelihood,) = likelihoods(1)
+    likelihood = likelihoods()[0]
     quantities = parameters_and_sum(TWO)[:2]
     for quantity, together in zip(quantities, profiles_of(likelihood, quantities), strict=True):
         alone = profile(likelihood, quantity)

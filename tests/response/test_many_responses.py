@@ -33,7 +33,9 @@ def samples(model: SampleModel, count: int) -> Array:
 
 
 def assert_alike(residuals: Residuals, x: Array) -> None:
-    for rows, point in zip(residuals.condensed_responses(x), x, strict=True):
+    found = residuals.condensed_responses(x)
+    np.testing.assert_array_equal(residuals.condensed_values(x), found[:, 0])
+    for rows, point in zip(found, x, strict=True):
         rotation, slopes = residuals.condensed(point)
         peak = np.abs(rotation).max()
         np.testing.assert_allclose(rows[0], rotation, rtol=0, atol=1e-10 * peak)

@@ -79,7 +79,8 @@ class HeldQuantities:
         first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
         moved = x + by * np.where(sense == 0, powers * first, powers)
         moved = np.clip(moved, self._low, self._high)
-        restored = self.restored(moved, everyone, self._dominant(moved, everyone))
+        dominant = self._dominant(moved, self._slopes(moved, everyone))
+        restored = self.restored(moved, everyone, dominant)
         if np.any(np.isnan(restored)):
             raise ValueError("a quantity is to be held outside its range")
         return restored
@@ -103,8 +104,8 @@ class HeldQuantities:
 
     def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
         """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
-        basic = self._dominant(x, fit)
         slopes = self._slopes(x, fit)
+        basic = self._dominant(x, slopes)
         # Of the eliminated parameter by the others, with a minus; by itself 1.
         ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
         pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
@@ -131,14 +132,14 @@ class HeldQuantities:
             if not len(left):
                 return x
             # That one stays at its bound, and the next has to follow.
-            basic = self._dominant(x[left], fit[left], tried[left])
+            basic = self._dominant(x[left], self._slopes(x[left], fit[left]), tried[left])
             tried[left] |= basic
         x[left] = np.nan
         return x
 
-    def _dominant(self, x: Array, fit: IntArray, tried: BoolArray | None = None) -> BoolArray:
+    def _dominant(self, x: Array, slopes: Array, tried: BoolArray | None = None) -> BoolArray:
         """Mark the member to eliminate, none if all have been tried."""
-        weight = np.abs(self._slopes(x, fit))
+        weight = np.abs(slopes)
         free = (x > self._low + _FREE) & (x < self._high - _FREE)
         weight = np.where(free, weight, _UNWILLING * weight)
         if tried is not None:

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array, ComplexArray
-from biogrip.experiment.network import MOST_BRANCHES
+from biogrip.experiment.network import MOST_BRANCHES, Network
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import LEFT, evaluate, poles, slope_at_poles, transfer_functions
@@ -106,24 +106,21 @@ def polynomials_of(
     """
     count = parameters.shape[1]
     tilts = _tilts(count) if slopes else np.ones((1, count))
-    return _tilted(gripper, model, parameters, tilts, symmetric=symmetric, inertia=inertia)
+    network = model.network(_tilted(parameters, tilts))
+    return _polynomials(gripper, network, len(tilts) - 1, symmetric=symmetric, inertia=inertia)
 
 
-def _tilted(
-    gripper: Gripper,
-    model: SampleModel,
-    parameters: Array,
-    tilts: NDArray[Any],
-    *,
-    symmetric: bool,
-    inertia: bool,
+def _tilted(parameters: Array, tilts: NDArray[Any]) -> NDArray[Any]:
+    return (parameters * tilts[:, None]).reshape(-1, parameters.shape[1])
+
+
+def _polynomials(
+    gripper: Gripper, tilted: Network, count: int, *, symmetric: bool, inertia: bool
 ) -> Polynomials:
-    tilted = (parameters * tilts[:, None]).reshape(-1, parameters.shape[1])
-    transfer = transfer_functions(
-        gripper, model.network(tilted), symmetric=symmetric, inertia=inertia
-    )
-    denominator, denominator_slopes = _untilted(transfer.denominator, len(tilts) - 1)
-    rows = [_untilted(row, len(tilts) - 1) for row in transfer.numerators[LEFT]]
+    """Of n samples, after which there are the same with each of so many parameters tilted."""
+    transfer = transfer_functions(gripper, tilted, symmetric=symmetric, inertia=inertia)
+    denominator, denominator_slopes = _untilted(transfer.denominator, count)
+    rows = [_untilted(row, count) for row in transfer.numerators[LEFT]]
     return Polynomials(
         denominator, denominator_slopes, [row for row, _ in rows], [slope for _, slope in rows]
     )
@@ -167,13 +164,12 @@ def modes_of(
     count = parameters.shape[1]
     # Without slopes still complex: so are quotients rounded.
     tilts = _tilts(count) if slopes else _tilts(count)[:1]
-    network = model.network(parameters[:1])
+    network, tilted = model.network(_tilted(parameters, tilts)), len(tilts) - 1
     if network.k.shape[1] > MOST_BRANCHES:
-        tilted = model.network((parameters * tilts[:, None]).reshape(-1, count))
-        parts = modes_with_slopes(gripper, tilted, _TILT, len(tilts) - 1, symmetric=symmetric)
+        parts = modes_with_slopes(gripper, network, _TILT, tilted, symmetric=symmetric)
         modes = Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
     else:
-        polynomials = _tilted(gripper, model, parameters, tilts, symmetric=symmetric, inertia=False)
+        polynomials = _polynomials(gripper, network, tilted, symmetric=symmetric, inertia=False)
         modes = modes_at(polynomials, poles(polynomials.denominator, real=True))
     return modes if slopes else _level(modes, count)
 

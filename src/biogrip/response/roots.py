@@ -16,13 +16,13 @@ References
 """
 
 from collections.abc import Callable
-from itertools import combinations
+from functools import cache
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array, ComplexArray
+from biogrip.arrays import Array, ComplexArray, IntArray
 
 SMALLEST_GAP = 1e-6
 """Relative distance below which two roots are moved apart.
@@ -127,7 +127,10 @@ def swept(
 def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
     """Move roots that (nearly) coincide symmetrically apart to `SMALLEST_GAP`."""
     z = z.copy()
-    for i, j in combinations(range(z.shape[1]), 2):
+    first, second = _pairs(z.shape[1])
+    if not np.any(np.abs(z[:, first] - z[:, second]) < SMALLEST_GAP * np.abs(z[:, first])):
+        return z
+    for i, j in zip(first, second, strict=True):
         close = np.abs(z[:, i] - z[:, j]) < SMALLEST_GAP * np.abs(z[:, i])
         middle = 0.5 * (z[:, i] + z[:, j])
         z[:, i] = np.where(close, middle * (1 + SMALLEST_GAP / 2), z[:, i])
@@ -135,12 +138,18 @@ def separate(z: NDArray[AnyRoot]) -> NDArray[AnyRoot]:
     return z
 
 
+@cache
+def _pairs(count: int) -> tuple[IntArray, IntArray]:
+    return np.triu_indices(count, 1)
+
+
 def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
-    value = np.zeros_like(z)
-    slope = np.zeros_like(z)
-    for coefficient in coefficients.T[::-1]:
+    highest, *others = coefficients.T[::-1, :, None]
+    slope = highest + np.zeros_like(z)
+    value = slope * z + others[0]
+    for coefficient in others[1:]:
         slope = slope * z + value
-        value = value * z + coefficient[:, None]
+        value = value * z + coefficient
     return value / slope
 
 

@@ -88,9 +88,11 @@ class Whitening:
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))
         """Of the correlation matrix."""
-        basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
-        known = np.zeros((0, len(time_s))) if uncertain is None else self._whitened(uncertain)
-        self.nuisance = with_uncertain(basis, known)
+        self.nuisance = nuisance
+        if len(nuisance) or uncertain is not None:
+            basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
+            known = np.zeros((0, len(time_s))) if uncertain is None else self._whitened(uncertain)
+            self.nuisance = with_uncertain(basis, known)
         """What is taken out, white, (n_functions, n_samples)."""
 
     def __call__(self, rows: Array) -> Array:
