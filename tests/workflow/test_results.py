@@ -80,7 +80,7 @@ def test_every_figure_comes_as_picture_and_for_print(tiny: Path) -> None:
     pictures = sorted((tiny / "results" / "figures").glob("*.png"))
     plan = plan_of(TINY)
     figures = [one for one in products().values() if one.category == "Figures"]
-    assert len(pictures) == sum(len(figure.jobs(plan)) for figure in figures)
+    assert len(pictures) == len([job for figure in figures for job in figure.jobs(plan)])
     for path in pictures:
         assert imread(path).shape[1] >= 200 * COLUMN_IN
         content = path.with_suffix(".pdf").read_bytes()

@@ -6,13 +6,15 @@
 from collections.abc import Callable
 from itertools import product as all_pairs
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.image import imread, imsave
+from matplotlib.image import imread
+from PIL import Image
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS
@@ -124,7 +126,7 @@ def picture(figure: Figure) -> Array:
     with styled():
         label_plainly(figure)
         figure.set_dpi(DPI)
-        canvas = FigureCanvasAgg(figure)
+        canvas: Any = FigureCanvasAgg(figure)
         if (engine := figure.get_layout_engine()) is not None:
             engine.execute(figure)
             # A second time it would come to another layout.
@@ -134,7 +136,7 @@ def picture(figure: Figure) -> Array:
 
 
 def kept(path: Path, found: Array) -> None:
-    imsave(path, found.astype(np.uint8), metadata={"Software": None})
+    Image.fromarray(found.astype(np.uint8)).save(path)
 
 
 def difference(name: str, found: Array) -> float:

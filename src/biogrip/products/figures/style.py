@@ -128,6 +128,5 @@ def _glyphs_alone() -> Iterator[None]:
 def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
     """Label a panel; a title too long for it is cut."""
     short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
-    axes.set_title(f"     {short}", fontsize=_PANEL_SIZE)
-    place = axes.transAxes + axes.titleOffsetTrans
+    place = axes.set_title(f"     {short}", fontsize=_PANEL_SIZE).get_transform()
     axes.text(0, 1, letter, transform=place, fontsize=_PANEL_SIZE, fontweight="bold")
