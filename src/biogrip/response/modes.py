@@ -104,14 +104,13 @@ def polynomials_of(
     slopes
         Whether derivatives are wanted; without, there are those of no parameter.
     """
-    count = parameters.shape[1]
-    tilts = _tilts(count) if slopes else np.ones((1, count))
-    tilted = (parameters * tilts[:, None]).reshape(-1, count)
+    tilted = _tilted(parameters, slopes=slopes)
+    count = len(tilted) // len(parameters) - 1
     transfer = transfer_functions(
         gripper, model.network(tilted), symmetric=symmetric, inertia=inertia
     )
-    denominator, denominator_slopes = _untilted(transfer.denominator, len(tilts) - 1)
-    rows = [_untilted(row, len(tilts) - 1) for row in transfer.numerators[LEFT]]
+    denominator, denominator_slopes = _untilted(transfer.denominator, count)
+    rows = [_untilted(row, count) for row in transfer.numerators[LEFT]]
     return Polynomials(
         denominator, denominator_slopes, [row for row, _ in rows], [slope for _, slope in rows]
     )
@@ -145,15 +144,24 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
     )
 
 
-def modes_of(gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool) -> Modes:
+def modes_of(
+    gripper: Gripper,
+    model: SampleModel,
+    parameters: Array,
+    *,
+    symmetric: bool,
+    slopes: bool = True,
+) -> Modes:
     """Modes of samples without inertia, all real; arguments as of `polynomials_of`."""
     network = model.network(parameters[:1])
     if network.k.shape[1] > MOST_BRANCHES:
-        count = parameters.shape[1]
-        tilted = (parameters * _tilts(count)[:, None]).reshape(-1, count)
+        tilted = _tilted(parameters, slopes=slopes)
+        count = len(tilted) // len(parameters) - 1
         parts = modes_with_slopes(gripper, model.network(tilted), _TILT, count, symmetric=symmetric)
         return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    polynomials = polynomials_of(gripper, model, parameters, symmetric=symmetric, inertia=False)
+    polynomials = polynomials_of(
+        gripper, model, parameters, symmetric=symmetric, inertia=False, slopes=slopes
+    )
     return modes_at(polynomials, poles(polynomials.denominator, real=True))
 
 
@@ -161,6 +169,18 @@ def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
     """Polynomials of n samples, (n, terms), and their derivatives, (n_parameters, n, terms)."""
     of_tilts = coefficients.reshape(count + 1, -1, coefficients.shape[1])
     return of_tilts[0].real, of_tilts[1:].imag / _TILT
+
+
+def _tilted(parameters: Array, *, slopes: bool) -> NDArray[Any]:
+    """Samples, and after them the same with one parameter tilted and another if slopes are wanted.
+
+    Of shape (n (1 + n_parameters), n_parameters), or as they are.
+    """
+    if not slopes:
+        return parameters
+    count = parameters.shape[1]
+    found: ComplexArray = (parameters * _tilts(count)[:, None]).reshape(-1, count)
+    return found
 
 
 @cache
