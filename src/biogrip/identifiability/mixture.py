@@ -66,8 +66,8 @@ class Mixture:
         logs = np.log(np.diagonal(self.factors, axis1=1, axis2=2))
         constant = lgamma((FREEDOM + size) / 2) - lgamma(FREEDOM / 2)
         constant -= 0.5 * size * np.log(FREEDOM * np.pi)
-        peaks = np.log(self.weights) + constant - np.sum(logs, axis=1)
-        return peaks, np.linalg.inv(self.factors).swapaxes(1, 2)
+        peaks: Array = np.log(self.weights) + constant - np.sum(logs, axis=1)
+        return peaks, np.asarray(np.linalg.inv(self.factors), np.float64).swapaxes(1, 2)
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Array:
         """Draw points, (count, n_dimensions)."""
