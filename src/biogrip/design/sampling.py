@@ -169,7 +169,6 @@ def _mixed(
     known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
 ) -> Array:
     """Improve a mixture of fillings, whose information is known, (n_fillings, n, p, p)."""
-
     flat = known.reshape(len(known), -1)
 
     def at(shares: Array) -> tuple[Array, float]:
