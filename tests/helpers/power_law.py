@@ -1,4 +1,10 @@
-"""Power-law samples without the library: Mittag-Leffler functions, and inversion by mpmath."""
+"""Power-law samples without the library: Mittag-Leffler functions, and inversion by Talbot.
+
+References
+----------
+.. [1] J. Abate and P. P. Valkó, Multi-precision Laplace transform inversion, International Journal
+   for Numerical Methods in Engineering 60 (2004), 979-993: the fixed Talbot method.
+"""
 
 import math
 from collections.abc import Callable
@@ -6,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from mpmath import mp, mpf
+from flint import acb, arb, ctx
 from scipy.integrate import quad
 
 from biogrip.arrays import Array
@@ -14,19 +20,20 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Arm, Gripper
 
 Impedance = Callable[[Any], Any]
+_NODES = 45
 
 
 def mittag_leffler(a: float, b: float, x: float) -> float:
     """E_(a,b)(-x) by its series, sum (-x)^k / Gamma(a k + b); terms are as large as e^(x^(1/a))."""
-    with mp.workdps(40 + int(0.9 * x ** (1 / a))):
-        a_, b_, x_ = mpf(a), mpf(b), mpf(x)
-        total, k = mpf(0), 0
+    with ctx.workdps(40 + int(0.9 * x ** (1 / a))):
+        a_, b_, x_ = arb(a), arb(b), arb(x)
+        total, k, power = arb(0), 0, arb(1)
         while True:
-            term = (-x_) ** k * mp.rgamma(a_ * k + b_)
+            term = power * (a_ * k + b_).rgamma()
             total += term
-            if k > x ** (1 / a) / a and abs(term) < mpf(10) ** -30 * abs(total):
-                return float(total)
-            k += 1
+            if k > x ** (1 / a) / a and abs(term) < arb(10) ** -30 * abs(total):
+                return float(total.mid())
+            k, power = k + 1, -power * x_
 
 
 def one_minus_mittag_leffler(a: float, x: float) -> float:
@@ -51,25 +58,33 @@ def one_minus_mittag_leffler(a: float, x: float) -> float:
 
 
 def inverted(transform: Impedance, t: float) -> float:
-    """Inverse Laplace transform at a time, by Talbot's contour."""
-    with mp.workdps(30):
-        return float(mp.invertlaplace(transform, mpf(float(t)), method="talbot", degree=45))
+    """Inverse Laplace transform at a time, by Talbot's contour [1]; it has 0.6 digits a node."""
+    with ctx.workdps(45):
+        radius = arb(2 * _NODES) / 5 / t
+        total = (radius * t).exp() * transform(acb(radius)).real / 2
+        for node in range(1, _NODES):
+            angle = arb.pi() * node / _NODES
+            cotangent = angle.cot()
+            s = radius * angle * acb(cotangent, 1)
+            turn = angle + (angle * cotangent - 1) * cotangent
+            total += ((s * t).exp() * transform(s) * acb(1, turn)).real
+        return float((total * radius / _NODES).mid())
 
 
 def springpot(modulus: float, exponent: float) -> Impedance:
-    return lambda s: mpf(modulus) * s ** mpf(exponent)
+    return lambda s: modulus * s ** arb(exponent)
 
 
 def rotations(
     gripper: Gripper, sample: Impedance, torque: TorqueHistory, time_s: Array, *, inertia: bool
 ) -> Array:
     """Closing rotations of both arms under steps, (2, n_times), from forces on each arm."""
-    with mp.workdps(30):
-        b = mpf(gripper.arm_length_m) * mp.sin(mp.radians(mpf(gripper.reference_angle_deg)))
+    with ctx.workdps(45):
+        b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
 
     def free(arm: Arm, s: Any) -> Any:
-        moment = mpf(arm.inertia_kgm2) * s * s if inertia else 0
-        return moment + mpf(arm.damping_Nms_per_rad) * s + mpf(arm.stiffness_Nm_per_rad)
+        moment = arm.inertia_kgm2 * s * s if inertia else 0
+        return moment + arm.damping_Nms_per_rad * s + arm.stiffness_Nm_per_rad
 
     def transform(torques: tuple[float, float], which: int) -> Impedance:
         def both(s: Any) -> Any:
@@ -77,7 +92,7 @@ def rotations(
             coupled = b * b * sample(s)
             left, right = free(gripper.left, s) + coupled, free(gripper.right, s) + coupled
             determinant = left * right - coupled * coupled
-            loads = [mpf(value) / s for value in torques]
+            loads = [value / s for value in torques]
             first = right * loads[0] - coupled * loads[1]
             second = left * loads[1] - coupled * loads[0]
             return (first, second)[which] / determinant

@@ -2,14 +2,19 @@
 
 Of the corrected linear model's solution nothing is shared with the library: forces of
 springs and dampers are written down arm by arm, as in the corrected eqs. (4)-(6), and the
-five first-order equations solved through the eigenvectors of their matrix.
+five first-order equations solved through the eigenvectors of their matrix. That is done with
+balls, which hold the exact value whatever is rounded, so that how far it is known is known, too.
+
+References
+----------
+.. [1] F. Johansson, Arb: efficient arbitrary-precision midpoint-radius interval arithmetic, IEEE
+   Transactions on Computers 66 (2017), 1281-1292.
 """
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from mpmath import mp, mpf
+from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held
@@ -50,14 +55,17 @@ SAMPLING_TIMES = {
     "uneven": np.sort(np.random.default_rng(2).uniform(0.0, 400.0, 1500)),
     "few": np.array([0.0, 1.0, 5.0, 20.0, 199.0, 201.0, 210.0, 390.0]),
 }
+# Worked with, of which sums of modes and their weights cost up to 60.
+_DIGITS = 120
 
 
 def rotation_50_digits(
     gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:
     """phi_2 of one sample (k, k_p, c, c_p) with inertia, shape (n_times,)."""
-    found = _output_50_digits(gripper, parameters, steps, time_s, of_force=False)
-    return np.array([float(value) for value in found])
+    with ctx.workdps(_DIGITS):
+        given = [arb(float(value)) for value in parameters]
+        return _checked(_output(gripper, given, steps, time_s, of_force=False))
 
 
 def sensitivity_50_digits(
@@ -65,15 +73,15 @@ def sensitivity_50_digits(
 ) -> Array:
     """d phi_2 / d log p by central differences, which with 50 digits lose none of a double's."""
     rows = []
-    with mp.workdps(50):
-        step = mpf(10) ** -15
+    with ctx.workdps(_DIGITS):
+        step = arb(10) ** -15
         for index in range(len(parameters)):
             both = []
             for sign in (1, -1):
-                moved = [mpf(float(value)) for value in parameters]
-                moved[index] *= mp.exp(sign * step)
-                both.append(_output_50_digits(gripper, moved, steps, time_s, of_force=False))
-            rows.append([float((a - b) / (2 * step)) for a, b in zip(*both, strict=True)])
+                moved = [arb(float(value)) for value in parameters]
+                moved[index] *= (sign * step).exp()
+                both.append(_output(gripper, moved, steps, time_s, of_force=False))
+            rows.append([float(((a - b) / (2 * step)).mid()) for a, b in zip(*both, strict=True)])
     return np.array(rows)
 
 
@@ -81,54 +89,64 @@ def jaw_force_50_digits(
     gripper: Gripper, parameters: Array, steps: TorqueHistory, time_s: Array
 ) -> Array:
     """Force of the springs and dampers on the tips in N, shape (n_times,)."""
-    found = _output_50_digits(gripper, parameters, steps, time_s, of_force=True)
-    return np.array([float(value) for value in found])
+    with ctx.workdps(_DIGITS):
+        given = [arb(float(value)) for value in parameters]
+        return _checked(_output(gripper, given, steps, time_s, of_force=True))
 
 
-def _output_50_digits(
+def _output(
     gripper: Gripper,
-    parameters: Sequence[Any] | Array,
+    parameters: Sequence[arb],
     steps: TorqueHistory,
     time_s: Array,
     *,
     of_force: bool,
-) -> list[Any]:
-    with mp.workdps(50):
-        k, k_p, c, c_p = (mpf(value) for value in parameters)
-        b = mpf(gripper.arm_length_m) * mp.sin(mp.radians(mpf(gripper.reference_angle_deg)))
-        inertia, damping, stiffness = (
-            [mpf(getattr(arm, name)) for arm in (gripper.left, gripper.right)]
-            for name in ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
-        )
-        # State: phi_2, phi_4, their rates, and the node x between spring k and damper c.
-        # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
-        force = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k]
-        a = mp.zeros(5)
-        a[0, 2] = a[1, 3] = 1
-        for row, arm in ((2, 0), (3, 1)):
-            for column in range(5):
-                a[row, column] = -b * force[column] / inertia[arm]
-            a[row, arm] -= stiffness[arm] / inertia[arm]
-            a[row, 2 + arm] -= damping[arm] / inertia[arm]
-        # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
-        a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
-        rates, vectors = mp.eig(a)
-        seen = mp.matrix([force if of_force else [1, 0, 0, 0, 0]])
-        found = [mpf(0)] * len(time_s)
-        for start, left, right in zip(
-            steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True
-        ):
-            load = mp.matrix(5, 1)
-            load[2], load[3] = mpf(float(left)) / inertia[0], mpf(float(right)) / inertia[1]
-            rest = mp.lu_solve(a, -load)
-            weights = mp.lu_solve(vectors, -rest)
-            amplitudes = [(seen * vectors[:, j])[0] * weights[j] for j in range(5)]
-            for i, t in enumerate(time_s):
-                elapsed = mpf(float(t)) - mpf(float(start))
-                if elapsed >= 0:
-                    terms = (amplitudes[j] * mp.exp(rates[j] * elapsed) for j in range(5))
-                    found[i] += (seen * rest)[0] + mp.re(mp.fsum(terms))
-        return found
+) -> list[arb]:
+    k, k_p, c, c_p = parameters
+    b = arb(gripper.arm_length_m) * (arb(gripper.reference_angle_deg) / 180).sin_pi()
+    inertia, damping, stiffness = (
+        [arb(getattr(arm, name)) for arm in (gripper.left, gripper.right)]
+        for name in ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
+    )
+    # State: phi_2, phi_4, their rates, and the node x between spring k and damper c.
+    # Force on each tip: k (b phi_2 - x) + k_p delta + c_p delta', delta = b (phi_2 + phi_4).
+    force = [(k + k_p) * b, k_p * b, c_p * b, c_p * b, -k]
+    a = acb_mat(5, 5)
+    a[0, 2] = a[1, 3] = 1
+    for row, arm in ((2, 0), (3, 1)):
+        for column in range(5):
+            a[row, column] = -b * force[column] / inertia[arm]
+        a[row, arm] -= stiffness[arm] / inertia[arm]
+        a[row, 2 + arm] -= damping[arm] / inertia[arm]
+    # k (u_B - x) = c (x' - u_C'), u_B = b phi_2, u_C = -b phi_4.
+    a[4, 0], a[4, 4], a[4, 3] = k / c * b, -k / c, -b
+    rates, vectors = a.eig(right=True)
+    seen = acb_mat([force if of_force else [1, 0, 0, 0, 0]])
+    of_modes = seen * vectors
+    found = [acb(0)] * len(time_s)
+    for start, left, right in zip(steps.time_s, steps.left[:, 0], steps.right[:, 0], strict=True):
+        load = acb_mat(5, 1)
+        load[2, 0], load[3, 0] = arb(float(left)) / inertia[0], arb(float(right)) / inertia[1]
+        rest = a.solve(-load)
+        weights = vectors.solve(-rest)
+        for i, t in enumerate(time_s):
+            elapsed = arb(float(t)) - arb(float(start))
+            if elapsed >= 0:
+                terms = (
+                    of_modes[0, j] * weights[j, 0] * (rates[j] * elapsed).exp() for j in range(5)
+                )
+                found[i] += (seen * rest)[0, 0] + sum(terms, acb(0))
+    return [value.real for value in found]
+
+
+def _checked(values: Sequence[arb]) -> Array:
+    """As doubles, of what is known to 50 digits of the largest."""
+    middle, radius = (
+        np.array([float(of) for of in own])
+        for own in zip(*((value.mid(), value.rad()) for value in values), strict=True)
+    )
+    assert radius.max() < 1e-50 * np.abs(middle).max()
+    return middle
 
 
 def log_range(model: SampleModel) -> tuple[Array, Array]:

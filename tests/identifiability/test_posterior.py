@@ -101,16 +101,23 @@ def test_both_arms_of_a_valley_are_found() -> None:
         assert np.mean(ratios < split) == pytest.approx(wanted, abs=4 * deviation + 0.01)
 
 
-def test_the_same_stream_gives_the_same_samples() -> None:
-    posterior = posterior_of(posed_for(MODELS["maxwell"], *trace_of("liquid_drop_2")))
-    one, other, another = (sample(posterior, seed, FEW).log_parameters for seed in (3, 3, 4))
-    assert one.tobytes() == other.tobytes()
-    assert one.tobytes() != another.tobytes()
-
-
-def test_sampling_stops_at_its_limit_and_says_so() -> None:
+def few_samples(seed: int) -> Samples:
     (problem,) = posed(*clean("liquid_drop_1"), 1)
-    found = sample(posterior_of(problem), 5, FEW)
-    assert len(found.log_parameters) <= 500
-    assert "have not converged" in found.convergence.words()
-    assert "posterior.most_steps" in found.convergence.words()
+    return sample(posterior_of(problem), seed, FEW)
+
+
+@pytest.fixture(scope="module")
+def few() -> Samples:
+    return few_samples(5)
+
+
+def test_the_same_stream_gives_the_same_samples(few: Samples) -> None:
+    other, another = (few_samples(seed).log_parameters for seed in (5, 6))
+    assert few.log_parameters.tobytes() == other.tobytes()
+    assert few.log_parameters.tobytes() != another.tobytes()
+
+
+def test_sampling_stops_at_its_limit_and_says_so(few: Samples) -> None:
+    assert len(few.log_parameters) <= 500
+    assert "have not converged" in few.convergence.words()
+    assert "posterior.most_steps" in few.convergence.words()

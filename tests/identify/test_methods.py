@@ -82,9 +82,9 @@ def test_evaluations_are_counted(
             counted[0] += self.condensable
             return super().condensed(x)
 
-        def condensed_linear(self, x: Array) -> Array:
+        def condensed_linear(self, x: Array, *, slopes: bool = True) -> Array:
             counted[0] += len(x)
-            return super().condensed_linear(x)
+            return super().condensed_linear(x, slopes=slopes)
 
     watched = Problem(misfit, Counting(), posed.genome, posed.low, posed.high)
     assert run(method, watched).evaluations == counted[0]

@@ -34,7 +34,10 @@ def samples(model: SampleModel, count: int) -> Array:
 
 def assert_alike(residuals: Residuals, x: Array) -> None:
     found = residuals.condensed_responses(x)
-    np.testing.assert_array_equal(residuals.condensed_values(x), found[:, 0])
+    # Without derivatives numbers are real, and products of another shape: other last bits.
+    alone = residuals.condensed_responses(x, slopes=False)
+    peaks = np.abs(found[:, :1]).max(axis=2, keepdims=True)
+    assert np.all(np.abs(alone - found[:, :1]) <= 1e-12 * peaks)
     for rows, point in zip(found, x, strict=True):
         rotation, slopes = residuals.condensed(point)
         peak = np.abs(rotation).max()

@@ -24,6 +24,9 @@ from tests.helpers.responses import random_samples
 
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 OTHER = Arm(1.3e-14, 2.5e-12, 5.5e-7)
+# Of a step. What comes out is then 1e-9 of the peak away from where 1e-10 leads, in the worst of
+# all cases here, which is a hundredth of what is asked.
+RADAU = 1e-8
 TIMES = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
 
 
@@ -36,7 +39,7 @@ def tip(gripper: Gripper, phi: float) -> tuple[float, float]:
 def radau(
     gripper: Gripper, sample: Array, torques: list[tuple[float, ...]], time_s: Array
 ) -> tuple[Array, Array]:
-    """Corrected eqs. (1)-(3) without inertia, both arms, by SciPy (rtol 1e-10).
+    """Corrected eqs. (1)-(3) without inertia, both arms, by SciPy, to 1e-9 of the peak.
 
     The damper c_p couples the rates: [c_2 + c_p b_2^2, c_p b_2 b_4; ...] phi' = rest.
     """
@@ -73,8 +76,8 @@ def radau(
             "Radau",
             np.unique(np.append(here, end)),
             args=((left, right),),
-            rtol=1e-10,
-            atol=[1e-17, 1e-17, 1e-20],
+            rtol=RADAU,
+            atol=[1e-15, 1e-15, 1e-18],
         )
         found.append(solved.y[:2, : len(here)])
         state, start = solved.y[:, -1], end
@@ -121,8 +124,8 @@ def symmetric_states(
             "Radau",
             grid,
             args=(tau,),
-            rtol=1e-10,
-            atol=[1e-13 * peak, 1e-13 * peak * gripper.arm_length_m],
+            rtol=RADAU,
+            atol=[1e-11 * peak, 1e-11 * peak * gripper.arm_length_m],
         )
         assert solved.success, solved.message
         phi, y = solved.y[:, : len(here)]

@@ -149,7 +149,7 @@ def by_hand(model: str, sample: list[float]) -> Callable[[Any], Any]:
 
 
 def test_the_ring_against_inversion(gripper: Gripper) -> None:
-    """The first milliseconds, with inertia: de Hoog's method follows the ring."""
+    """The first milliseconds, with inertia: the contour is wide enough for the ring."""
     sample = [0.3, 0.02, 0.5]
     step = torque_history((held(1.0, TAU),))
     times = np.geomspace(2e-5, 2e-3, 12)

@@ -142,10 +142,9 @@ def _information(told: Array, samples: Array) -> Array:
 
 def _seen(inverse: Array, criterion: Criterion, sharpness: float) -> tuple[Array, Array, Array]:
     """Covariances of what is asked for, weights of the samples, and of their information."""
-    asked = np.array(criterion.asked)
-    covariances = inverse[:, asked[:, None], asked]
+    columns = inverse[:, :, criterion.asked]
+    covariances = columns[:, criterion.asked]
     of_samples, z = criterion.weights(covariances, sharpness)
-    columns = inverse[:, :, asked]
     return covariances, of_samples, columns @ z @ columns.swapaxes(1, 2)
 
 
@@ -170,21 +169,27 @@ def _mixed(
     known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
 ) -> Array:
     """Improve a mixture of fillings, whose information is known, (n_fillings, n, p, p)."""
+    flat = known.reshape(len(known), -1)
 
-    def at(shares: Array) -> tuple[float, Array]:
-        inverse = inverted(np.tensordot(shares, known, 1) + before)
-        covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
-        worth = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
-        return criterion.smooth(covariances, sharpness), worth
+    def at(shares: Array) -> tuple[Array, float]:
+        inverse = inverted((shares @ flat).reshape(known.shape[1:]) + before)
+        covariances = inverse[:, :, criterion.asked][:, criterion.asked]
+        return inverse, criterion.smooth(covariances, sharpness)
+
+    def worth_of(inverse: Array) -> Array:
+        _, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
+        found: Array = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
+        return found
 
     power = 1.0 if criterion.name == "D" else 0.5
-    value, worth = at(shares)
+    inverse, value = at(shares)
+    worth = worth_of(inverse)
     for _ in range(_MIXED):
         tried = shares * (worth / worth.max()) ** power
         tried /= tried.sum()
-        new_value, new_worth = at(tried)
+        inverse, new_value = at(tried)
         if new_value <= value:
-            shares, value, worth = tried, new_value, new_worth
+            shares, value, worth = tried, new_value, worth_of(inverse)
             power *= 1.2
         else:
             power *= 0.4

@@ -95,16 +95,14 @@ def remembering(
     .. [1] D. T. Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its
        integral, Physical Review E 54 (1996), 2084-2091.
     """
-    drawn = rng.standard_normal((len(time_s), len(weights)))
-    kept = np.exp(-np.outer(np.diff(time_s), rates_per_s))
-    fresh = np.sqrt(-np.expm1(-2 * np.outer(np.diff(time_s), rates_per_s)))
-    state = drawn[0]
-    total = np.empty(len(time_s))
-    deviations = np.sqrt(weights)
-    total[0] = deviations @ state
-    for index in range(1, len(time_s)):
-        state = kept[index - 1] * state + fresh[index - 1] * drawn[index]
-        total[index] = deviations @ state
+    states = rng.standard_normal((len(time_s), len(weights)))
+    elapsed = np.outer(np.diff(time_s), rates_per_s)
+    states[1:] *= np.sqrt(-np.expm1(-2 * elapsed))
+    left = np.empty(len(weights))
+    for before, kept, state in zip(states[:-1], np.exp(-elapsed), states[1:], strict=True):
+        state += np.multiply(kept, before, out=left)
+    # A product a sample, as whose sums the order does not depend on how many there are.
+    total: Array = (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
     return total
 
 

@@ -87,18 +87,16 @@ class JointResiduals(Residuals):
         """Rows of the traces, (n_rows,) in rad."""
         return self._side_by_side([part.condensed_trace for part in self._parts])
 
-    def condensed_linear(self, log_parameters: Array) -> Array:
+    def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
-        return self._side_by_side([part.condensed_linear(log_parameters) for part in self._parts])
+        return self._side_by_side(
+            [part.condensed_linear(log_parameters, slopes=slopes) for part in self._parts]
+        )
 
-    def condensed_values(self, log_parameters: Array) -> Array:
-        """Of `condensed_responses`, the responses without derivatives, (n, n_rows)."""
-        return self._side_by_side([part.condensed_values(log_parameters) for part in self._parts])
-
-    def condensed_corrections(self, log_parameters: Array) -> Array:
+    def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         return self._side_by_side(
-            [part.condensed_corrections(log_parameters) for part in self._parts]
+            [part.condensed_corrections(log_parameters, slopes=slopes) for part in self._parts]
         )
 
     def shares_responses(self, other: Residuals) -> bool:

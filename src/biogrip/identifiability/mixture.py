@@ -13,6 +13,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import lgamma
 
 import numpy as np
@@ -50,17 +51,23 @@ class Mixture:
 
     def log_density(self, points: Array) -> Array:
         """Logarithm of the density at points (n, n_dimensions), (n,)."""
-        size = points.shape[1]
-        inverse = np.linalg.inv(self.factors)
-        scaled = np.einsum("kij,nkj->nki", inverse, points[:, None] - self.centres)
-        distance = np.sum(scaled**2, axis=2)
+        peaks, scaling = self._peaks
+        scaled = (points - self.centres[:, None]) @ scaling
+        distance = np.einsum("kni,kni->kn", scaled, scaled)
+        each = peaks[:, None] - 0.5 * (FREEDOM + points.shape[1]) * np.log1p(distance / FREEDOM)
+        highest = np.max(each, axis=0)
+        found: Array = highest + np.log(np.sum(np.exp(each - highest), axis=0))
+        return found
+
+    @cached_property
+    def _peaks(self) -> tuple[Array, Array]:
+        """Logarithms of the densities at the centres, (n_clusters,), and what scales distances."""
+        size = self.centres.shape[1]
         logs = np.log(np.diagonal(self.factors, axis1=1, axis2=2))
         constant = lgamma((FREEDOM + size) / 2) - lgamma(FREEDOM / 2)
         constant -= 0.5 * size * np.log(FREEDOM * np.pi)
-        peaks = np.log(self.weights) + constant - np.sum(logs, axis=1)
-        each = peaks - 0.5 * (FREEDOM + size) * np.log1p(distance / FREEDOM)
-        found: Array = np.logaddexp.reduce(each, axis=1)
-        return found
+        peaks: Array = np.log(self.weights) + constant - np.sum(logs, axis=1)
+        return peaks, np.asarray(np.linalg.inv(self.factors), np.float64).swapaxes(1, 2)
 
     def draw(self, count: int, rng: np.random.Generator | np.random.RandomState) -> Array:
         """Draw points, (count, n_dimensions)."""

@@ -198,7 +198,7 @@ class _Ensemble:
         """
         count, size = self._state.coords.shape
         density = partial(self._posterior.log_density, power=power)
-        sampler = emcee.EnsembleSampler(count, size, density, moves=moves, vectorize=True)
+        sampler = _Sampler(count, size, density, moves=moves, vectorize=True)
         start = emcee.State(self._state.coords, random_state=self._state.random_state)
         self._state = sampler.run_mcmc(start, steps, skip_initial_state_check=True)
         chain = sampler.get_chain()
@@ -207,6 +207,14 @@ class _Ensemble:
         best = self._state.coords[[np.argmax(self._state.log_prob)]]
         self._progress(self._evaluations, float(self._posterior.misfit(np.exp(best))[0]))
         return chain, sampler.get_log_prob(), float(np.mean(sampler.acceptance_fraction))
+
+
+class _Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
+    """The sampler, which takes densities as they come: an array without blobs and NaN."""
+
+    def compute_log_prob(self, coords: Array) -> tuple[Array, None]:
+        """Logarithms of the density at points, (n,)."""
+        return self.log_prob_fn(coords), None
 
 
 class _AlongValley(DEMove):  # type: ignore[misc]
@@ -257,8 +265,8 @@ def _of_mixture(
 ) -> tuple[Array, Array]:
     """Draw from a mixture, wherever the walkers are."""
     drawn = _gridded(axes.back(mixture.draw(len(walkers), random)))
-    before, after = (mixture.log_density(axes.of(points)) for points in (walkers, drawn))
-    return drawn, before - after
+    density = mixture.log_density(axes.of(np.concatenate((walkers, drawn))))
+    return drawn, density[: len(walkers)] - density[len(walkers) :]
 
 
 def _gridded(log_parameters: Array) -> Array:

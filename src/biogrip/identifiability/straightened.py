@@ -60,7 +60,8 @@ class Straightened:
         if len(self.members) > 1:
             *others, last = self.members
             ratios = coordinates[:, others]
-            found[:, last] -= np.logaddexp.reduce(np.pad(ratios, ((0, 0), (0, 1))), axis=1)
+            of_last = np.zeros((len(ratios), 1))
+            found[:, last] -= np.logaddexp.reduce(np.concatenate((ratios, of_last), axis=1), axis=1)
             found[:, others] = ratios + found[:, last, None]
         return found
 

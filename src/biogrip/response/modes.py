@@ -104,14 +104,16 @@ def polynomials_of(
     slopes
         Whether derivatives are wanted; without, there are those of no parameter.
     """
+    network, count = _tilted(model, parameters, slopes=slopes)
+    return _polynomials(gripper, network, count, symmetric=symmetric, inertia=inertia)
+
+
+def _tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Network, int]:
+    """Networks of samples, and after them, for slopes, with each of so many parameters tilted."""
+    if not slopes:
+        return model.network(parameters), 0
     count = parameters.shape[1]
-    tilts = _tilts(count) if slopes else np.ones((1, count))
-    network = model.network(_tilted(parameters, tilts))
-    return _polynomials(gripper, network, len(tilts) - 1, symmetric=symmetric, inertia=inertia)
-
-
-def _tilted(parameters: Array, tilts: NDArray[Any]) -> NDArray[Any]:
-    return (parameters * tilts[:, None]).reshape(-1, parameters.shape[1])
+    return model.network((parameters * _tilts(count)[:, None]).reshape(-1, count)), count
 
 
 def _polynomials(
@@ -157,29 +159,13 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
 def modes_of(
     gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
 ) -> Modes:
-    """Modes of samples without inertia, all real; arguments as of `polynomials_of`.
-
-    Where no slopes are wanted all are zero, and the rest is the same to the last bit.
-    """
-    count = parameters.shape[1]
-    # Without slopes still complex: so are quotients rounded.
-    tilts = _tilts(count) if slopes else _tilts(count)[:1]
-    network, tilted = model.network(_tilted(parameters, tilts)), len(tilts) - 1
+    """Modes of samples without inertia, all real; arguments as of `polynomials_of`."""
+    network, count = _tilted(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:
-        parts = modes_with_slopes(gripper, network, _TILT, tilted, symmetric=symmetric)
-        modes = Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    else:
-        polynomials = _polynomials(gripper, network, tilted, symmetric=symmetric, inertia=False)
-        modes = modes_at(polynomials, poles(polynomials.denominator, real=True))
-    return modes if slopes else _level(modes, count)
-
-
-def _level(modes: Modes, count: int) -> Modes:
-    """Give modes zero as the slopes of so many parameters."""
-    slopes = (
-        np.broadcast_to(0.0, (len(of), count, *of.shape[1:])) for of in (modes.rates, modes.weights)
-    )
-    return Modes(modes.rates, modes.weights, *slopes)
+        parts = modes_with_slopes(gripper, network, _TILT, count, symmetric=symmetric)
+        return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
+    polynomials = _polynomials(gripper, network, count, symmetric=symmetric, inertia=False)
+    return modes_at(polynomials, poles(polynomials.denominator, real=True))
 
 
 def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:

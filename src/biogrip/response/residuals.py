@@ -162,54 +162,53 @@ class Residuals:
         """Rows of the trace, (n_rows,) in rad."""
         return self._condensed.of_trace(self._rotation_rad)
 
-    def condensed_responses(self, log_parameters: Array) -> Array:
+    def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Rows of the responses of many samples, the same as of `condensed` before the trace's.
 
         Parameters
         ----------
         log_parameters : (n, n_parameters)
             Natural logarithms of the parameters in SI units.
+        slopes
+            Whether the derivatives are wanted.
 
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
             In rad; first the response, then its derivatives by the log-parameters. NaN where
-            the nonlinear model has no answer.
+            the nonlinear model has no answer. Without `slopes`, (n, 1, n_rows).
         """
-        rows = self.condensed_linear(log_parameters)
-        return rows + self.condensed_corrections(log_parameters) if self.nonlinear else rows
+        rows = self.condensed_linear(log_parameters, slopes=slopes)
+        if self.nonlinear:
+            rows = rows + self.condensed_corrections(log_parameters, slopes=slopes)
+        return rows
 
-    def condensed_linear(self, log_parameters: Array) -> Array:
+    def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
-        parameters, condensed = np.exp(log_parameters), self._condensed
+        parameters, condensed, torque = np.exp(log_parameters), self._condensed, self._torque
         if isinstance(condensed, EverySample):
             rows = ringing_responses(
-                self._gripper, self.model, self._torque, self._time_s, parameters
+                self._gripper, self.model, torque, self._time_s, parameters, slopes=slopes
             )
             return condensed.cleared(rows)
-        modes = modes_of(self._gripper, self.model, parameters, symmetric=self._torque.symmetric)
+        modes = modes_of(
+            self._gripper, self.model, parameters, symmetric=torque.symmetric, slopes=slopes
+        )
         return condensed.of_modes(modes)
 
-    def condensed_values(self, log_parameters: Array) -> Array:
-        """Of `condensed_responses`, the responses without derivatives, (n, n_rows)."""
-        condensed = self._condensed
-        if self.nonlinear or isinstance(condensed, EverySample):
-            return self.condensed_responses(log_parameters)[:, 0]
-        parameters, symmetric = np.exp(log_parameters), self._torque.symmetric
-        modes = modes_of(self._gripper, self.model, parameters, symmetric=symmetric, slopes=False)
-        return condensed.of_modes(modes)[:, 0]
-
-    def condensed_corrections(self, log_parameters: Array) -> Array:
+    def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         # As many modes at once, about.
         few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
         parts = range(0, len(log_parameters), few)
         return np.concatenate(
-            [self._corrections(log_parameters[start : start + few]) for start in parts]
+            [self._corrections(log_parameters[start : start + few], slopes) for start in parts]
         )
 
-    def _corrections(self, log_parameters: Array) -> Array:
-        found = corrections(self._gripper, self.model, self._torque, np.exp(log_parameters))
+    def _corrections(self, log_parameters: Array, slopes: bool) -> Array:
+        found = corrections(
+            self._gripper, self.model, self._torque, np.exp(log_parameters), slopes=slopes
+        )
         condensed = self._condensed
         if isinstance(condensed, EverySample):
             values = np.where(found.converged[:, None], found.at(self._time_s), np.nan)
@@ -237,7 +236,8 @@ class Residuals:
         misfit = np.empty(len(parameters))
         for start in range(0, len(parameters), _AT_ONCE):
             some = slice(start, start + _AT_ONCE)
-            rows = self.condensed_values(np.log(parameters[some])) - self.condensed_trace
+            responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
+            rows = responses - self.condensed_trace
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
         return misfit
 

@@ -66,7 +66,12 @@ def rotation_and_sensitivity(
 
 
 def corrections(
-    gripper: Gripper, model: SampleModel, torque: TorqueHistory, parameters: Array
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    parameters: Array,
+    *,
+    slopes: bool = True,
 ) -> Correction:
     """Nonlinear minus linear rotation of samples, and of those that are a little different.
 
@@ -76,14 +81,18 @@ def corrections(
         What is simulated.
     parameters : (n, n_parameters)
         All positive.
+    slopes
+        Whether the samples that are a little different are wanted.
 
     Returns
     -------
     Correction
-        Of n (1 + 2 n_parameters) samples, see `differences`.
+        Of n (1 + 2 n_parameters) samples, see `differences`; without `slopes`, of n.
     """
     count = parameters.shape[1]
-    steps = _STEP * np.concatenate((np.zeros((1, count)), _both_ways(count)))
+    steps = np.zeros((1, count))
+    if slopes:
+        steps = _STEP * np.concatenate((steps, _both_ways(count)))
     around = (parameters[:, None] * np.exp(steps)).reshape(-1, count)
     return correction(gripper, model.network(around), torque, COARSE)
 

@@ -1,7 +1,7 @@
 """What is wrong with a plain value, in words: what was found, and what is allowed."""
 
 import math
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any
 
@@ -145,11 +145,14 @@ def _shown(value: Any) -> str:
 
 
 def _not_finite(path: tuple[Hashable, ...], value: Any) -> Iterator[Problem]:
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            yield path, f"found {value}, allowed is a finite number."
+        return
     if isinstance(value, Mapping):
-        for key, inner in value.items():
+        inside: Iterable[tuple[Hashable, Any]] = value.items()
+    else:
+        inside = enumerate(value) if isinstance(value, list) else ()
+    for key, inner in inside:
+        if not isinstance(inner, str | int):
             yield from _not_finite((*path, key), inner)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from _not_finite((*path, index), inner)
-    elif isinstance(value, float) and not math.isfinite(value):
-        yield path, f"found {value}, allowed is a finite number."

@@ -1,6 +1,5 @@
 """What a config file holds, and where in which file a key stands."""
 
-import copy
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -79,9 +78,9 @@ def read_config(file: Path) -> dict[str, Any]:
 
 
 def overlaid(base: Any, over: Any) -> Any:
-    """Lay a config block over another: blocks key by key, everything else whole."""
+    """Lay a config block over another: blocks key by key, everything else whole, not copied."""
     if isinstance(base, dict) and isinstance(over, dict):
-        merged = copy.deepcopy(base)
+        merged = dict(base)
         for key, value in over.items():
             merged[key] = overlaid(merged[key], value) if key in merged else value
         return merged

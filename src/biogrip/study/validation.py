@@ -21,6 +21,7 @@ STUDY = Shape(Key(), block=StudyConfig)
 
 _CASE = Shape(Key(), block=CaseBlock)
 _GRIPPER = Shape(Key(), block=Gripper)
+_SCALARS = (float, int, str, type(None))
 _SHOWN = 6
 
 
@@ -72,7 +73,10 @@ def value_problem(key: tuple[str, ...], value: Any) -> str | None:
 def block_problems(path: KeyPath, value: Any) -> Iterator[Problem]:
     """Find what only several keys together can get wrong, in blocks that are else in order."""
     inside = [
-        problem for part, inner in parts(value) for problem in block_problems((*path, part), inner)
+        problem
+        for part, inner in parts(value)
+        if not isinstance(inner, _SCALARS)
+        for problem in block_problems((*path, part), inner)
     ]
     yield from inside
     if not inside and hasattr(value, "problems"):
