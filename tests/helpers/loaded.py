@@ -110,14 +110,20 @@ def _load() -> dict[str, Callable[[], Any]]:
     from snakemake.cli import get_argument_parser
     from snakemake.cli import main as snakemake_main
 
-    from biogrip.cli import main
+    from biogrip.__main__ import main
     from biogrip.products.catalogue import products
     from biogrip.products.figures.style import figure, styled
     from biogrip.running.source_files import fingerprint
 
     # What either imports only when it is needed.
     get_argument_parser()
-    for name in ("smart_open", "snakemake.report", "scipy.interpolate", "scipy.ndimage"):
+    for name in (
+        "biogrip.cli",
+        "smart_open",
+        "snakemake.report",
+        "scipy.interpolate",
+        "scipy.ndimage",
+    ):
         import_module(name)
     for product in products().values():
         fingerprint(product.module)
