@@ -3,7 +3,7 @@
 Loading them takes longer than most of what tests call them for. So a process loads both, and
 forks for each call: folder, environment and output of a call are its own, as those of a program
 that is started. The jobs of a run ask it, too: for their shell `biogrip` is `asking.py`; and so
-does `biogrip run` for Snakemake.
+does `biogrip run` for Snakemake. In an environment of another tree's code, that is loaded anew.
 """
 
 import atexit
@@ -27,6 +27,7 @@ from typing import IO, Any, NoReturn
 from tests.helpers import asking
 
 _SECONDS = 600
+PROGRAMS = {"biogrip": "biogrip.__main__", "snakemake": "snakemake.cli"}
 # Python as `biogrip` knows it, which starts Snakemake by it.
 PYTHON = """#!/bin/sh
 case "$2" in biogrip.running.snakemake_process) shift 2; exec {client} snakemake "$@" ;; esac
@@ -90,7 +91,7 @@ def _place() -> str:
 
 
 def _serve(place: str) -> None:
-    programs = _load()
+    _load()
     # Else a call would copy all that is loaded, to count what refers to it.
     gc.freeze()
     with socket.socket(socket.AF_UNIX) as listening:
@@ -102,15 +103,13 @@ def _serve(place: str) -> None:
             with connection:
                 if not os.fork():
                     listening.close()
-                    _answer(connection, programs, Path(place).parent)
+                    _answer(connection, Path(place).parent)
             _reap()
 
 
-def _load() -> dict[str, Callable[[], Any]]:
+def _load() -> None:
     from snakemake.cli import get_argument_parser
-    from snakemake.cli import main as snakemake_main
 
-    from biogrip.__main__ import main
     from biogrip.products.catalogue import products
     from biogrip.products.figures.style import figure, styled
     from biogrip.running.source_files import fingerprint
@@ -118,6 +117,7 @@ def _load() -> dict[str, Callable[[], Any]]:
     # What either imports only when it is needed.
     get_argument_parser()
     for name in (
+        "biogrip.__main__",
         "biogrip.cli",
         "smart_open",
         "snakemake.report",
@@ -132,12 +132,9 @@ def _load() -> dict[str, Callable[[], Any]]:
         drawn.subplots().set_title("$10^{-1}$")
         for kind in ("png", "pdf"):
             drawn.savefig(BytesIO(), format=kind)
-    return {"biogrip": main, "snakemake": snakemake_main}
 
 
-def _answer(
-    connection: socket.socket, programs: Mapping[str, Callable[[], Any]], place: Path
-) -> None:
+def _answer(connection: socket.socket, place: Path) -> None:
     """Run what is asked for in a process of its own, and say how that ended."""
     (program, *arguments), folder, environment, files = asking.asked(connection)
     child = os.fork()
@@ -147,14 +144,23 @@ def _answer(
             os.dup2(file, number)
             os.close(file)
         os.chdir(folder)
+        if environment.get("PYTHONPATH") != os.environ.get("PYTHONPATH"):
+            _unload(environment["PYTHONPATH"])
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [program, *arguments]
         if program == "biogrip":
             sys.executable = f"{place}/python"
-        _end(programs[program])
+        _end(import_module(PROGRAMS[program]).main)
     asking.answer(connection, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     os._exit(0)
+
+
+def _unload(tree: str) -> None:
+    """Forget this tree's code, so that another's is found."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == "biogrip"]:
+        del sys.modules[name]
+    sys.path.insert(0, tree)
 
 
 def _end(program: Callable[[], Any]) -> NoReturn:

@@ -93,26 +93,28 @@ def snakemake(
     *arguments: str,
     config: str = SMALL,
     environment: dict[str, str] | None = None,
-    root: Path = ROOT,
+    tree: "Tree | None" = None,
 ) -> Run:
     """Run the repository's workflow in a folder of its own, over a config laid on the default.
 
-    In an environment of its own, or of another tree's code, by a program that is started.
+    In an environment of its own by a program that is started.
     """
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
     jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
+    root = ROOT if tree is None else tree.root
     given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
     given += ["--configfile", str(overlay)]
-    if root == ROOT and environment is None:
+    if environment is None:
+        place = os.environ if tree is None else tree.environment
         with NamedTemporaryFile("w+") as said:
-            status = loaded.call("snakemake", given, root, os.environ, (said, said))
+            status = loaded.call("snakemake", given, root, place, (said, said))
             said.seek(0)
             return Run(status, said.read())
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", *given],
         cwd=root,
-        env={**os.environ, **(environment or {})},
+        env={**os.environ, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -152,9 +154,7 @@ class Tree:
 
     def run(self, *arguments: str, config: str = SMALL) -> Run:
         """Run the copy's workflow in its study."""
-        return snakemake(
-            self.study, *arguments, root=self.root, environment=self.environment, config=config
-        )
+        return snakemake(self.study, *arguments, tree=self, config=config)
 
 
 def copied_tree(folder: Path) -> Tree:
