@@ -24,9 +24,15 @@ from pathlib import Path
 from select import select
 from typing import IO, Any, NoReturn
 
+import pytest
+
+from biogrip.products.figures import declared
 from tests.helpers import asking
+from tests.helpers.pictures import in_coarse_dots
 
 _SECONDS = 600
+# Set in the environment of calls of which no picture is looked at.
+COARSE = "COARSE_PICTURES"
 PROGRAMS = {"biogrip": "biogrip.__main__", "snakemake": "snakemake.cli"}
 # Python as `biogrip` knows it, which starts Snakemake by it.
 PYTHON = """#!/bin/sh
@@ -149,6 +155,8 @@ def _answer(connection: socket.socket, place: Path) -> None:
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [program, *arguments]
+        if COARSE in environment:
+            pytest.MonkeyPatch().setattr(declared, "save", in_coarse_dots)
         if program == "biogrip":
             sys.executable = f"{place}/python"
         _end(import_module(PROGRAMS[program]).main)

@@ -3,7 +3,18 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.image import imread
+
+from biogrip.files import written_whole
+
+
+def in_coarse_dots(figure: Figure, png: Path) -> None:
+    """Save a figure where no more of it is looked at than that it is drawn, and no PDF."""
+    with written_whole(png) as scratch:
+        figure.savefig(scratch, format="png", dpi=60)
+    with written_whole(png.with_suffix(".pdf")) as scratch:
+        scratch.touch()
 
 
 def assert_drawn(path: Path) -> None:

@@ -6,17 +6,15 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from matplotlib.figure import Figure
 
 from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.files import written_whole
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures import declared
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
-from tests.helpers.pictures import assert_drawn
+from tests.helpers.pictures import assert_drawn, in_coarse_dots
 from tests.helpers.places import ROOT
 from tests.helpers.runs import built_once
 
@@ -87,13 +85,6 @@ def made(folder: Path) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(declared, "save", in_coarse_dots)
         make_in_process(folder, study_of(CASES), WANTED)
-
-
-def in_coarse_dots(figure: Figure, png: Path) -> None:
-    with written_whole(png) as scratch:
-        figure.savefig(scratch, format="png", dpi=60)
-    with written_whole(png.with_suffix(".pdf")) as scratch:
-        scratch.touch()
 
 
 @pytest.mark.parametrize("name", NAMES)
