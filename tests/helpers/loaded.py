@@ -64,12 +64,17 @@ def call(
         Files for its output and its errors.
     """
     place = _place()
-    told = {**environment, "BASH_ENV": f"{place}/functions"}
+    told = for_jobs(environment)
     with open(os.devnull) as nothing:
         files = [nothing.fileno(), *(file.fileno() for file in outputs)]
         return asking.ask(
             f"{place}/socket", [program, *arguments], str(folder), told, files, _SECONDS
         )
+
+
+def for_jobs(environment: Mapping[str, str]) -> dict[str, str]:
+    """An environment in which a Snakemake's jobs ask the process that is loaded."""
+    return {**environment, "BASH_ENV": f"{_place()}/functions"}
 
 
 @cache

@@ -5,7 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -62,7 +62,7 @@ cases:
 
 @dataclass(frozen=True)
 class Run:
-    """What a call of Snakemake came to."""
+    """What a call of a program came to."""
 
     status: int
     output: str
@@ -106,11 +106,7 @@ def snakemake(
     given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
     given += ["--configfile", str(overlay)]
     if environment is None:
-        place = os.environ if tree is None else tree.environment
-        with NamedTemporaryFile("w+") as said:
-            status = loaded.call("snakemake", given, root, place, (said, said))
-            said.seek(0)
-            return Run(status, said.read())
+        return _loaded("snakemake", given, root, os.environ if tree is None else tree.environment)
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", *given],
         cwd=root,
@@ -121,6 +117,20 @@ def snakemake(
         timeout=600,
     )
     return Run(done.returncode, done.stdout)
+
+
+def _loaded(
+    program: str, arguments: Sequence[str], folder: Path, environment: Mapping[str, str]
+) -> Run:
+    with NamedTemporaryFile("w+") as said:
+        status = loaded.call(program, arguments, folder, environment, (said, said))
+        said.seek(0)
+        return Run(status, said.read())
+
+
+def called(folder: Path, *arguments: str | Path) -> Run:
+    """Run a command of the command line in a folder, by a process that is loaded already."""
+    return _loaded("biogrip", [*map(str, arguments)], folder, os.environ)
 
 
 def biogrip(folder: Path, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
