@@ -16,6 +16,7 @@ from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_histo
 from biogrip.instrument.gripper import Arm, Gripper
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
+from tests.helpers.pictures import in_coarse_dots
 from tests.helpers.places import EXAMPLE
 from tests.helpers.runs import RECORDED, SMALL, TINY, built_once, snakemake
 
@@ -72,13 +73,16 @@ def steps(phases: tuple[Phase, ...]) -> TorqueHistory:
 
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
-    """Results of a small study, one for all workers; Snakemake does not know of them."""
-    return built_once(
-        "finished",
-        lambda folder: make_in_process(folder, study_of(SMALL)),
-        tmp_path_factory,
-        worker_id,
-    )
+    """Results of a small study, one for all workers; Snakemake does not know of them.
+
+    Its figures are not those that users see, which `tiny` has.
+    """
+
+    def make(folder: Path) -> None:
+        with in_coarse_dots():
+            make_in_process(folder, study_of(SMALL))
+
+    return built_once("finished", make, tmp_path_factory, worker_id)
 
 
 @pytest.fixture(scope="session")

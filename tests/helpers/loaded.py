@@ -17,6 +17,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from functools import cache
 from importlib import import_module
 from io import BytesIO
@@ -24,9 +25,6 @@ from pathlib import Path
 from select import select
 from typing import IO, Any, NoReturn
 
-import pytest
-
-from biogrip.products.figures import declared
 from tests.helpers import asking
 from tests.helpers.pictures import in_coarse_dots
 
@@ -160,11 +158,10 @@ def _answer(connection: socket.socket, place: Path) -> None:
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [program, *arguments]
-        if COARSE in environment:
-            pytest.MonkeyPatch().setattr(declared, "save", in_coarse_dots)
         if program == "biogrip":
             sys.executable = f"{place}/python"
-        _end(import_module(PROGRAMS[program]).main)
+        with in_coarse_dots() if COARSE in environment else nullcontext():
+            _end(import_module(PROGRAMS[program]).main)
     asking.answer(connection, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     os._exit(0)
 

@@ -1,18 +1,31 @@
-"""What can be said of a picture without knowing what it should show."""
+"""Pictures of which no more is asked than that they are drawn."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from biogrip.files import written_whole
+from biogrip.products.figures import declared
+
+_DOTS_PER_INCH = 60
 
 
-def in_coarse_dots(figure: Figure, png: Path) -> None:
-    """Save a figure where no more of it is looked at than that it is drawn, and no PDF."""
+@contextmanager
+def in_coarse_dots() -> Iterator[None]:
+    """Save figures quickly: as PNG in coarse dots, and as PDF without anything."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(declared, "save", _save_coarsely)
+        yield
+
+
+def _save_coarsely(figure: Figure, png: Path) -> None:
     with written_whole(png) as scratch:
-        figure.savefig(scratch, format="png", dpi=60)
+        figure.savefig(scratch, format="png", dpi=_DOTS_PER_INCH)
     with written_whole(png.with_suffix(".pdf")) as scratch:
         scratch.touch()
 

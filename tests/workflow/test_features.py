@@ -10,7 +10,6 @@ import yaml
 from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
-from biogrip.products.figures import declared
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
@@ -82,9 +81,7 @@ def study(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Path:
 
 
 def made(folder: Path) -> None:
-    """Make what is wanted, with pictures that show no more than that they are drawn."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(declared, "save", in_coarse_dots)
+    with in_coarse_dots():
         make_in_process(folder, study_of(CASES), WANTED)
 
 

@@ -25,7 +25,7 @@ from biogrip.products.figures.profiles import Settings as ProfileSettings
 from biogrip.products.figures.profiles import draw_profiles
 from biogrip.products.figures.residual_diagnosis import draw_residuals
 from biogrip.products.figures.results import fit_of
-from biogrip.products.figures.style import styled
+from biogrip.products.figures.style import save_png, styled
 from biogrip.products.pages.png_address import png_address
 
 
@@ -85,5 +85,5 @@ def _figures(identified: Identified) -> dict[str, Figure]:
 def embedded(drawn: Figure) -> str:
     """Return a figure as the source of an image on a page."""
     content = io.BytesIO()
-    drawn.savefig(content, format="png", metadata={"Software": None})
+    save_png(drawn, content)
     return png_address(content.getvalue())

@@ -19,8 +19,8 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import Parameter, Sample, with_fixed
+from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.profiles import decade_ticks
 from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, PAGE_IN, SHADE, figure
 from biogrip.products.files.posterior import SAMPLES, TOLD, read_posterior, read_samples
 from biogrip.products.product import JUDGEMENT, the

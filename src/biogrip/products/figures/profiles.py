@@ -1,6 +1,5 @@
 """Profile likelihoods: what chi-squared says against other values of a quantity."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
+from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.products.files.verdicts import PATH, read_verdicts
@@ -109,21 +109,6 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
     roots = np.sqrt(np.clip(np.array(profile["rises"])[places], 0.0, 4 * _HIGHEST))
     dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
     return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
-
-
-def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
-    """Return three ticks of a logarithmic axis at most, and their labels, that do not collide."""
-    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
-    decades = list(range(first, last + 1))
-    if len(decades) >= 2:
-        step = -(-(len(decades) - 1) // 2)
-        chosen = decades[::step]
-        return [10.0**d for d in chosen], [f"$10^{{{d}}}$" for d in chosen]
-    steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
-    found = [value for value in steps if low <= value <= high]
-    # Their labels are wide.
-    inside = [found[0], found[-1]] if len(found) > 2 else found
-    return inside, [f"{value:g}" for value in inside]
 
 
 def _limits(axes: Axes, item: dict[str, Any]) -> None:
