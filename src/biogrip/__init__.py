@@ -7,8 +7,6 @@ What a notebook needs stands in `biogrip.library`, and can be had from here::
     experiment = biogrip.set_up(gripper, protocol, biogrip.Sample("liquid_drop"))
 """
 
-from importlib import import_module
-
 __version__ = "0.1.0"
 
 
@@ -24,5 +22,8 @@ _LIBRARY = frozenset(
 def __getattr__(name: str) -> object:
     # Jobs import this package hundreds of times, and the library never.
     if name in _LIBRARY:
+        # Nor anything else, before it can be stopped without a stack.
+        from importlib import import_module
+
         return getattr(import_module("biogrip.library"), name)
     raise AttributeError(f"module 'biogrip' has no attribute '{name}'")

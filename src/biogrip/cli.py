@@ -1,15 +1,12 @@
 """The ``biogrip`` command."""
 
 import argparse
-import atexit
-import gc
 import os
 import signal
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
@@ -25,15 +22,9 @@ _SHOWN = 200
 
 # Imports stay inside their command: a job pays only for what it uses.
 
-_MESSAGES = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
-_stops: list[signal.Signals] = []
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; return its exit status."""
-    if arguments is None:
-        # A fifth of a short job's time would go into looking for cycles when the process ends.
-        atexit.register(gc.freeze)
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = _parser()
     if given[:1] == ["run"] and not {"-h", "--help"} & set(given):
@@ -42,10 +33,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options.rest = given[1:]
     else:
         options = parser.parse_args(given)
-    for number in _MESSAGES:
-        # Ignored, as with nohup, it stays so.
-        if signal.getsignal(number) != signal.SIG_IGN:
-            signal.signal(number, _stop)
     # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -68,12 +55,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         place = "" if error.filename is None else f"{str(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
-    except (KeyboardInterrupt, ImportError, SystemError):
-        # A library that was being loaded may have made another error of it.
-        if not _stops:
-            raise
-        print(f"biogrip: {_MESSAGES[_stops[0]]}; nothing was written by halves.", file=sys.stderr)
-        return 128 + _stops[0]
     return options.status
 
 
@@ -84,12 +65,6 @@ def _refuse_others(path: Path, scratch: Path) -> None:
         from biogrip.running.wholeness import refuse_others
 
         refuse_others(Manifest(RESULTS), RESULTS, [path])
-
-
-def _stop(number: int, _: FrameType | None) -> None:
-    _stops.append(signal.Signals(number))
-    # Scratch files are tidied up on the way out.
-    raise KeyboardInterrupt
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
+from biogrip.stopping import unfinished
 
 Watch = Callable[[Path, Path], None]
 """Is told of a file, and of the scratch file with its contents, just before it is in place."""
@@ -33,6 +34,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         If the file cannot be written.
     """
     scratch = scratch_of(path)
+    unfinished.add(str(scratch))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
@@ -45,6 +47,7 @@ def written_whole(path: Path) -> Iterator[Path]:
         # Why it could not be written is said already.
         with suppress(OSError):
             scratch.unlink(missing_ok=True)
+        unfinished.discard(str(scratch))
 
 
 def scratch_of(path: Path) -> Path:

@@ -6,9 +6,8 @@ process for each job has to be started, which takes most of the time of a small 
 """
 
 import shlex
-import signal
-from collections.abc import Iterable, Iterator
-from contextlib import chdir, contextmanager
+from collections.abc import Iterable
+from contextlib import chdir
 from pathlib import Path
 
 from biogrip.cli import main
@@ -31,7 +30,7 @@ def make_in_process(folder: Path, study: Study, wanted: Iterable[str] | None = N
     wanted
         Files from the folder on; all that a run makes if that is not given.
     """
-    with chdir(folder), _signals_kept():
+    with chdir(folder):
         results = Path("results")
         write_study(study, results)
         plan = Plan(study, results)
@@ -40,14 +39,6 @@ def make_in_process(folder: Path, study: Study, wanted: Iterable[str] | None = N
         makers = _makers(sheets)
         for file in makers if wanted is None else wanted:
             _make(file, makers)
-
-
-@contextmanager
-def _signals_kept() -> Iterator[None]:
-    """A command handles SIGTERM as is right for a process of its own."""
-    before = signal.getsignal(signal.SIGTERM)
-    yield
-    signal.signal(signal.SIGTERM, before)
 
 
 def inputs_and_outputs(study: Study) -> tuple[set[str], set[str]]:

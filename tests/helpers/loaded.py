@@ -3,7 +3,7 @@
 Loading them takes longer than most of what tests call them for. So a process loads both, and
 forks for each call: folder, environment and output of a call are its own, as those of a program
 that is started. The jobs of a run ask it, too: for their shell `biogrip` is `asking.py`; and so
-does `biogrip run` for Snakemake.
+does `biogrip run` for Snakemake. In an environment of another tree's code, that is loaded anew.
 """
 
 import atexit
@@ -17,6 +17,7 @@ import sys
 import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from functools import cache
 from importlib import import_module
 from io import BytesIO
@@ -25,8 +26,12 @@ from select import select
 from typing import IO, Any, NoReturn
 
 from tests.helpers import asking
+from tests.helpers.pictures import in_coarse_dots
 
 _SECONDS = 600
+# Set in the environment of calls of which no picture is looked at.
+COARSE = "COARSE_PICTURES"
+PROGRAMS = {"biogrip": "biogrip.__main__", "snakemake": "snakemake.cli"}
 # Python as `biogrip` knows it, which starts Snakemake by it.
 PYTHON = """#!/bin/sh
 case "$2" in biogrip.running.snakemake_process) shift 2; exec {client} snakemake "$@" ;; esac
@@ -57,12 +62,17 @@ def call(
         Files for its output and its errors.
     """
     place = _place()
-    told = {**environment, "BASH_ENV": f"{place}/functions"}
+    told = for_jobs(environment)
     with open(os.devnull) as nothing:
         files = [nothing.fileno(), *(file.fileno() for file in outputs)]
         return asking.ask(
             f"{place}/socket", [program, *arguments], str(folder), told, files, _SECONDS
         )
+
+
+def for_jobs(environment: Mapping[str, str]) -> dict[str, str]:
+    """An environment in which a Snakemake's jobs ask the process that is loaded."""
+    return {**environment, "BASH_ENV": f"{_place()}/functions"}
 
 
 @cache
@@ -90,7 +100,7 @@ def _place() -> str:
 
 
 def _serve(place: str) -> None:
-    programs = _load()
+    _load()
     # Else a call would copy all that is loaded, to count what refers to it.
     gc.freeze()
     with socket.socket(socket.AF_UNIX) as listening:
@@ -102,22 +112,27 @@ def _serve(place: str) -> None:
             with connection:
                 if not os.fork():
                     listening.close()
-                    _answer(connection, programs, Path(place).parent)
+                    _answer(connection, Path(place).parent)
             _reap()
 
 
-def _load() -> dict[str, Callable[[], Any]]:
+def _load() -> None:
     from snakemake.cli import get_argument_parser
-    from snakemake.cli import main as snakemake_main
 
-    from biogrip.cli import main
     from biogrip.products.catalogue import products
     from biogrip.products.figures.style import figure, styled
     from biogrip.running.source_files import fingerprint
 
     # What either imports only when it is needed.
     get_argument_parser()
-    for name in ("smart_open", "snakemake.report", "scipy.interpolate", "scipy.ndimage"):
+    for name in (
+        "biogrip.__main__",
+        "biogrip.cli",
+        "smart_open",
+        "snakemake.report",
+        "scipy.interpolate",
+        "scipy.ndimage",
+    ):
         import_module(name)
     for product in products().values():
         fingerprint(product.module)
@@ -126,12 +141,9 @@ def _load() -> dict[str, Callable[[], Any]]:
         drawn.subplots().set_title("$10^{-1}$")
         for kind in ("png", "pdf"):
             drawn.savefig(BytesIO(), format=kind)
-    return {"biogrip": main, "snakemake": snakemake_main}
 
 
-def _answer(
-    connection: socket.socket, programs: Mapping[str, Callable[[], Any]], place: Path
-) -> None:
+def _answer(connection: socket.socket, place: Path) -> None:
     """Run what is asked for in a process of its own, and say how that ended."""
     (program, *arguments), folder, environment, files = asking.asked(connection)
     child = os.fork()
@@ -141,14 +153,24 @@ def _answer(
             os.dup2(file, number)
             os.close(file)
         os.chdir(folder)
+        if environment.get("PYTHONPATH") != os.environ.get("PYTHONPATH"):
+            _unload(environment["PYTHONPATH"])
         os.environ.clear()
         os.environ.update(environment)
         sys.argv = [program, *arguments]
         if program == "biogrip":
             sys.executable = f"{place}/python"
-        _end(programs[program])
+        with in_coarse_dots() if COARSE in environment else nullcontext():
+            _end(import_module(PROGRAMS[program]).main)
     asking.answer(connection, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
     os._exit(0)
+
+
+def _unload(tree: str) -> None:
+    """Forget this tree's code, so that another's is found."""
+    for name in [name for name in sys.modules if name.partition(".")[0] == "biogrip"]:
+        del sys.modules[name]
+    sys.path.insert(0, tree)
 
 
 def _end(program: Callable[[], Any]) -> NoReturn:

@@ -5,7 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import NamedTemporaryFile
@@ -62,7 +62,7 @@ cases:
 
 @dataclass(frozen=True)
 class Run:
-    """What a call of Snakemake came to."""
+    """What a call of a program came to."""
 
     status: int
     output: str
@@ -93,32 +93,44 @@ def snakemake(
     *arguments: str,
     config: str = SMALL,
     environment: dict[str, str] | None = None,
-    root: Path = ROOT,
+    tree: "Tree | None" = None,
 ) -> Run:
     """Run the repository's workflow in a folder of its own, over a config laid on the default.
 
-    In an environment of its own, or of another tree's code, by a program that is started.
+    In an environment of its own by a program that is started.
     """
     overlay = folder / "overlay.yaml"
     overlay.write_text(config)
     jobs = () if any(a.startswith(("-j", "--profile")) for a in arguments) else ("-j2",)
+    root = ROOT if tree is None else tree.root
     given = [*jobs, *arguments, "--snakefile", str(root / "Snakefile"), "--directory", str(folder)]
     given += ["--configfile", str(overlay)]
-    if root == ROOT and environment is None:
-        with NamedTemporaryFile("w+") as said:
-            status = loaded.call("snakemake", given, root, os.environ, (said, said))
-            said.seek(0)
-            return Run(status, said.read())
+    if environment is None:
+        return _loaded("snakemake", given, root, os.environ if tree is None else tree.environment)
     done = subprocess.run(
         [sys.executable, "-m", "snakemake", *given],
         cwd=root,
-        env={**os.environ, **(environment or {})},
+        env={**os.environ, **environment},
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
         timeout=600,
     )
     return Run(done.returncode, done.stdout)
+
+
+def _loaded(
+    program: str, arguments: Sequence[str], folder: Path, environment: Mapping[str, str]
+) -> Run:
+    with NamedTemporaryFile("w+") as said:
+        status = loaded.call(program, arguments, folder, environment, (said, said))
+        said.seek(0)
+        return Run(status, said.read())
+
+
+def called(folder: Path, *arguments: str | Path) -> Run:
+    """Run a command of the command line in a folder, by a process that is loaded already."""
+    return _loaded("biogrip", [*map(str, arguments)], folder, os.environ)
 
 
 def biogrip(folder: Path, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
@@ -152,9 +164,7 @@ class Tree:
 
     def run(self, *arguments: str, config: str = SMALL) -> Run:
         """Run the copy's workflow in its study."""
-        return snakemake(
-            self.study, *arguments, root=self.root, environment=self.environment, config=config
-        )
+        return snakemake(self.study, *arguments, tree=self, config=config)
 
 
 def copied_tree(folder: Path) -> Tree:

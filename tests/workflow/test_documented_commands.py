@@ -45,11 +45,12 @@ LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
-# A trace fitted from few starts, and with few models.
+# A trace fitted from few starts, and with few models; where it is asked for, a short posterior.
 TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
+SHORT = "posterior: {walkers: 20, most_steps: 1000}\n"
 
 
 @pytest.fixture(scope="module")
@@ -78,21 +79,20 @@ def test_what_is_said_can_be_done(
     needed = "cases:" not in text or "[liquid_drop_2]" in text
     (place.root / "tiny.yaml").write_text(TINY if needed else f"{TINY}  liquid_drop_2: null\n")
     (place.root / "tiny_fit.yaml").write_text(TINY_FIT)
+    (place.root / "short.yaml").write_text(TINY_FIT + SHORT)
     blocks = BLOCK.findall(text)
     # Else the copy's code is the repository's, which is loaded already.
     own_code = any(title.endswith(".py") for _, title, _ in blocks)
+    environment = place.environment if own_code else {**os.environ, loaded.COARSE: "1"}
     for language, title, content in blocks:
         if title:
-            (place.root / title).write_text(content)
+            of_a_fit = re.search(f"identify .*--config {title}", text)
+            (place.root / title).write_text(content + (TINY_FIT if of_a_fit else ""))
         elif language == "sh":
             for line in content.splitlines():
-                words = _typed(shlex.split(line, comments=True))
-                if own_code:
-                    _run(["-m", "biogrip", *words], place)
-                else:
-                    _call(words, place)
+                _call(_typed(shlex.split(line, comments=True)), place.root, environment)
         elif language == "python":
-            _run(["-c", content], place)
+            _run(content, place)
     assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
 
 
@@ -103,22 +103,23 @@ def _typed(words: list[str]) -> list[str]:
     if arguments[0] == "run":
         return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
     if arguments[0] == "identify" and "--config" not in arguments:
-        return [*arguments, "--config", "tiny_fit.yaml"]
+        config = "short.yaml" if "--posterior" in arguments else "tiny_fit.yaml"
+        return [*arguments, "--config", config]
     return arguments
 
 
-def _call(arguments: list[str], place: Tree) -> None:
+def _call(arguments: list[str], folder: Path, environment: dict[str, str]) -> None:
     with TemporaryFile("w+") as said:
-        status = loaded.call("biogrip", arguments, place.root, os.environ, (said, said))
+        status = loaded.call("biogrip", arguments, folder, environment, (said, said))
         said.seek(0)
         assert status == 0, said.read()
 
 
-def _run(arguments: list[str], place: Tree) -> None:
+def _run(code: str, place: Tree) -> None:
     done = subprocess.run(
-        [sys.executable, *arguments],
+        [sys.executable, "-c", code],
         cwd=place.root,
-        env={**os.environ, **place.environment},
+        env=place.environment,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 import psutil
@@ -14,8 +15,9 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
+from tests.helpers import loaded
 from tests.helpers.places import CONFIG, ROOT
-from tests.helpers.runs import TINY, biogrip, results_of, snakemake
+from tests.helpers.runs import TINY, called, results_of, snakemake
 
 BAD = {
     "misspelt key": ("seedz: 3", "overlay.yaml, line 1: seedz: unknown key. Did you mean 'seeds'?"),
@@ -79,12 +81,12 @@ def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -
     batch = tiny_copy / "results/measurements/liquid_drop_2/seeds_0-0.parquet"
     batch.unlink()
     # By a job's command alone nothing is made again.
-    done = biogrip(
+    done = called(
         tiny_copy, "make", "measurement", "--case", "liquid_drop_2", "--batch", "seeds_0-0"
     )
-    assert done.returncode == 1
-    assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.stderr
-    assert "Traceback" not in done.stderr
+    assert done.status == 1
+    assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.output
+    assert "Traceback" not in done.output
     run = snakemake(tiny_copy, str(batch.relative_to(tiny_copy)), config=TINY)
     assert run.status == 0, run.output
     kept = "results/targets/liquid_drop_2.csv.edited"
@@ -94,13 +96,21 @@ def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -
     assert batch.read_bytes() == (tiny / batch.relative_to(tiny_copy)).read_bytes()
 
 
-def started(folder: Path, *targets: str) -> "subprocess.Popen[bytes]":
+def started(
+    folder: Path, *targets: str, environment: Mapping[str, str] = os.environ
+) -> "subprocess.Popen[bytes]":
     """Start the workflow as `snakemake` does, and do not wait for it."""
     (folder / "overlay.yaml").write_text(TINY)
     command = [sys.executable, "-m", "snakemake", "-j2", *targets]
     command += ["--snakefile", str(ROOT / "Snakefile")]
     command += ["--directory", str(folder), "--configfile", str(folder / "overlay.yaml")]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.STDOUT)
+    return subprocess.Popen(
+        command,
+        cwd=ROOT,
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.STDOUT,
+    )
 
 
 ERRORS = "results/tables/errors_liquid_drop_2.csv"
@@ -108,7 +118,7 @@ ERRORS = "results/tables/errors_liquid_drop_2.csv"
 
 def test_a_killed_run_continues_with_the_same_command(tiny: Path, tmp_path: Path) -> None:
     """Kill -9 of Snakemake in mid-run: the second call needs no other flag."""
-    process = started(tmp_path, ERRORS)
+    process = started(tmp_path, ERRORS, environment=loaded.for_jobs(os.environ))
     give_up = time.monotonic() + 120
     while not list((tmp_path / "results").glob("identifications/*/*/*.csv")):
         assert time.monotonic() < give_up
@@ -201,12 +211,12 @@ def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None
     errors.write_text("\n".join([*old[:2], ",".join(cells), *old[3:], ""]))
     (published / "gripper.md").unlink()
     now = finished / "results" / "tables"
-    done = biogrip(tmp_path, "compare", published, now)
-    assert done.returncode != 0
-    assert "gripper.md: regenerated, but not published" in done.stderr
-    row = next(line for line in done.stderr.splitlines() if "99.9" in line)
+    done = called(tmp_path, "compare", published, now)
+    assert done.status != 0
+    assert "gripper.md: regenerated, but not published" in done.output
+    row = next(line for line in done.output.splitlines() if "99.9" in line)
     for word in ("errors", "endothelial_cell k_p", "typical_identified", "99.9"):
         assert word in row
-    same = biogrip(tmp_path, "compare", now, now)
-    assert same.returncode == 0
-    assert "byte for byte" in same.stdout
+    same = called(tmp_path, "compare", now, now)
+    assert same.status == 0
+    assert "byte for byte" in same.output

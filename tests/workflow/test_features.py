@@ -54,6 +54,7 @@ cases:
   nonlinear:
     sample: {model: liquid_drop, k: 1.0, k_p: 1e-3, c: 10.0}
     models: {target: nonlinear, identification: nonlinear}
+    measurement: {rate_Hz: 0.5}
   calibrated:
     sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0}
     assumed_gripper: calibrated

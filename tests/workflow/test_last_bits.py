@@ -4,6 +4,8 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.running.resolved import write_study
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
+from tests.helpers.runs import built_once
 
 CASES = ("endothelial_cell", "liquid_drop_1", "liquid_drop_2")
 SEEDS = "seeds_0-1"
@@ -19,8 +22,8 @@ SEEDS = "seeds_0-1"
 NO_AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"
 NO_AVX2 = f"{NO_AVX512} X86_V3"
 # Code paths of numpy, those of BLAS, and threads: three at a time, for each changes bits of its
-# own. The reference has what the processor has, and two threads, which on small matrices take
-# longer than one.
+# own. The reference has what the processor has, and two threads, which go to sleep as soon as they
+# are through: on small matrices they would else spend more time waiting than working.
 SETTINGS = {
     "no AVX-512, Haswell": {
         "NPY_DISABLE_CPU_FEATURES": NO_AVX512,
@@ -29,7 +32,7 @@ SETTINGS = {
     "no AVX2, Nehalem": {"NPY_DISABLE_CPU_FEATURES": NO_AVX2, "OPENBLAS_CORETYPE": "Nehalem"},
     "SkylakeX": {"OPENBLAS_CORETYPE": "SkylakeX"},
 }
-TWO_THREADS = {"OPENBLAS_NUM_THREADS": "2"}
+TWO_THREADS = {"OPENBLAS_NUM_THREADS": "2", "OPENBLAS_THREAD_TIMEOUT": "4"}
 BITS = """
 import hashlib, numpy as np
 x = -np.geomspace(1e-9, 700, 100_000)
@@ -54,15 +57,22 @@ def in_process(
     return done.stdout
 
 
-COMMANDS = """
-import json, sys
+# A study by the command line's commands, and a posterior.
+DONE = """
+import hashlib, json, sys
+from pathlib import Path
 from biogrip.cli import main
-sys.exit(max(map(main, json.load(sys.stdin))))
+from tests.identifiability import test_posterior as own
+status = max(map(main, json.load(sys.stdin)))
+problem = own.posed_for(own.MODELS["liquid_drop"], *own.trace_of("liquid_drop_2"))
+found = own.sample(own.posterior_of(problem), 3)
+Path("posterior").write_text(hashlib.sha256(found.log_parameters.tobytes()).hexdigest())
+sys.exit(status)
 """
 
 
-def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
-    """Targets to error tables, through the command line's commands in one process."""
+def make(folder: Path, environment: dict[str, str]) -> None:
+    """Targets to error tables, and a posterior, in one process."""
     results = folder / "results"
     write_study(study_of("seeds: 2"), results)
     calls = []
@@ -71,7 +81,24 @@ def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
         calls += [["make", "target", "--case", case], ["make", "measurement", *batch]]
         calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
         calls.append(["make", "identifications", "errors", "--case", case])
-    in_process(environment, "-c", COMMANDS, given=json.dumps(calls), folder=folder)
+    python_path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    environment = {**environment, "PYTHONPATH": python_path}
+    in_process(environment, "-c", DONE, given=json.dumps(calls), folder=folder)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> Callable[[str], Path]:
+    """What came out in a setting, made by one worker for all."""
+
+    def made_in(name: str) -> Path:
+        build = partial(make, environment=SETTINGS.get(name, TWO_THREADS))
+        return built_once(f"bits {name}", build, tmp_path_factory, worker_id)
+
+    return made_in
+
+
+def files_of(study: Path) -> dict[str, bytes]:
+    results = study / "results"
     found = [
         *(results / "targets").glob("*.csv"),
         *(results / "measurements").glob("*/*.parquet"),
@@ -84,38 +111,19 @@ def study(folder: Path, environment: dict[str, str]) -> dict[str, bytes]:
     return {str(path.relative_to(results)): path.read_bytes() for path in found}
 
 
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
-    return study(tmp_path_factory.mktemp("reference"), TWO_THREADS)
-
-
 @pytest.mark.parametrize("name", SETTINGS)
-def test_other_code_paths_change_no_byte(
-    name: str, reference: dict[str, bytes], tmp_path: Path
-) -> None:
-    ours = study(tmp_path, SETTINGS[name])
+def test_other_code_paths_change_no_byte(name: str, made: Callable[[str], Path]) -> None:
+    ours, reference = files_of(made(name)), files_of(made("two threads"))
     assert ours.keys() == reference.keys()
     assert [file for file in ours if ours[file] != reference[file]] == []
 
 
-POSTERIOR = """
-import hashlib
-from tests.identifiability import test_posterior as own
-problem = own.posed_for(own.MODELS["liquid_drop"], *own.trace_of("liquid_drop_2"))
-found = own.sample(own.posterior_of(problem), 3)
-print(hashlib.sha256(found.log_parameters.tobytes()).hexdigest())
-"""
-
-
-@pytest.fixture(scope="module")
-def walked() -> str:
-    return in_process(TWO_THREADS, "-c", POSTERIOR)
-
-
 @pytest.mark.parametrize("name", SETTINGS)
-def test_other_code_paths_sample_the_same_posterior(name: str, walked: str) -> None:
+def test_other_code_paths_sample_the_same_posterior(name: str, made: Callable[[str], Path]) -> None:
     """To the last bit, over some hundred thousand decisions."""
-    assert in_process(SETTINGS[name], "-c", POSTERIOR) == walked
+    ours, reference = ((made(each) / "posterior").read_text() for each in (name, "two threads"))
+    assert len(ours) == 64
+    assert ours == reference
 
 
 def test_the_settings_do_change_last_bits() -> None:

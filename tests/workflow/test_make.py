@@ -11,7 +11,7 @@ import pytest
 from biogrip.cli import main
 from biogrip.products.catalogue import products
 from biogrip.running.source_files import source_files
-from tests.helpers.runs import biogrip, results_of
+from tests.helpers.runs import biogrip, built_once, results_of
 
 CASE = ("--case", "liquid_drop_2")
 BATCH = (*CASE, "--batch", "seeds_1-1")
@@ -209,19 +209,26 @@ def test_a_file_of_the_users_is_not_replaced(
 
 
 @pytest.fixture(scope="module")
-def called(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+def called(
+    tiny: Path, tmp_path_factory: pytest.TempPathFactory, worker_id: str
+) -> dict[str, set[str]]:
     """By product, the files of all functions that are called when it is made."""
-    study = shutil.copytree(tiny, tmp_path_factory.mktemp("watched") / "study")
-    jobs = [(name, wildcards_of(job)) for name, job in JOBS.items()]
-    done = subprocess.run(
-        [sys.executable, "-c", WATCHED],
-        cwd=study,
-        input=json.dumps(jobs),
-        capture_output=True,
-        text=True,
-    )
-    assert done.returncode == 0, done.stderr
-    lines = [line for line in done.stdout.splitlines() if line.startswith("[")]
+
+    def watch(folder: Path) -> None:
+        study = shutil.copytree(tiny, folder / "study")
+        jobs = [(name, wildcards_of(job)) for name, job in JOBS.items()]
+        done = subprocess.run(
+            [sys.executable, "-c", WATCHED],
+            cwd=study,
+            input=json.dumps(jobs),
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        (folder / "called").write_text(done.stdout)
+
+    said = (built_once("watched", watch, tmp_path_factory, worker_id) / "called").read_text()
+    lines = [line for line in said.splitlines() if line.startswith("[")]
     return {name: set(files) for name, files in map(json.loads, lines)}
 
 

@@ -15,7 +15,7 @@ import pytest
 
 from biogrip.cli import main
 from tests.helpers.places import EXAMPLE
-from tests.helpers.runs import TINY, started
+from tests.helpers.runs import TINY, called, started
 
 BAD = {
     "missing": (None, r"my.yaml: cannot be read: No such file"),
@@ -88,10 +88,9 @@ def test_config_files_may_be_given_as_to_snakemake(
 def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:
     errors = "results/tables/errors.csv"
     (tiny_copy / errors).unlink()
-    with started(tiny_copy, "run", "overlay.yaml", "-j2", errors) as run:
-        output, _ = run.communicate(timeout=300)
-    assert run.returncode == 0, output
-    assert output.splitlines()[-1] == (
+    run = called(tiny_copy, "run", "overlay.yaml", "-j2", errors)
+    assert run.status == 0, run.output
+    assert run.output.splitlines()[-1] == (
         "biogrip: done. Open results/report.html, results/summaries/liquid_drop_2.html."
     )
     assert (tiny_copy / errors).read_bytes() == (tiny / errors).read_bytes()
@@ -116,9 +115,8 @@ def test_a_stopped_run_ends_with_what_goes_on(tmp_path: Path, number: signal.Sig
     assert not [p for p in psutil.process_iter(["cwd"]) if p.info["cwd"] == str(tmp_path)]
     (target,) = (tmp_path / "results").glob("targets/*.csv")
     done = target.stat().st_mtime_ns
-    with started(tmp_path, "run", "my.yaml", "-j2", str(target.relative_to(tmp_path))) as run:
-        output, _ = run.communicate(timeout=120)
-    assert run.returncode == 0, output
+    again = called(tmp_path, "run", "my.yaml", "-j2", target.relative_to(tmp_path))
+    assert again.status == 0, again.output
     assert target.stat().st_mtime_ns == done
 
 
@@ -158,7 +156,7 @@ def test_a_run_in_the_background_of_a_script_is_stopped_too(tmp_path: Path) -> N
         [sys.executable, "-c", starting], cwd=tmp_path, stderr=subprocess.PIPE, text=True
     ) as run:
         give_up = time.monotonic() + 120
-        while not list((tmp_path / "results").glob("measurements/*/*.parquet")):
+        while not list((tmp_path / "results").glob("targets/*.csv")):
             assert time.monotonic() < give_up
             time.sleep(0.05)
         os.kill(run.pid, signal.SIGINT)
@@ -173,12 +171,11 @@ def test_a_run_in_the_background_of_a_script_is_stopped_too(tmp_path: Path) -> N
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     for name, found in (("file", "found a file"), ("file/x", "Not a directory"), ("x" * 300, "")):
-        with started(tmp_path, "run", "--directory", name, "-n") as run:
-            output, _ = run.communicate(timeout=60)
-        assert run.returncode == 1
-        assert output.startswith("biogrip: --directory: ")
-        assert f"{found}, allowed is a folder.\n" in output if found else "too long" in output
-        assert output.count("\n") == 1
+        run = called(tmp_path, "run", "--directory", name, "-n")
+        assert run.status == 1
+        assert run.output.startswith("biogrip: --directory: ")
+        assert f"{found or 'too long'}, allowed is a folder.\n" in run.output
+        assert run.output.count("\n") == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)

@@ -22,7 +22,8 @@ DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
 
 # Rules find the biogrip command of the Python that runs Snakemake, activated or not.
 COMMANDS = shlex.quote(str(Path(sys.executable).parent))
-shell.prefix(f"set -euo pipefail; PATH={COMMANDS}:$PATH; ")
+# A shell that is stopped ends after its command, not before.
+shell.prefix(f"trap : TERM; set -euo pipefail; PATH={COMMANDS}:$PATH; ")
 
 # Leaving with the message alone keeps Snakemake's stack out of it.
 try:

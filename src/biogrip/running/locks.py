@@ -28,6 +28,11 @@ def sign_locks(snakemake_folder: Path) -> None:
     write_text(snakemake_folder / "run.json", json.dumps(run))
 
 
+def is_locked(snakemake_folder: Path) -> bool:
+    """Whether a run holds locks in a ``.snakemake`` folder."""
+    return any((snakemake_folder / "locks").glob("*"))
+
+
 def release_dead_locks(snakemake_folder: Path) -> None:
     """Remove the locks that a dead run has signed in a ``.snakemake`` folder."""
     try:

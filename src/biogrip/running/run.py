@@ -13,6 +13,7 @@ from pathlib import Path
 from types import FrameType
 
 from biogrip.errors import BiogripError
+from biogrip.stopping import end_at_once
 
 # What is large is imported by who uses it: until then no signal would be answered.
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -39,21 +40,12 @@ def run(arguments: Sequence[str]) -> int:
     BiogripError
         If a config cannot be used. Nothing has been started then.
     """
-    signals = _Signals()
-    try:
-        with signals.handled():
-            status = _run(arguments, signals)
-    except _Stopped:
-        status = 1
-    if signals.first is None:
-        return status
-    again = shlex.join(["biogrip", "run", *arguments])
-    print(
-        f"biogrip: stopped by {signals.first.name}. Nothing that is done is lost; "
-        f"to go on: {again}",
-        file=sys.stderr,
-    )
-    return 128 + signals.first
+    signals = _Signals(shlex.join(["biogrip", "run", *arguments]))
+    with signals.handled():
+        status = _run(arguments, signals)
+        if signals.first is not None:
+            signals.end(signals.first)
+    return status
 
 
 def _run(arguments: Sequence[str], signals: "_Signals") -> int:
@@ -132,14 +124,11 @@ def _known(rest: list[str]) -> argparse.Namespace:
     return known
 
 
-class _Stopped(BaseException):
-    """A signal came before there was anything to stop."""
-
-
 class _Signals:
     """The signals that stop a run, handed to Snakemake once it is there."""
 
-    def __init__(self) -> None:
+    def __init__(self, again: str) -> None:
+        self._again = again
         self.first: signal.Signals | None = None
         self._starting = False
         self._child: subprocess.Popen[bytes] | None = None
@@ -158,7 +147,7 @@ class _Signals:
     def supervise(self, command: list[str]) -> int:
         """Run a command in a process group of its own, and return its exit status.
 
-        So that it gets each signal once, whether from the terminal or from a scheduler.
+        So that it gets each signal once, and its jobs none from the terminal.
         """
         self._starting = True
         # It lets SIGINT through when it is ready to end by it.
@@ -176,13 +165,20 @@ class _Signals:
         if self._child is not None:
             self._pass_on(self._child)
         elif not self._starting:
-            raise _Stopped
+            self.end(self.first)
+
+    def end(self, number: signal.Signals) -> None:
+        """End this process, and say what goes on."""
+        end_at_once(
+            number,
+            f"stopped by {number.name}. Nothing that is done is lost; to go on: {self._again}",
+        )
 
     def _pass_on(self, child: "subprocess.Popen[bytes]") -> None:
         # It may have ended just now.
         with suppress(ProcessLookupError):
-            # Snakemake ends at once on SIGINT; on SIGTERM it would first wait for its jobs.
-            os.killpg(child.pid, signal.SIGINT)
+            # On SIGTERM it would first wait for its jobs, which on SIGINT it ends.
+            os.kill(child.pid, signal.SIGINT)
 
 
 def _to_open(results: Path) -> str:

@@ -1,0 +1,90 @@
+"""A command that is stopped ends at once, wherever the signal finds it."""
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BEGIN = """
+import atexit, os, sys, time
+from pathlib import Path
+from biogrip.stopping import end_when_stopped
+def stop():
+    print("said before")
+    os.kill(os.getpid(), {number})
+    time.sleep(60)
+end_when_stopped()
+"""
+# Where an exception would be made another error of, would be printed and forgotten, or would
+# have to be raised through other people's code.
+PLACES = {
+    "a library that is being loaded": """
+try:
+    stop()
+except BaseException as error:
+    raise ImportError("not initialized") from error
+""",
+    "a finalizer": """
+class Finalized:
+    def __del__(self):
+        stop()
+Finalized()
+""",
+    "a callback that anything may come out of": """
+try:
+    stop()
+except BaseException:
+    pass
+""",
+    "a file being written": """
+from biogrip.files import written_whole
+with written_whole(Path("table.csv")) as scratch:
+    scratch.write_text("a,b")
+    stop()
+""",
+    "the end": """
+atexit.register(stop)
+""",
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=lambda s: s.name)
+def test_it_says_so_in_a_line_and_leaves_nothing(
+    tmp_path: Path, number: signal.Signals, place: str
+) -> None:
+    # As a shell's background has it, Python would leave SIGINT ignored.
+    code = f"import signal; signal.signal({signal.SIGINT}, signal.default_int_handler)"
+    code += BEGIN.format(number=int(number)) + PLACES[place]
+    run = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert run.returncode == 128 + number
+    assert run.stdout == "said before\n"
+    how = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}[number]
+    assert run.stderr == f"biogrip: {how}; nothing was written by halves.\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_ignored_stays_so() -> None:
+    """As what a script runs in the background ignores SIGINT."""
+    code = f"import signal; signal.signal({signal.SIGINT}, signal.SIG_IGN)"
+    code += BEGIN + f"os.kill(os.getpid(), {signal.SIGINT}); print('goes on')"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert (run.returncode, run.stdout, run.stderr) == (0, "goes on\n", "")
+
+
+def test_it_can_be_stopped_before_it_loads_anything_large() -> None:
+    """What is loaded before the signals are taken is what a stop would show a stack of."""
+    code = """
+import sys
+before = {*sys.modules}
+import biogrip.__main__
+print(*{*sys.modules} - before)
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    ours = {name for name in run.stdout.split() if name.startswith("biogrip")}
+    assert ours == {"biogrip", "biogrip.__main__", "biogrip.stopping"}
+    assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & set(run.stdout.split())
