@@ -88,3 +88,31 @@ print(*{*sys.modules} - before)
     ours = {name for name in run.stdout.split() if name.startswith("biogrip")}
     assert ours == {"biogrip", "biogrip.__main__", "biogrip.stopping"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & set(run.stdout.split())
+
+
+def test_snakemake_is_interrupted_wherever_it_is_in_the_end(tmp_path: Path) -> None:
+    """A version that waits for its jobs in another way could not be stopped else."""
+    locks = tmp_path / ".snakemake" / "locks"
+    locks.mkdir(parents=True)
+    (locks / "0.input.lock").touch()
+    code = """
+import os, signal, time
+from biogrip.running import snakemake_process as its
+its._PATIENCE_S = 0.2
+for number in (signal.SIGINT, signal.SIGALRM):
+    signal.signal(number, its._stop)
+os.kill(os.getpid(), signal.SIGINT)
+try:
+    time.sleep(30)
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        text=True,
+        timeout=20,
+        start_new_session=True,
+    )
+    assert run.stdout == "interrupted\n"

@@ -206,7 +206,7 @@ def test_heat_maps_show_the_numbers_they_are_given(maps: HeatMaps, judged: Path)
         drawn = figure.draw(maps, [judged])
     shares, best, worst = drawn.axes[:3]
     texts = [[text.get_text() for text in axes.texts] for axes in (shares, best, worst)]
-    assert texts[0] == ["80\n(80)"] * 4
+    assert texts[0] == ["a", *["80\n(80)"] * 4]
     rows = pd.read_csv(judged, dtype={"row": str})
     bound = rows[(rows["row"] == "0.2") & (rows["quantity"] == "k")]["bound_percent"].unique()
     assert texts[2] == ["15", "15", *(f"15\n({value:.2g})" for value in bound)]

@@ -169,6 +169,10 @@ class _Signals:
 
     def end(self, number: signal.Signals) -> None:
         """End this process, and say what goes on."""
+        if self._child is not None:
+            # It may have ended in the middle of a line.
+            with suppress(OSError):
+                os.write(sys.stderr.fileno(), b"\n")
         end_at_once(
             number,
             f"stopped by {number.name}. Nothing that is done is lost; to go on: {self._again}",

@@ -8,12 +8,16 @@ import gc
 import os
 import signal
 import sys
+import time
 from pathlib import Path
 from types import FrameType
 
 from biogrip.running.locks import is_locked
 
 _AGAIN_S = 0.05
+# Wherever it is by then, as in a version that waits in another way.
+_PATIENCE_S = 10.0
+_asked_s: list[float] = []
 
 
 def main() -> None:
@@ -36,7 +40,8 @@ def _stop(_: int, frame: FrameType | None) -> None:
         os._exit(128 + signal.SIGINT)
     # It may have to come that far, and a job may have begun just now.
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
-    waits = _waits_for_jobs(frame)
+    _asked_s.append(time.monotonic())
+    waits = _waits_for_jobs(frame) or _asked_s[-1] - _asked_s[0] > _PATIENCE_S
     if waits:
         signal.signal(signal.SIGTERM, _cancelling)
     if signal.getsignal(signal.SIGTERM) is _cancelling:
