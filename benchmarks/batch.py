@@ -1,6 +1,7 @@
 """Our genetic algorithm on many traces side by side, as the study identifies."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,10 @@ BATCH = 25
 
 def in_batch(problems: Sequence[Problem], settings: GeneticSettings) -> list[float]:
     """Identify from the traces to the answers, with generators of seeds 0, 1, ...; the misfits."""
-    misfits = together([p.misfit() for p in problems])
+    # As in the study, where they are traces of one case: what is not one is not taken together.
+    first = problems[0]
+    alike = [replace(p, model=first.model, steps=first.steps) for p in problems]
+    misfits = together([p.misfit() for p in alike])
     rngs = [np.random.default_rng(seed) for seed in range(len(problems))]
     found = evolve_many(misfits, problems[0].genome, settings, rngs)
     return [evolution.identification.misfit_rad for evolution in found]

@@ -11,8 +11,8 @@ from benchmarks.section import Row, Section, number
 from benchmarks.setup import Problem, problem
 from benchmarks.starts import Started, fitted, started
 from benchmarks.timing import alternate, clocked
-from biogrip.arrays import Array
-from biogrip.identify.genetic import evolve
+from biogrip.arrays import Array, IntArray
+from biogrip.identify.genetic import evolve, evolve_many
 from biogrip.identify.problem import condensed_of
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import SeriesMisfit
@@ -47,9 +47,9 @@ class Watched(SeriesMisfit):
         self.rates = 0
         super().__init__(*args)
 
-    def __call__(self, parameters: Array) -> Array:
-        """Misfit of parameters of shape (n, n_parameters)."""
-        spent_s, found = clocked(partial(super().__call__, parameters))
+    def of_each(self, parameters: Array, traces: IntArray) -> Array:
+        """Misfit of populations, (n_populations, n, n_parameters), each against a trace."""
+        spent_s, found = clocked(partial(super().of_each, parameters, traces))
         self.misfit_s += spent_s
         return found
 
@@ -65,6 +65,13 @@ def watched(p: Problem) -> Watched:
     """Return the misfit of a problem, watched."""
     misfit = Watched(p.gripper, p.model, p.steps, p.interval_s, p.trace_rad)
     misfit.projections  # noqa: B018 - makes the table
+    return misfit
+
+
+def watched_identification(p: Problem, seed: int) -> Watched:
+    """Identify by the genetic algorithm; the misfit that watched it."""
+    misfit = watched(p)
+    evolve_many(misfit.of_each, p.genome, p.genetic, [np.random.default_rng(seed)])
     return misfit
 
 
@@ -156,13 +163,8 @@ def _shares(p: Problem) -> list[Row]:
         spent_s += seconds
         return found
 
-    def identify(seed: int) -> Watched:
-        misfit = watched(p)
-        evolve(misfit, p.genome, p.genetic, np.random.default_rng(seed))
-        return misfit
-
     for seed in range(_SEEDS):
-        seconds, misfit = clocked(partial(identify, seed))
+        seconds, misfit = clocked(partial(watched_identification, p, seed))
         whole_s += seconds
         sums_s += misfit.sums_s
         misfit_s += misfit.misfit_s

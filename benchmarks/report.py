@@ -107,14 +107,16 @@ def _aims(sections: Mapping[str, Section]) -> list[dict[str, str]]:
     for name, peer, aim in AIMS:
         section = sections[name]
         row = next(row for row in section.rows if peer in row.values())
-        reached = row["times_ours"] >= aim
+        alone, batch = row["times_ours"], row.get("times_side_by_side")
+        in_batch = "side by side" if batch is not None and batch >= aim else "no"
         found.append(
             {
                 "benchmark": section.title,
                 "faster than": peer,
                 "at least": f"{aim} times",
-                "measured": f"{number(row['times_ours'])} times",
-                "reached": "yes" if reached else "no",
+                "measured": f"{number(alone)} times",
+                "traces side by side": "" if batch is None else f"{number(batch)} times",
+                "reached": "yes" if alone >= aim else in_batch,
             }
         )
     return found

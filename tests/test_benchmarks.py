@@ -14,7 +14,7 @@ import pytest
 import yaml
 
 from benchmarks.batch import in_batch
-from benchmarks.limit import watched, watched_fits
+from benchmarks.limit import watched, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.sampling_gap import feasible, gap_of, typical_bound
@@ -23,10 +23,12 @@ from benchmarks.setup import CONFIG, Problem, problem
 from benchmarks.starts import fitted, started
 from benchmarks.study import by_rule, in_order, processor_s
 from benchmarks.timing import Timed, alternate, time_to_success
+from biogrip.arrays import Array, IntArray
 from biogrip.design.criteria import Criterion
 from biogrip.design.sampling import best_sampling
 from biogrip.identify.genetic import evolve
 from biogrip.identify.genome import Genome
+from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
@@ -68,6 +70,26 @@ def test_the_watched_misfit_is_the_misfit(noisy: Problem) -> None:
     assert misfit.misfit_s > 0
     # The trace is summed over for the table alone.
     assert (misfit.rates, misfit.sums_s) == (rates, sums_s)
+
+
+def test_traces_side_by_side_are_taken_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in the study; else their misfits, though the same, would be computed one by one."""
+    traces = [problem(seed, rate_Hz=1.0) for seed in range(3)]
+    sizes: list[int] = []
+    of_each = SeriesMisfit.of_each
+
+    def watching(misfit: SeriesMisfit, parameters: Array, of: IntArray) -> Array:
+        sizes.append(len(parameters))
+        return of_each(misfit, parameters, of)
+
+    monkeypatch.setattr(SeriesMisfit, "of_each", watching)
+    in_batch(traces, replace(traces[0].genetic, max_generations=25))
+    assert set(sizes) == {3}
+
+
+def test_an_identification_is_watched(noisy: Problem) -> None:
+    misfit = watched_identification(noisy, seed=0)
+    assert misfit.misfit_s > misfit.sums_s > 0
 
 
 def test_the_watched_fits_are_the_fits(noisy: Problem) -> None:
