@@ -42,12 +42,14 @@ def _stop(_: int, frame: FrameType | None) -> None:
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
     _asked_s.append(time.monotonic())
     waits = _waits_for_jobs(frame) or _asked_s[-1] - _asked_s[0] > _PATIENCE_S
-    if waits:
+    # Once: again, it would interrupt the cancelling of jobs.
+    interrupts = waits and signal.getsignal(signal.SIGTERM) is not _cancelling
+    if interrupts:
         signal.signal(signal.SIGTERM, _cancelling)
     if signal.getsignal(signal.SIGTERM) is _cancelling:
         # Unlike SIGINT, this shows no stack of a Python that is just starting.
         os.killpg(0, signal.SIGTERM)
-    if waits:
+    if interrupts:
         raise KeyboardInterrupt
 
 
