@@ -7,6 +7,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, torque_history
 from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
 from biogrip.instrument.gripper import Gripper
+from biogrip.response import sensitivity
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
@@ -51,6 +52,21 @@ def _difference(
     values = [rotation_50_digits(gripper, one, steps, TIMES) for one in (ahead, behind)]
     difference: Array = (values[0] - values[1]) / (2 * step)
     return difference
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_many_samples_are_looked_at_in_parts(
+    gripper: Gripper, monkeypatch: pytest.MonkeyPatch, protocol: str
+) -> None:
+    """Which give what all of them do at once, but for the order of a product's few sums."""
+    (sample,) = random_samples(1, seed=8)
+    torque, model = torque_history(PROTOCOLS[protocol]), MODELS["generalized_maxwell"]
+    time_s = np.linspace(0, torque.end_s, 1001)
+    whole = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
+    monkeypatch.setattr(sensitivity, "_AT_ONCE", 90)
+    parts = rotation_and_sensitivity(gripper, model, torque, time_s, sample)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-14 * np.abs(whole[0]).max())
 
 
 def test_every_model_is_covered() -> None:

@@ -17,6 +17,8 @@ from biogrip.response.ringing import ringing_responses
 
 # The correction is of second order itself; its derivative by differences is good to 1e-6 of that.
 _STEP = 1e-3
+# Samples at a time: of a million, what the modes do would take more memory than all else.
+_AT_ONCE = 100_000
 
 
 def rotation_and_sensitivity(
@@ -56,7 +58,11 @@ def rotation_and_sensitivity(
         phi, slopes = rows[0], rows[1:]
     else:
         modes = modes_of(gripper, model, parameters[None], symmetric=torque.symmetric)
-        phi, slopes = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s))
+        rows = np.empty((1 + len(parameters), len(time_s)))
+        for start in range(0, len(time_s), _AT_ONCE):
+            some = slice(start, start + _AT_ONCE)
+            rows[:, some] = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s[some]))
+        phi, slopes = rows[0], rows[1:]
     if nonlinear:
         found = corrections(gripper, model, torque, parameters[None])
         values = np.where(found.converged[:, None], found.at(time_s), np.nan)
@@ -118,7 +124,7 @@ def _both_ways(count: int) -> Array:
     return np.stack((unit, -unit), axis=1).reshape(-1, count)
 
 
-def _mixed(modes: Modes, growth: Array, slope: Array) -> tuple[Array, Array]:
+def _mixed(modes: Modes, growth: Array, slope: Array) -> Array:
     """Weigh what the modes do; d(w g) = dw g + w dr dg/dr."""
     weights, times = modes.weights[0], growth.shape[-1]
     slanted = weights * modes.rate_slopes[0][:, None]
@@ -128,4 +134,4 @@ def _mixed(modes: Modes, growth: Array, slope: Array) -> tuple[Array, Array]:
         (by_growth.reshape(len(by_growth), -1), by_slope.reshape(len(by_slope), -1)), axis=1
     )
     rows: Array = both @ np.concatenate((growth, slope)).reshape(-1, times)
-    return rows[0], rows[1:]
+    return rows
