@@ -376,7 +376,7 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     assert page.read_text().count("<img") == 6
     assert "http" not in page.read_text()
     # What biogrip wrote is replaced, be there nothing to draw.
-    identify(bad, missing, *options)
+    assert identify(bad, missing, *options).returncode == 1
     assert page.read_text().count("<img") == 0
     assert list(pd.read_csv(table)["trace"]) == [str(bad), str(missing)]
 
@@ -408,6 +408,7 @@ def test_the_chosen_model_is_held_against_others(
     for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
         output = tmp_path / f"{model}.json"
         done = identify(EXAMPLE, "--config", few, "--model", model, "--output", output)
+        assert done.returncode == 0, done.stderr
         assert said in done.stdout
         assert "generalized_maxwell_3" in [
             row["model"] for row in json.loads(output.read_text())["models"]

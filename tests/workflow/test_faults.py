@@ -17,7 +17,7 @@ from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
 from tests.helpers import loaded
 from tests.helpers.places import CONFIG, ROOT
-from tests.helpers.runs import TINY, called, results_of, snakemake
+from tests.helpers.runs import TINY, biogrip, results_of, snakemake
 
 BAD = {
     "misspelt key": ("seedz: 3", "overlay.yaml, line 1: seedz: unknown key. Did you mean 'seeds'?"),
@@ -81,12 +81,12 @@ def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -
     batch = tiny_copy / "results/measurements/liquid_drop_2/seeds_0-0.parquet"
     batch.unlink()
     # By a job's command alone nothing is made again.
-    done = called(
+    done = biogrip(
         tiny_copy, "make", "measurement", "--case", "liquid_drop_2", "--batch", "seeds_0-0"
     )
-    assert done.status == 1
-    assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.output
-    assert "Traceback" not in done.output
+    assert done.returncode == 1
+    assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.stderr
+    assert "Traceback" not in done.stderr
     run = snakemake(tiny_copy, str(batch.relative_to(tiny_copy)), config=TINY)
     assert run.status == 0, run.output
     kept = "results/targets/liquid_drop_2.csv.edited"
@@ -211,12 +211,12 @@ def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None
     errors.write_text("\n".join([*old[:2], ",".join(cells), *old[3:], ""]))
     (published / "gripper.md").unlink()
     now = finished / "results" / "tables"
-    done = called(tmp_path, "compare", published, now)
-    assert done.status != 0
-    assert "gripper.md: regenerated, but not published" in done.output
-    row = next(line for line in done.output.splitlines() if "99.9" in line)
+    done = biogrip(tmp_path, "compare", published, now)
+    assert done.returncode != 0
+    assert "gripper.md: regenerated, but not published" in done.stderr
+    row = next(line for line in done.stderr.splitlines() if "99.9" in line)
     for word in ("errors", "endothelial_cell k_p", "typical_identified", "99.9"):
         assert word in row
-    same = called(tmp_path, "compare", now, now)
-    assert same.status == 0
-    assert "byte for byte" in same.output
+    same = biogrip(tmp_path, "compare", now, now)
+    assert same.returncode == 0
+    assert "byte for byte" in same.stdout

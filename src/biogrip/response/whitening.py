@@ -88,16 +88,19 @@ class Whitening:
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))
         """Of the correlation matrix."""
-        self.nuisance = nuisance
-        if len(nuisance) or uncertain is not None:
-            basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
-            known = np.zeros((0, len(time_s))) if uncertain is None else self._whitened(uncertain)
-            self.nuisance = with_uncertain(basis, known)
+        self.nuisance = self._white(nuisance, uncertain)
         """What is taken out, white, (n_functions, n_samples)."""
 
     def __call__(self, rows: Array) -> Array:
         """Whiten functions of time, shape (..., n_samples), and take the nuisance out."""
         return without(self.nuisance, self._whitened(rows))
+
+    def _white(self, nuisance: Array, uncertain: Array | None) -> Array:
+        if not len(nuisance) and uncertain is None:
+            return nuisance
+        basis = np.linalg.qr(self._whitened(nuisance).T)[0].T
+        known = nuisance[:0] if uncertain is None else self._whitened(uncertain)
+        return with_uncertain(basis, known)
 
     def _whitened(self, rows: Array) -> Array:
         columns = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]).T)

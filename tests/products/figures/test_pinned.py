@@ -22,8 +22,7 @@ from biogrip.products.catalogue import products
 from biogrip.products.figures import declared, designed_map, sequential
 from biogrip.products.figures import robustness as heat_map
 from biogrip.products.figures.corner import draw_corner
-from biogrip.products.figures.decades import label_plainly
-from biogrip.products.figures.style import styled
+from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
@@ -124,13 +123,8 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 def picture(figure: Figure) -> Array:
     """What is seen of a figure, as (height, width, 3) from 0 to 255."""
     with styled():
-        label_plainly(figure)
-        figure.set_dpi(DPI)
         canvas: Any = FigureCanvasAgg(figure)
-        if (engine := figure.get_layout_engine()) is not None:
-            engine.execute(figure)
-            # A second time it would come to another layout.
-            figure.set_layout_engine("none")
+        lay_out(figure, DPI)
         canvas.draw()
         return np.array(canvas.buffer_rgba())[..., :3].astype(float)
 

@@ -95,13 +95,20 @@ def save(drawn: Figure, output: Path) -> None:
 
 def save_png(drawn: Figure, output: Path | BinaryIO) -> None:
     """Write a figure as PNG, and leave it laid out for other kinds."""
+    lay_out(drawn, mpl.rcParams["savefig.dpi"])
+    drawn.savefig(output, format="png", metadata={"Software": None})
+
+
+def lay_out(drawn: Figure, dots_per_inch: float) -> None:
+    """Label a figure and lay it out, once: a second layout would be another one.
+
+    Each `savefig` would draw once more than it has to, for the layout.
+    """
     label_plainly(drawn)
-    # Laid out once for all; each `savefig` would draw once more than it has to, for the layout.
-    drawn.set_dpi(mpl.rcParams["savefig.dpi"])
+    drawn.set_dpi(dots_per_inch)
     if (engine := drawn.get_layout_engine()) is not None:
         engine.execute(drawn)
     drawn.set_layout_engine(None)
-    drawn.savefig(output, format="png", metadata={"Software": None})
 
 
 @contextmanager
