@@ -183,6 +183,10 @@ def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> N
     misfit = np.sqrt(residual @ residual / len(residual))
     assert joint.misfit(np.exp(x))[0] == pytest.approx(misfit, rel=1e-9)
     assert joint.residuals.condensed_misfit(np.exp(x))[0] == pytest.approx(misfit, rel=1e-9)
+    np.testing.assert_array_equal(joint.residuals.left(x[0]), residual)
+    gradient, root_mean_square = joint.residuals.gradient(x[0])
+    assert gradient == pytest.approx(slopes @ residual, rel=1e-9)
+    assert root_mean_square == pytest.approx(misfit, rel=1e-12)
     normal = ManyFits([joint]).normal(x, np.array([0]))
     assert normal.misfit_rad[0] == pytest.approx(misfit, rel=1e-9)
 

@@ -7,11 +7,12 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, torque_history
 from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
 from biogrip.instrument.gripper import Gripper
+from biogrip.response import residuals as of_residuals
 from biogrip.response import sensitivity
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
-from biogrip.response.nuisance import nuisance_basis, within, without
+from biogrip.response.nuisance import nuisance_basis, with_uncertain, within, without
 from biogrip.response.residuals import Residuals
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.responses import (
@@ -161,3 +162,24 @@ def test_residuals_do_not_see_what_the_instrument_added(
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
     assert np.all(np.abs(plain(x)[1] @ basis.T) < 1e-12)
     assert plain.free == len(times) - 2
+
+
+def test_the_gradient_of_many_samples_is_summed_in_parts(
+    gripper: Gripper, steps: TorqueHistory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever part of an amplitude is taken out, and whatever the residual leaves."""
+    model, x = MODELS["maxwell"], np.log([2.0, 50.0])
+    times = np.arange(401.0)
+    trace = np.random.default_rng(0).standard_normal(len(times)) * 1e-4
+    basis = with_uncertain(
+        nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
+    )
+    condensed = Condensed(steps, times, basis)
+    residuals = Residuals(gripper, model, steps, times, trace, condensed, nonlinear=False)
+    residual, slopes = residuals(x)
+    np.testing.assert_array_equal(residuals.left(x), residual)
+    for at_once in (1000, 90):
+        monkeypatch.setattr(of_residuals, "_SAMPLES_AT_ONCE", at_once)
+        gradient, misfit_rad = residuals.gradient(x)
+        np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
+        assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)

@@ -139,5 +139,5 @@ def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None
 
 
 def _square_sum(problem: Problem, x: Array) -> float:
-    residual, _ = problem.residuals(x)
+    residual = problem.residuals.left(x)
     return float(residual @ residual)

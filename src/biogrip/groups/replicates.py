@@ -63,6 +63,18 @@ class JointResiduals(Residuals):
         """Residuals (n_samples,) and derivatives (n_parameters, n_samples), trace after trace."""
         return self._stacked([part(log_parameters) for part in self._parts])
 
+    def gradient(self, log_parameters: Array) -> tuple[Array, float]:
+        """Of half the sum of squares, (n_parameters,) in rad^2, and the RMS misfit in rad."""
+        found = [part.gradient(log_parameters) for part in self._parts]
+        counted = zip(self.weights, self._parts, found, strict=True)
+        squares = (w**2 * part.samples * rms**2 for w, part, (_, rms) in counted)
+        gradients = [w**2 * own for w, (own, _) in zip(self.weights, found, strict=True)]
+        return np.sum(gradients, axis=0), sqrt(fsum(squares) / self.samples)
+
+    def left(self, log_parameters: Array) -> Array:
+        """Residuals alone, trace after trace, (n_samples,) in rad."""
+        return self._side_by_side([part.left(log_parameters) for part in self._parts])
+
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, trace after trace."""
         return self._stacked([part.condensed(log_parameters) for part in self._parts])

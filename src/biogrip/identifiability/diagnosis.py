@@ -112,7 +112,7 @@ def _pulling(grip: Grip, last_s: float) -> list[str]:
 
 def _notes(likelihood: Likelihood) -> list[str]:
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
-    residual, _ = residuals(likelihood.best)
+    residual = residuals.left(likelihood.best)
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return []
     notes = doubts_about_noise(residual)

@@ -103,8 +103,11 @@ def uneven(residual: Array) -> float:
     .. [1] J. Durbin, Tests for serial correlation in regression analysis based on the periodogram
        of least-squares residuals, Biometrika 56 (1969), 1-15.
     """
+    from scipy.fft import prev_fast_len
     from scipy.special import kolmogorov
 
+    # Of a length that has no small factors, a transform takes many times the memory.
+    residual = residual[: prev_fast_len(len(residual))]
     power = np.abs(np.fft.rfft(residual)[1 : (len(residual) + 1) // 2]) ** 2
     if len(power) < 2:
         return 1.0

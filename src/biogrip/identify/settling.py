@@ -16,8 +16,9 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimized
-from biogrip.identify.local_fit import Objective
+from biogrip.identify.local_fit import PRIOR_WIDTH
 from biogrip.identify.many_fits import ManyFits
+from biogrip.identify.problem import Problem
 
 # Differences leave second derivatives an error of some 1e-6: of a step, so much is left to the
 # next. Whether a step is below 1e-7 every machine sees alike, and what is left is rounding.
@@ -74,19 +75,16 @@ def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
     evaluations += 2 + by_differences
     misfit_rad = np.empty(len(x))
     for fit in range(len(x)):
-        objective = Objective(fits.problems[trace[fit]], condensed=False)
         own = curved.of(np.array([fit]))
         for _ in range(_MOST_STEPS_ON_ALL_SAMPLES):
-            rows, slopes = objective.both(x[fit])
-            misfit_rad[fit] = objective.misfit_rad(x[fit])
-            own.gradient[0] = slopes.T @ rows
+            own.gradient[0], misfit_rad[fit] = _on_all_samples(fits.problems[trace[fit]], x[fit])
+            evaluations[fit] += 1
             step = _newton_step(fits, own, x[fit : fit + 1])[0]
             if lost[fit]:
                 break
             x[fit] = np.clip(x[fit] + step, fits.low, fits.high)
             if np.max(np.abs(step)) < _NEARLY_SETTLED:
                 break
-        evaluations[fit] += objective.evaluations
     order = fits.problems[0].residuals.model.in_order(np.exp(x))
     return Minima(np.take_along_axis(x, order, axis=1), misfit_rad, evaluations)
 
@@ -95,6 +93,14 @@ def _newton_step(fits: ManyFits, curved: Normal, x: Array) -> Array:
     below = np.maximum(fits.low - x, -_LONGEST_STEP)
     above = np.minimum(fits.high - x, _LONGEST_STEP)
     return bounded_step(curved, np.zeros(len(x)), below, above)
+
+
+def _on_all_samples(problem: Problem, x: Array) -> tuple[Array, float]:
+    """Gradient of half the sum of squares in units of the noise, and RMS misfit in rad."""
+    gradient, misfit_rad = problem.residuals.gradient(x)
+    away = x - 0.5 * (problem.low + problem.high)
+    scale = problem.residuals.noise_scale_rad
+    return gradient / scale**2 + away / PRIOR_WIDTH**2, misfit_rad
 
 
 def _curved(fits: ManyFits, x: Array, trace: IntArray) -> Normal:

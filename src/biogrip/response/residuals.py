@@ -1,5 +1,6 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
+from collections.abc import Iterator
 from copy import copy
 from functools import cached_property
 
@@ -24,6 +25,8 @@ from biogrip.response.sensitivity import (
 
 # Samples whose rows are formed at once, of the linear model and of what the nonlinear adds.
 _AT_ONCE, _FEW_AT_ONCE = 1000, 50
+# Samples of a trace whose derivatives are formed at once: more would be as much memory as all else.
+_SAMPLES_AT_ONCE = 100_000
 
 
 class Residuals:
@@ -112,6 +115,47 @@ class Residuals:
         rotation, sensitivity = self._simulated(log_parameters, self._time_s)
         residual = self._condensed.cleared(rotation) - self._rotation_rad
         return residual, self._condensed.cleared(sensitivity)
+
+    def gradient(self, log_parameters: Array) -> tuple[Array, float]:
+        """Sum the residuals' squares, and find where they grow, a part of the samples at a time.
+
+        Parameters
+        ----------
+        log_parameters : (n_parameters,)
+            Natural logarithms of the parameters in SI units.
+
+        Returns
+        -------
+        gradient : (n_parameters,)
+            Of half the sum of squares, in rad^2.
+        misfit_rad
+            Root mean square.
+        """
+        if self.samples <= _SAMPLES_AT_ONCE:
+            residual, sensitivity = self(log_parameters)
+            return sensitivity @ residual, self._rms(residual)
+        residual = self.left(log_parameters)
+        # Of so many samples noise is white, and what clears them symmetric.
+        weights = self._condensed.cleared(residual)
+        gradient = sum(
+            self._simulated(log_parameters, self._time_s[some])[1] @ weights[some]
+            for some in self._blocks()
+        )
+        return np.asarray(gradient), self._rms(residual)
+
+    def left(self, log_parameters: Array) -> Array:
+        """Residuals alone, (n_samples,) in rad."""
+        rotation = np.concatenate(
+            [self._simulated(log_parameters, self._time_s[some])[0] for some in self._blocks()]
+        )
+        return self._condensed.cleared(rotation) - self._rotation_rad
+
+    def _blocks(self) -> Iterator[slice]:
+        starts = range(0, self.samples, _SAMPLES_AT_ONCE)
+        return (slice(start, start + _SAMPLES_AT_ONCE) for start in starts)
+
+    def _rms(self, residual: Array) -> float:
+        return float(np.linalg.norm(residual)) / np.sqrt(self.samples)
 
     def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
         """Rows with the residuals' sum of squares and its derivatives, some fifty of them.

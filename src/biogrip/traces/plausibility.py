@@ -17,7 +17,7 @@ References
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -59,7 +59,36 @@ _LAG_SHARES = (1e-6, 0.1, 10.0)
 _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
 # Share of a constant that offset and drift leave over, from which on it is one.
 _NO_CONSTANT = 1e-6
+# Samples that are looked at at once.
 _AT_ONCE = 65_536
+
+
+@dataclass(frozen=True)
+class _Functions:
+    """Functions of time as short vectors, whose products are those of their samples.
+
+    All that is asked of a trace are such products, and of a million samples all functions
+    at once would be as much memory as all else.
+
+    Parameters
+    ----------
+    lagged : (n_lagged, n_rows)
+        The lagged torques, those of the left arm before those of the difference.
+    nuisance : (n_functions, n_rows)
+        What the instrument may have added, orthonormal.
+    constant : (1, n_rows)
+        One of norm 1.
+    trace : (n_rows,)
+        In rad.
+    samples
+        How many these stand for.
+    """
+
+    lagged: Array
+    nuisance: Array
+    constant: Array
+    trace: Array
+    samples: int
 
 
 @dataclass(frozen=True)
@@ -68,20 +97,17 @@ class _Fit:
 
     Parameters
     ----------
-    lagged : (n_samples, n_lagged)
-        The lagged torques, those of the left arm before those of the difference.
-    response_rad : (n_samples,)
+    response : (n_rows,)
         That part, without what the instrument may have added.
+    weights : (n_lagged,)
+        Of the lagged torques.
     unknowns
         How many independent lagged torques it is made of.
-    turn_rad
-        Largest rotation.
     """
 
-    lagged: Array
-    response_rad: Array
+    response: Array
+    weights: Array
     unknowns: int
-    turn_rad: float
 
 
 def check_recording(
@@ -122,22 +148,25 @@ def check_recording(
         which the trace would do.
     """
     _check_times(recording, torque.end_s, path, columns)
-    trace = recording.rotation_rad
-    fit = _fit(recording, torque, nuisance)
-    if not _responds(without(nuisance, trace), fit, noise_rad):
+    trace, lagged = recording.rotation_rad, _lagged(torque)
+    functions = _functions(recording, lagged, nuisance)
+    fit = _fit(functions)
+    if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.rotation}': found no response to the "
             f"torque, but {trace.mean():.3g} rad throughout, give or take {trace.std():.2g} rad; "
             "allowed is a rotation from zero that follows the torque and stands out of the noise."
         )
-    if _mirrored(trace, fit.lagged, gripper, nuisance, noise_rad):
+    if _mirrored(functions, gripper, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.rotation}': found a rotation that goes "
             "against the torque, allowed is the closing rotation, positive where the arm closes. "
             "It would fit if it were -1 times (is opening counted as positive?), or if an offset "
             "or drift of the instrument, where it has one, were declared."
         )
-    _check_turn(recording, fit.turn_rad, free_rotation(gripper, torque), path, columns)
+    turns = (fit.weights @ lagged(recording.time_s[some]) for some in _parts(len(trace)))
+    turn = max(float(np.abs(part).max()) for part in turns)
+    _check_turn(recording, turn, free_rotation(gripper, torque), path, columns)
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -178,51 +207,76 @@ def _check_times(recording: Recording, end_s: float, path: Path, columns: Column
     )
 
 
-def _fit(recording: Recording, torque: TorqueHistory, nuisance: Array) -> _Fit:
-    """Fit the lagged torques of the left arm and, if that differs, of the difference of both."""
+def _lagged(torque: TorqueHistory) -> Callable[[Array], Array]:
+    """Lagged torques of the left arm and, if that differs, of the difference of both."""
     drives = 1 if torque.symmetric else 2
     rates = -1 / (torque.end_s * np.tile(_LAG_SHARES, drives))
     static = np.repeat(np.eye(drives), len(_LAG_SHARES), axis=0)[:, None, :]
     lags = StepResponse(static, rates[:, None], -static[..., None])
-    lagged = rotation(lags, torque, recording.time_s).T
-    seen = without(nuisance, lagged.T).T
-    weights, _, rank, _ = np.linalg.lstsq(seen, without(nuisance, recording.rotation_rad))
-    return _Fit(lagged, seen @ weights, int(rank), float(np.abs(lagged @ weights).max()))
+    return lambda time_s: rotation(lags, torque, time_s)
 
 
-def _responds(trace: Array, fit: _Fit, noise_rad: float | None) -> bool:
+def _functions(
+    recording: Recording, lagged: Callable[[Array], Array], nuisance: Array
+) -> _Functions:
+    samples = len(recording.time_s)
+    constant = np.full(samples, samples**-0.5)
+    rows: Array | None = None
+    for some in _parts(samples):
+        own = lagged(recording.time_s[some])
+        columns = np.vstack((own, nuisance[:, some], constant[some], recording.rotation_rad[some]))
+        below = columns.T if rows is None else np.vstack((rows, columns.T))
+        rows = np.asarray(np.linalg.qr(below, mode="r"))
+    assert rows is not None
+    lags, others = np.split(rows.T, [len(own)])
+    return _Functions(lags, others[:-2], others[-2:-1], others[-1], samples)
+
+
+def _parts(samples: int) -> Iterator[slice]:
+    return (slice(start, start + _AT_ONCE) for start in range(0, samples, _AT_ONCE))
+
+
+def _fit(functions: _Functions) -> _Fit:
+    nuisance = functions.nuisance
+    seen, trace = without(nuisance, functions.lagged), without(nuisance, functions.trace)
+    rounding = functions.samples * np.finfo(float).eps
+    found, _, rank, _ = np.linalg.lstsq(seen.T, trace, rounding)
+    weights: Array = np.asarray(found, np.float64)
+    return _Fit(weights @ seen, weights, int(rank))
+
+
+def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool:
     """Whether the trace follows the torque.
 
-    It does not if it is constant, or better described by a constant; nor if
-    white noise about zero, where the arm stands until the torque sets in,
-    would give as large a fit: an F test, with known noise a chi-squared one.
+    It does not if it is better described by a constant; nor if white noise about
+    zero, where the arm stands until the torque sets in, would give as large a fit:
+    an F test, with known noise a chi-squared one.
     """
     from scipy.special import chdtri, fdtri
 
-    explained = np.sum(fit.response_rad**2)
-    left_over = np.sum((trace - fit.response_rad) ** 2)
-    if np.ptp(trace) == 0 or np.sum((trace - trace.mean()) ** 2) <= left_over:
+    trace = without(functions.nuisance, functions.trace)
+    explained = np.sum(fit.response**2)
+    left_over = np.sum((trace - fit.response) ** 2)
+    if np.sum(without(functions.constant, trace) ** 2) <= left_over:
         return False
     if noise_rad is not None:
         return bool(explained > noise_rad**2 * chdtri(fit.unknowns, FALSE_ALARM))
-    freedom = len(trace) - fit.unknowns
+    freedom = functions.samples - fit.unknowns
     ratio = fdtri(fit.unknowns, freedom, 1 - FALSE_ALARM)
     return bool(explained / fit.unknowns > ratio * left_over / freedom)
 
 
-def _mirrored(
-    trace: Array, lagged: Array, gripper: Gripper, nuisance: Array, noise_rad: float | None
-) -> bool:
+def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) -> bool:
     """Whether the trace is a response with the wrong sign: the mirrored one is far likelier.
 
     It must be so with and without a constant that the instrument may have added: a constant
     that was not declared is no wrong sign.
     """
-    constant = np.full((1, len(trace)), len(trace) ** -0.5)
-    rest = without(nuisance, constant)
+    nuisance, trace = functions.nuisance, functions.trace
+    rest = without(nuisance, functions.constant)
     norm = np.linalg.norm(rest)
     also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
-    responses = _extreme_responses(lagged, gripper)
+    responses = _extreme_responses(functions.lagged, gripper)
     declared, freed = (
         [_left_over(without(basis, trace), sign * without(basis, responses)) for sign in (1, -1)]
         for basis in (nuisance, also)
@@ -230,12 +284,12 @@ def _mirrored(
     if noise_rad is not None:
         likelier = declared[0] - declared[1] > _FAR_LIKELIER * noise_rad**2
     else:
-        likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / len(trace))
+        likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / functions.samples)
     return bool(likelier and freed[0] > freed[1])
 
 
 def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
-    """Responses of which all samples' are sums with weights that are not negative, (n, n_samples).
+    """Responses of which all samples' are sums with weights that are not negative, (n, n_rows).
 
     A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
     where x tells how rigid it is and falls, as it relaxes, from at most 1 to at least 0. The
@@ -243,10 +297,10 @@ def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
     """
     k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
     lags = len(_LAG_SHARES)
-    alone = lagged[:, :lags].T / k_2
-    if lagged.shape[1] == lags:
+    alone = lagged[:lags] / k_2
+    if len(lagged) == lags:
         return alone
-    pushed = lagged[:, lags:].T / (k_2 + k_4)
+    pushed = lagged[lags:] / (k_2 + k_4)
     # The shortest lag is next to none.
     return np.vstack((alone - pushed + pushed[0], pushed[0]))
 
@@ -256,15 +310,8 @@ def _left_over(trace: Array, responses: Array) -> float:
     from scipy.optimize import nnls
 
     scale = np.linalg.norm(responses, axis=1)
-    count = np.count_nonzero(scale)
-    triangle: Array = np.zeros((0, count + 1))
-    # In pieces: of a million samples, all at once would be as much memory as all else.
-    for start in range(0, len(trace), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        columns = np.vstack((responses[scale > 0, some] / scale[scale > 0, None], trace[some]))
-        triangle = np.asarray(np.linalg.qr(np.vstack((triangle, columns.T)), mode="r"))
-    _, distance = nnls(triangle[:count, :count], triangle[:count, count])
-    return float(distance**2 + np.sum(triangle[count:, count] ** 2))
+    told = scale > 0
+    return float(nnls((responses[told] / scale[told, None]).T, trace)[1] ** 2)
 
 
 def _check_turn(
