@@ -16,6 +16,7 @@ from benchmarks.misfit import misfit_section
 from benchmarks.nonlinear import nonlinear_section
 from benchmarks.optimum import optimum_section
 from benchmarks.profiles import profiles_section
+from benchmarks.scale import scale_section
 from benchmarks.section import Section, markdown, number, renewed, written
 from benchmarks.study import study_section
 from benchmarks.timing import clocked
@@ -35,6 +36,7 @@ SECTIONS: Mapping[str, Callable[[], Section]] = {
     "growth": growth_section,
     "limit": limit_section,
     "study": study_section,
+    "scale": scale_section,
 }
 """By name, in the order of the report."""
 

@@ -1,54 +1,40 @@
-"""A study of many seeds, with what it costs: `python -m benchmarks.scale`, see docs/scale.md."""
+"""What a study of many seeds takes, process by process."""
 
-import argparse
-import resource
 import subprocess
 import sys
 import tempfile
 import time
 from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import psutil
+import yaml
+
+from benchmarks.section import Row, Section, number
+from benchmarks.setup import CONFIG
 
 ROOT = Path(__file__).parents[1]
-CONFIG = """
-seeds: {seeds}
-methods: [genetic]
-identifiability: {{coverage_seeds: 0}}
-model_selection: {{models: []}}
-genetic_algorithm: {{population: {population}, survivors: {survivors}}}
-"""
+SEEDS, CASES, CORES = 10_000, 100, 2
+
+_ALL, _PLANNING = "all", f"planning {CASES} such cases"
 # Often enough to see every job, not so often that looking takes their time.
-SAMPLED_EVERY_S = 0.25
-CORES = 2
+_LOOKED_EVERY_S = 0.25
+# What grows with the seeds and is not asked for.
+_WITHOUT: dict[str, Any] = {
+    "methods": ["genetic"],
+    "identifiability": {"coverage_seeds": 0},
+    "model_selection": {"models": []},
+}
 
-
-def main() -> None:
-    """Run the default cases with many seeds of the genetic algorithm, and print the cost."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", type=int, default=10_000, help="a case [%(default)s]")
-    parser.add_argument("--population", type=int, default=500, help="[%(default)s]")
-    options = parser.parse_args()
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        config = folder / "scale.yaml"
-        survivors = options.population // 2
-        config.write_text(
-            CONFIG.format(seeds=options.seeds, population=options.population, survivors=survivors)
-        )
-        command = [sys.executable, "-m", "snakemake", f"-j{CORES}", "--quiet", "all"]
-        command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
-        command += ["--configfile", str(config)]
-        start = time.monotonic()
-        running = subprocess.Popen(command, cwd=ROOT)
-        seen = _watched(running)
-        wall_s = time.monotonic() - start
-        if running.returncode:
-            sys.exit(running.returncode)
-        _report(folder / "results", wall_s, seen)
+_TEXT = f"""\
+The three default cases with {SEEDS:,} seeds each of `genetic` and nothing else of what grows with
+the seeds (no other method, no coverage, no model selection), by Snakemake with `-j{CORES}`: processor
+time and largest resident memory of its processes, by what they make first, looked at four times a
+second; and of a dry run with {CASES} such cases."""
 
 
 @dataclass
@@ -59,67 +45,114 @@ class Seen:
     ----------
     processes
         How many.
-    cpu_s
+    processor_s
         Processor time when they were last looked at.
-    peak_bytes
+    largest_MB
         Largest resident memory of one.
     """
 
     processes: int = 0
-    cpu_s: float = 0.0
-    peak_bytes: int = 0
+    processor_s: float = 0.0
+    largest_MB: float = 0.0
 
 
-def _watched(running: subprocess.Popen[bytes]) -> dict[str, Seen]:
-    """Follow the processes of a run; by kind, see `_kind`."""
-    seen: dict[tuple[str, int], Seen] = defaultdict(Seen)
+def scale_section() -> Section:
+    """Run the study of many seeds, and plan one of many cases."""
+    with tempfile.TemporaryDirectory() as name:
+        wall_s, seen = _study(Path(name), _WITHOUT | {"seeds": SEEDS})
+        sizes = _sizes(Path(name) / "results")
+    with tempfile.TemporaryDirectory() as name:
+        cases = yaml.safe_load(CONFIG.read_text())["cases"]
+        some = list(cases.values())
+        many = {f"case_{index}": some[index % len(some)] for index in range(CASES)}
+        overlay = _WITHOUT | {"seeds": SEEDS, "cases": many, "only": list(many)}
+        planning_s, planning = _study(Path(name), overlay, "--dry-run")
+    rows = [
+        *({"process": kind, **vars(of_kind)} for kind, of_kind in seen.items()),
+        {"process": _ALL, **vars(_together(seen)), "wall_s": wall_s, **sizes},
+        {"process": _PLANNING, **vars(_together(planning)), "wall_s": planning_s},
+    ]
+    columns: dict[str, Callable[[Row], str]] = {
+        "process": lambda row: row["process"].replace("_", " "),
+        "number": lambda row: str(row["processes"]),
+        "processor time (s)": lambda row: number(row["processor_s"]),
+        "largest (MB)": lambda row: f"{row['largest_MB']:.0f}",
+        "wall time (s)": lambda row: number(row["wall_s"]) if "wall_s" in row else "",
+    }
+    return Section("scale", "Many seeds, many cases", _TEXT, columns, rows)
+
+
+def watched(command: Sequence[str], folder: Path) -> dict[str, Seen]:
+    """Run a command in a folder, and follow its processes; by kind, the most costly first.
+
+    Raises
+    ------
+    subprocess.CalledProcessError
+        If it fails.
+    """
+    seen: dict[tuple[str, int], Seen] = defaultdict(lambda: Seen(processes=1))
+    with (folder / "log.txt").open("w") as log:
+        running = subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log)
     parent = psutil.Process(running.pid)
     while running.poll() is None:
-        for process in [parent, *parent.children(recursive=True)]:
-            try:
-                one = seen[_kind(process.cmdline()), process.pid]
-                one.peak_bytes = max(one.peak_bytes, process.memory_info().rss)
-                one.cpu_s = sum(process.cpu_times()[:2])
-            except psutil.Error:
-                continue
-        time.sleep(SAMPLED_EVERY_S)
-    kinds: dict[str, Seen] = defaultdict(Seen)
+        try:
+            for process in [parent, *parent.children(recursive=True)]:
+                _look(process, seen)
+        except psutil.NoSuchProcess:
+            continue
+        time.sleep(_LOOKED_EVERY_S)
+    if running.returncode:
+        raise subprocess.CalledProcessError(running.returncode, command)
+    by_kind: dict[str, list[Seen]] = defaultdict(list)
     for (kind, _), one in seen.items():
-        kinds[kind].processes += 1
-        kinds[kind].cpu_s += one.cpu_s
-        kinds[kind].peak_bytes = max(kinds[kind].peak_bytes, one.peak_bytes)
-    return kinds
+        by_kind[kind].append(one)
+    kinds = {kind: _together(dict(enumerate(some))) for kind, some in by_kind.items()}
+    return dict(sorted(kinds.items(), key=lambda item: -item[1].processor_s))
 
 
-def _kind(command: list[str]) -> str:
-    """The stage of a biogrip process, with the name of its table or figure."""
-    words = [Path(word).name for word in command[1:4]]
-    if words[:1] == ["biogrip"]:
-        return " ".join(words[1:3] if words[1] in ("table", "figure") else words[1:2])
-    return "snakemake" if "snakemake" in command else "others"
+def _study(folder: Path, overlay: dict[str, Any], *options: str) -> tuple[float, dict[str, Seen]]:
+    config = folder / "scale.yaml"
+    config.write_text(yaml.safe_dump(overlay))
+    command = [sys.executable, "-m", "snakemake", f"-j{CORES}", "--quiet", "all", *options]
+    command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
+    command += ["--configfile", str(config)]
+    start = time.monotonic()
+    seen = watched(command, folder)
+    return time.monotonic() - start, seen
 
 
-def _report(results: Path, wall_s: float, seen: dict[str, Seen]) -> None:
-    files = sorted((results / "timings").glob("*.csv"))
-    identifying_s = sum(float(pd.read_csv(file)["cpu_s"].sum()) for file in files)
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(f"wall time {wall_s:.0f} s, processor time identifying {identifying_s:.0f} s")
-    for what, spent_s in (
-        (f"{CORES} cores' wall time", CORES * wall_s),
-        ("processor time, which other programs disturb less", used.ru_utime + used.ru_stime),
-    ):
-        print(f"all else: {100 * (1 - identifying_s / spent_s):.1f} % of {spent_s:.0f} s of {what}")
-    print("processor time, until last looked at, and largest memory:")
-    for kind, of_kind in sorted(seen.items(), key=lambda item: -item[1].cpu_s):
-        print(
-            f"{of_kind.cpu_s:7.1f} s  {of_kind.peak_bytes / 1e6:5.0f} MB  "
-            f"{of_kind.processes:4d} x {kind}"
-        )
-    for folder in sorted(path for path in results.iterdir() if path.is_dir()):
-        sizes = [file.stat().st_size for file in folder.rglob("*") if file.is_file()]
-        if sizes:
-            print(f"{sum(sizes) / 1e6:7.1f} MB  {folder.name}/, largest {max(sizes) / 1e6:.2f} MB")
+def _look(process: psutil.Process, seen: dict[tuple[str, int], Seen]) -> None:
+    try:
+        kind = _kind(process.cmdline())
+        if kind is None:
+            return
+        one = seen[kind, process.pid]
+        one.largest_MB = max(one.largest_MB, process.memory_info().rss / 1e6)
+        one.processor_s = sum(process.cpu_times()[:2])
+    except psutil.Error:
+        return
 
 
-if __name__ == "__main__":
-    main()
+def _kind(command: Sequence[str]) -> str | None:
+    """What a process makes, if it is one of the study's and no shell between them."""
+    if "snakemake" in command:
+        return "Snakemake"
+    return command[command.index("make") + 1] if "make" in command[:-1] else None
+
+
+def _together(seen: dict[Any, Seen]) -> Seen:
+    return Seen(
+        sum(one.processes for one in seen.values()),
+        sum(one.processor_s for one in seen.values()),
+        max(one.largest_MB for one in seen.values()),
+    )
+
+
+def _sizes(results: Path) -> dict[str, float]:
+    """Processor time of the identifications alone, and sizes of what is kept of all seeds, MB."""
+    timings = (pd.read_csv(file) for file in (results / "timings").glob("*.csv"))
+    found = {"identifying_s": sum(float(of_case["cpu_s"].sum()) for of_case in timings)}
+    for kind in ("measurements", "histories", "identifications"):
+        files = (path for path in (results / kind).rglob("*") if path.is_file())
+        found[f"{kind}_MB"] = sum(path.stat().st_size for path in files) / 1e6
+    return found

@@ -44,8 +44,9 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     truth, step = settings.truth, METHODS[settings.method].step
     found = read_identifications(identifications, settings.method)
     shown = int(typical(found)["seed"])
-    history = read_history(histories, settings.method, shown)
     parameters = truth.model.parameters
+    columns = [parameter.column for parameter in parameters]
+    history = read_history(histories, settings.method, shown, columns)
     identified = truth.published.identified
     drawn = figure(PAGE_IN, 3.9)
     grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
@@ -69,8 +70,8 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
         axes.set_xlim(0, history["generation"].max())
     for axes in grid[len(parameters) :]:
         axes.set_axis_off()
-    columns = len(grid) // 2
-    for axes, below in zip(grid[:columns], grid[columns:], strict=True):
+    half = len(grid) // 2
+    for axes, below in zip(grid[:half], grid[half:], strict=True):
         lowest = below if below.get_visible() and below.axison else axes
         lowest.set_xlabel(step)
         lowest.tick_params(labelbottom=True)

@@ -1,6 +1,6 @@
 """What the figures of results read: a case's typical seed, its trace and its fit."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -121,8 +121,21 @@ def typical_in_words(found: pd.DataFrame) -> str:
     return f"seed {int(typical(found)['seed'])}, typical" if len(found) > 1 else "the only trace"
 
 
-def read_history(path: Path, method: str, shown: int) -> pd.DataFrame:
+def read_history(
+    path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
+) -> pd.DataFrame:
     """Read the histories, by one method, of the seeds that are drawn and of one more.
+
+    Parameters
+    ----------
+    path
+        Histories of a case, Parquet.
+    method
+        Whose.
+    shown
+        The one more.
+    values
+        Columns that are wanted beside seed and generation.
 
     Raises
     ------
@@ -133,10 +146,13 @@ def read_history(path: Path, method: str, shown: int) -> pd.DataFrame:
         by_method = ("method", "==", method)
         return pd.read_parquet(
             path,
+            columns=["seed", "generation", *values],
             filters=[
                 [by_method, ("seed", "<", SHOWN_SEEDS)],
                 [by_method, ("seed", "==", shown)],
             ],
+            # Each thread would take memory of its own for some batches of many seeds.
+            use_threads=False,
         )
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error

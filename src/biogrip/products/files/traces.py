@@ -1,6 +1,7 @@
 """Targets and measurements as files."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,9 @@ SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
+# Before a seed's number, of its column.
+_SEED = "seed_"
+_READ_AT_ONCE = 50
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
 
@@ -118,7 +122,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
     columns = {"time_s": measurements.time_s}
     if measurements.target_rad is not None:
         columns["target_rad"] = measurements.target_rad
-    columns |= {f"seed_{seed}": trace for seed, trace in measurements.rotation_rad.items()}
+    columns |= {f"{_SEED}{seed}": trace for seed, trace in measurements.rotation_rad.items()}
     table = table_of(columns, len(measurements.time_s))
     write_tables(path, [table], dictionary=False)
 
@@ -133,11 +137,37 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     """
     present = column_names(path)
     kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
-    wanted = present if seeds is None else [*kept, *(f"seed_{seed}" for seed in seeds)]
+    wanted = present if seeds is None else [*kept, *(f"{_SEED}{seed}" for seed in seeds)]
     columns = read_columns(path, wanted)
     time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
-    traces = {int(name.removeprefix("seed_")): trace for name, trace in columns.items()}
+    traces = {int(name.removeprefix(_SEED)): trace for name, trace in columns.items()}
     return Measurements(time_s, target, traces)
+
+
+def seeds_in(path: Path) -> list[int]:
+    """Seeds whose noisy traces a file of `write_measurements` holds.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be read.
+    """
+    return [int(name.removeprefix(_SEED)) for name in column_names(path) if name.startswith(_SEED)]
+
+
+def each_trace(path: Path) -> Iterator[Array]:
+    """Noisy traces of a file one after the other, (n_samples,) each; some are read at once.
+
+    Raises
+    ------
+    BiogripError
+        If it is damaged.
+    """
+    seeds = seeds_in(path)
+    for start in range(0, len(seeds), _READ_AT_ONCE):
+        yield from read_measurements(
+            path, seeds[start : start + _READ_AT_ONCE]
+        ).rotation_rad.values()
 
 
 def write_single_trace(path: Path, time_s: Array, rotation_rad: Array) -> None:

@@ -16,7 +16,7 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS
 from biogrip.products.figures.results import read_history
 from biogrip.products.files.identifications import read_identifications
-from biogrip.products.files.traces import read_measurements
+from biogrip.products.files.traces import read_measurements, seeds_in
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.response.linear import is_symmetric
 
@@ -99,12 +99,16 @@ def _case(
 ) -> dict[str, Any]:
     problem = case.problem.calibrated(files.calibrated)
     model = problem.model
-    recorded = [read_measurements(path) for path in files.measurements]
-    traces = {seed: trace for part in recorded for seed, trace in part.rotation_rad.items()}
-    time_s, target = recorded[0].time_s, recorded[0].target_rad
+    sampled = read_measurements(files.measurements[0], [])
+    time_s, target = sampled.time_s, sampled.target_rad
     stride = 1 + _NUMBER_BYTES * len(time_s) // most_bytes
     room = most_bytes // (_NUMBER_BYTES * len(time_s[::stride]))
-    seeds = sorted(traces)[: max(1, min(MOST_SEEDS, room))]
+    held = {seed: path for path in files.measurements for seed in seeds_in(path)}
+    seeds = sorted(held)[: max(1, min(MOST_SEEDS, room))]
+    traces: dict[int, Array] = {}
+    for path in files.measurements:
+        own = [seed for seed in seeds if held[seed] == path]
+        traces |= read_measurements(path, own).rotation_rad if own else {}
     sigma = 0.0
     if case.noise is not None and target is not None:
         sigma = float(np.sqrt(np.mean(standard_deviation(target, case.noise) ** 2)))

@@ -17,8 +17,8 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import (
     MEASUREMENTS,
     TARGETS,
+    each_trace,
     read_jaw_force,
-    read_measurements,
 )
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.tables.declared import table
@@ -165,11 +165,7 @@ def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
     if not axis or not traces:
         return []
     # Not the traces themselves are kept: of many seeds they are more than fits into memory.
-    extremes = [
-        (trace.min(), trace.max())
-        for path in traces
-        for trace in read_measurements(path).rotation_rad.values()
-    ]
+    extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
     low, high = (1e3 * float(value) for value in np.median(extremes, axis=0))
     remark = f"median of {len(extremes)} noisy traces; the paper's is the end of its axis"
     return [
