@@ -32,9 +32,9 @@ _WITHOUT: dict[str, Any] = {
 
 _TEXT = f"""\
 The three default cases with {SEEDS:,} seeds each of `genetic` and nothing else of what grows with
-the seeds (no other method, no coverage, no model selection), by Snakemake with `-j{CORES}`: processor
-time and largest resident memory of its processes, by what they make first, looked at four times a
-second; and of a dry run with {CASES} such cases."""
+the seeds (no other method, no coverage, no model selection), by Snakemake with `-j{CORES}`:
+processor time and largest resident memory of its processes, by what they make first, looked at four
+times a second; and of a dry run with {CASES} such cases."""
 
 
 @dataclass

@@ -18,6 +18,7 @@ from benchmarks.limit import watched, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.sampling_gap import feasible, gap_of, typical_bound
+from benchmarks.scale import watched as watched_processes
 from benchmarks.section import Section, number, renewed
 from benchmarks.setup import CONFIG, Problem, problem
 from benchmarks.starts import fitted, started
@@ -132,6 +133,22 @@ def test_processor_time_of_jobs_is_added_up_by_rule(study: Study, tmp_path: Path
 def test_a_job_that_fails_is_no_measurement(tmp_path: Path) -> None:
     with pytest.raises(subprocess.CalledProcessError):
         processor_s([sys.executable, "-c", "raise SystemExit(1)"], tmp_path)
+
+
+def test_processes_are_watched_by_what_they_make(tmp_path: Path) -> None:
+    """Two children of a Snakemake, each with the name of what it makes; a shell is neither."""
+    child = "import sys, time; kept = b'.' * 50_000_000; time.sleep(1)"
+    start = (
+        "import subprocess, sys\n"
+        "for what in ('errors', 'methods'):\n"
+        f"    subprocess.run([sys.executable, '-c', {child!r}, 'make', what], check=True)"
+    )
+    seen = watched_processes([sys.executable, "-c", start, "snakemake"], tmp_path)
+    assert set(seen) == {"Snakemake", "errors", "methods"}
+    assert seen["errors"].processes == 1
+    assert seen["errors"].largest_MB > seen["Snakemake"].largest_MB + 25
+    with pytest.raises(subprocess.CalledProcessError):
+        watched_processes([sys.executable, "-c", "raise SystemExit(3)"], tmp_path)
 
 
 def test_ratios_are_taken_turn_by_turn() -> None:

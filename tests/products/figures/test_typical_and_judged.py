@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
+from biogrip.errors import BiogripError
 from biogrip.products.figures import evolution, fit, judged_fit
+from biogrip.products.figures.results import SHOWN_SEEDS, read_history
 from biogrip.products.figures.style import styled
+from biogrip.products.files.parquet import table_of
 from biogrip.products.files.traces import Measurements, write_measurements
 from biogrip.products.pages.summary import SUMMARY
 from biogrip.response.simulation import simulated_rotation
@@ -27,6 +31,26 @@ def response(values: list[float]) -> np.ndarray:
         problem.gripper, network, problem.torque, TIME_S, nonlinear=False
     )[0]
     return found
+
+
+def test_histories_of_the_seeds_that_are_drawn_are_read(tmp_path: Path) -> None:
+    """By one method, wherever in the file they are; Arrow's own filter is the independent one."""
+    path = tmp_path / "histories.parquet"
+    seeds = np.repeat([0, 1, SHOWN_SEEDS, SHOWN_SEEDS + 1], 3)
+    tables = [
+        table_of({"method": method, "seed": seeds, "generation": seeds, "k": seeds * 0.5}, 12)
+        for method in ("genetic", "least_squares")
+    ]
+    with pq.ParquetWriter(path, tables[0].schema) as writer:
+        for table in tables:
+            for start in range(0, 12, 4):
+                writer.write_table(table.slice(start, 4))
+    found = read_history(path, "least_squares", SHOWN_SEEDS + 1, ["k"])
+    kept = [("method", "==", "least_squares"), ("seed", "!=", SHOWN_SEEDS)]
+    columns = ["seed", "generation", "k"]
+    pd.testing.assert_frame_equal(found, pd.read_parquet(path, columns=columns, filters=kept))
+    with pytest.raises(BiogripError, match=r"histories.parquet: cannot be read as histories"):
+        read_history(path, "genetic", 0, ["no such column"])
 
 
 @pytest.fixture

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.products.files.traces import read_jaw_force, read_target, write_target
+from biogrip.products.files import traces
+from biogrip.products.files.traces import (
+    Measurements,
+    each_trace,
+    read_jaw_force,
+    read_target,
+    seeds_in,
+    write_measurements,
+    write_target,
+)
 
 TIMES = np.arange(5.0)
 # Rounding is all that is in the second.
@@ -48,3 +57,15 @@ def test_a_damaged_target_is_explained(tmp_path: Path, line: int, text: str, mes
     path.write_text("\n".join(lines))
     with pytest.raises(BiogripError, match=message):
         read_target(path)
+
+
+def test_traces_are_read_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However many at once; those of all seeds, and no other column."""
+    monkeypatch.setattr(traces, "_READ_AT_ONCE", 2)
+    written = {seed: np.full(4, float(seed)) for seed in (3, 4, 5, 6, 7)}
+    path = tmp_path / "seeds_3-7.parquet"
+    write_measurements(path, Measurements(np.arange(4.0), np.zeros(4), written))
+    assert seeds_in(path) == list(written)
+    np.testing.assert_array_equal(list(each_trace(path)), list(written.values()))

@@ -14,7 +14,7 @@ import yaml
 from markupsafe import Markup
 
 from biogrip.errors import BiogripError
-from biogrip.files import write_text
+from biogrip.files import written_whole
 from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
@@ -176,7 +176,7 @@ def write(
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    text = environment.from_string(settings.sources["report.html.j2"]).render(
+    parts = environment.from_string(settings.sources["report.html.j2"]).stream(
         style=settings.sources["report.css"],
         scripts=[settings.sources[name] for name in _SOURCES[2:]],
         plotly=_plotly(),
@@ -199,7 +199,8 @@ def write(
         versions={"Python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
     )
-    write_text(page, text)
+    with written_whole(page) as scratch, scratch.open("wb") as file:
+        parts.dump(file, encoding="utf-8")
 
 
 def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildcards, str]]:
