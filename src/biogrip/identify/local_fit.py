@@ -76,14 +76,9 @@ class Objective:
         What is fitted.
     further
         Values, and derivatives by the log-parameters, of what else a fit should keep small.
-    condensed
-        Whether few rows may stand for all samples, at the price of some digits.
     """
 
-    def __init__(
-        self, problem: Problem, further: Rows | None = None, *, condensed: bool = True
-    ) -> None:
-        self._of = problem.residuals.condensed if condensed else problem.residuals
+    def __init__(self, problem: Problem, further: Rows | None = None) -> None:
         self._further = further
         self.low, self.high = problem.low, problem.high
         self._residuals = problem.residuals
@@ -96,7 +91,7 @@ class Objective:
         """Residual rows and their Jacobian; the last are kept, for both are asked for in turn."""
         if self._last is None or not np.array_equal(self._last[0], x):
             scale = self._residuals.noise_scale_rad
-            residual, sensitivity = self._of(x)
+            residual, sensitivity = self._residuals.condensed(x)
             rows, slopes = [residual / scale], [sensitivity.T / scale]
             if self._further is not None:
                 values, derivatives = self._further(x)
@@ -117,11 +112,6 @@ class Objective:
         """Their Jacobian."""
         return self.both(x)[1]
 
-    def gradient(self, x: Array) -> Array:
-        """Derivatives of half the sum of squares, (n_parameters,)."""
-        rows, jacobian = self.both(x)
-        return jacobian.T @ rows
-
     def chi2(self, rows: Array) -> float:
         """Sum of squares of rows, in units of the noise, without what is the prior's."""
         told = rows[: -len(self._middle)]
@@ -132,6 +122,29 @@ class Objective:
         self.both(x)
         assert self._last is not None
         return self._last[3]
+
+
+def on_all_samples(problem: Problem, x: Array) -> tuple[Array, float]:
+    """Return gradient and misfit to all digits: few rows stand for all samples but for some.
+
+    Parameters
+    ----------
+    problem
+        What is fitted.
+    x : (n_parameters,)
+        Log-parameters.
+
+    Returns
+    -------
+    gradient : (n_parameters,)
+        Of half the sum of squares of an `Objective`.
+    misfit_rad
+        RMS misfit.
+    """
+    gradient, misfit_rad = problem.residuals.gradient(x)
+    away = x - 0.5 * (problem.low + problem.high)
+    scale = problem.residuals.noise_scale_rad
+    return gradient / scale**2 + away / PRIOR_WIDTH**2, misfit_rad
 
 
 def local_fit(problem: Problem, start: Array, tolerance: float = FINE) -> LocalFit:
@@ -173,11 +186,12 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
     where parameters trade against each other, that of Gauss and Newton leaves out
     most of it, and its steps go to and fro for ever.
     """
-    objective, nearby = Objective(problem, condensed=False), Objective(problem)
-    x, left = found.log_parameters, _MOST_STEPS
+    nearby = Objective(problem)
+    x, left, evaluations = found.log_parameters, _MOST_STEPS, 0
     length = before = np.inf
     while left > 0:
-        downhill = -objective.gradient(x)
+        downhill = -on_all_samples(problem, x)[0]
+        evaluations += 1
         if not length < _SHRUNK * before:
             curvature = _curvature(nearby, x)
         edge = 1e-6 * (problem.high - problem.low)
@@ -192,8 +206,8 @@ def settled(problem: Problem, found: LocalFit) -> LocalFit:
         before, length = length, float(np.max(np.abs(step)))
         x = np.clip(x + step / max(length, 1.0), problem.low, problem.high)
         left = _LAST_STEPS if left > _LAST_STEPS and length < _NEARLY_SETTLED else left - 1
-    misfit = objective.misfit_rad(x)
-    evaluations = objective.evaluations + nearby.evaluations
+    _, misfit = on_all_samples(problem, x)
+    evaluations += 1 + nearby.evaluations
     if not misfit <= found.misfit_rad * (1 + FINE):
         x, misfit = found.log_parameters, found.misfit_rad
     order = problem.residuals.model.in_order(np.exp(x)[None])[0]

@@ -16,9 +16,8 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimized
-from biogrip.identify.local_fit import PRIOR_WIDTH
+from biogrip.identify.local_fit import on_all_samples
 from biogrip.identify.many_fits import ManyFits
-from biogrip.identify.problem import Problem
 
 # Differences leave second derivatives an error of some 1e-6: of a step, so much is left to the
 # next. Whether a step is below 1e-7 every machine sees alike, and what is left is rounding.
@@ -77,7 +76,7 @@ def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
     for fit in range(len(x)):
         own = curved.of(np.array([fit]))
         for _ in range(_MOST_STEPS_ON_ALL_SAMPLES):
-            own.gradient[0], misfit_rad[fit] = _on_all_samples(fits.problems[trace[fit]], x[fit])
+            own.gradient[0], misfit_rad[fit] = on_all_samples(fits.problems[trace[fit]], x[fit])
             evaluations[fit] += 1
             step = _newton_step(fits, own, x[fit : fit + 1])[0]
             if lost[fit]:
@@ -93,14 +92,6 @@ def _newton_step(fits: ManyFits, curved: Normal, x: Array) -> Array:
     below = np.maximum(fits.low - x, -_LONGEST_STEP)
     above = np.minimum(fits.high - x, _LONGEST_STEP)
     return bounded_step(curved, np.zeros(len(x)), below, above)
-
-
-def _on_all_samples(problem: Problem, x: Array) -> tuple[Array, float]:
-    """Gradient of half the sum of squares in units of the noise, and RMS misfit in rad."""
-    gradient, misfit_rad = problem.residuals.gradient(x)
-    away = x - 0.5 * (problem.low + problem.high)
-    scale = problem.residuals.noise_scale_rad
-    return gradient / scale**2 + away / PRIOR_WIDTH**2, misfit_rad
 
 
 def _curved(fits: ManyFits, x: Array, trace: IntArray) -> Normal:
