@@ -101,12 +101,15 @@ def test_units_separators_offset_and_drift(
     other = written(
         tmp_path / "b.csv", times / 60, 1e3 * (values + 5e-4 + 1e-6 * times), "t;phi_mrad;note"
     )
-    other.write_text(other.read_text().replace(",", ";"))
+    other.write_text(other.read_text().replace(",", ";") + "6.67;-;\n6.68;;\n")
     shifted = tmp_path / "shifted.json"
     options = ("--config", few, "--time", "t", "--time-unit", "min", "--rotation", "phi_mrad")
     done = identify(other, *options, "--offset", "--drift", "--output", shifted)
     assert done.returncode == 0, done.stderr
     found = json.loads(shifted.read_text())
+    left_out = f"2 of {len(times) + 2} rows hold no number and are left out."
+    assert found["notes"][0] == left_out
+    assert f"Note: {left_out}" in done.stdout
     # Fitted along, both are known to some per cent of the rotation.
     assert found["offset_rad"] == pytest.approx(5e-4, abs=1e-4)
     assert found["drift_rad_per_s"] == pytest.approx(1e-6, abs=1e-6)

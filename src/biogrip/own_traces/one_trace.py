@@ -126,7 +126,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             "confidence": confidence,
             **_instrument(posed, recorded, np.exp(told.likelihood.best)),
             **said,
-            "notes": [*fit.notes(), *said["notes"], *doubts],
+            "notes": [*recording.notes_on_gaps(recorded), *fit.notes(), *said["notes"], *doubts],
             "noise_model": fit.noise_data(),
             **models_tried(study, case, fit, progress.within),
             "assumed": assumed(case),

@@ -8,9 +8,11 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, held
 from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
-from biogrip.products.files.traces import read_jaw_force, read_target
-from biogrip.products.stages import joined, target
+from biogrip.products.files.traces import read_jaw_force, read_measurements, read_target
+from biogrip.products.stages import joined, recording, target
+from biogrip.traces.recordings import Columns
 from tests.helpers.default import STUDY
+from tests.helpers.places import EXAMPLE
 
 
 def settings(torque_Nm: float, *more: Phase, unilateral: bool = False) -> target.Settings:
@@ -63,6 +65,24 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     np.testing.assert_allclose(
         rotation[until], bilateral[until], rtol=0, atol=1e-5 * rotation.max()
     )
+
+
+def test_rows_of_a_recording_without_a_number_are_counted(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = STUDY.cases["liquid_drop_2"]
+    settings = recording.Settings(case.gripper, case.problem, Columns("time_s", "rotation_rad"))
+    # The example is a trace of this gripper under this protocol.
+    text, rows = EXAMPLE.read_text(), 1 + np.arange(3) / 10
+    for gaps in ("", "".join(f"{400 + row:g},nan\n" for row in rows)):
+        trace, made = tmp_path / "trace.csv", tmp_path / "made.parquet"
+        trace.write_text(text + gaps)
+        recording.record(settings, trace, made)
+        samples = len(read_measurements(made).time_s)
+        said = capsys.readouterr().out
+        warned = f"{trace}: 3 of {samples + 3} rows hold no number and are left out."
+        assert (warned in said) == bool(gaps)
+        assert np.isfinite(read_measurements(made).rotation_rad[0]).all()
 
 
 def test_what_is_left_from_a_larger_study_is_not_joined(tmp_path: Path) -> None:

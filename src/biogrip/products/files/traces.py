@@ -37,11 +37,14 @@ class Measurements:
         The trace without noise; nobody knows it of a recording.
     rotation_rad
         The noisy trace of each seed, (n_samples,) each.
+    gaps
+        Rows of a recording that hold no number, and were left out.
     """
 
     time_s: Array
     target_rad: Array | None
     rotation_rad: dict[int, Array]
+    gaps: int = 0
 
 
 def write_target(

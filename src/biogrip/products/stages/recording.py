@@ -9,6 +9,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Reads
+from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.plausibility import check_recording
@@ -52,7 +53,10 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
     BiogripError
         With file, line and column, if the trace cannot be used.
     """
-    write_measurements(measurements, read_checked(settings, recorded))
+    trace = read_checked(settings, recorded)
+    for note in notes_on_gaps(trace):
+        warn(f"{recorded}: {note}")
+    write_measurements(measurements, trace)
 
 
 def read_checked(settings: Settings, recorded: Path) -> Measurements:
@@ -73,7 +77,15 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
         nuisance,
         problem.noise_rad,
     )
-    return Measurements(trace.time_s, None, {0: trace.rotation_rad})
+    return Measurements(trace.time_s, None, {0: trace.rotation_rad}, trace.without_number)
+
+
+def notes_on_gaps(trace: Measurements) -> list[str]:
+    """Say how many rows of a recording were left out, if any were."""
+    samples = len(trace.time_s)
+    if not trace.gaps:
+        return []
+    return [f"{trace.gaps} of {samples + trace.gaps} rows hold no number and are left out."]
 
 
 def check_traces(study: Study) -> None:
