@@ -88,6 +88,13 @@ def replaced(text: str, old: str, new: str) -> str:
     return text.replace(old, new)
 
 
+def waited_for(run: Run) -> set[str]:
+    """Files that `all` would wait for in a dry run, of those that the run would make."""
+    _, _, told = run.output.partition(": The whole study;")
+    reason = next(line for line in told.splitlines() if line.startswith("Reason: "))
+    return set(reason.partition("another job: ")[2].split(", "))
+
+
 def snakemake(
     folder: Path,
     *arguments: str,
