@@ -2,11 +2,12 @@
 
 from typing import Any
 
+import emcee
 import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from biogrip.experiment.sample import CANDIDATES, MODELS
+from biogrip.experiment.sample import CANDIDATES, MODELS, model_named
 from biogrip.identifiability.convergence import convergence_of
 from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR, marginals_of
 from biogrip.identifiability.mixture import FREEDOM, Mixture, mixture_of
@@ -216,3 +217,22 @@ def test_priors_are_of_what_is_identified() -> None:
     branch = PosteriorSettings(prior={"k_1": LogNormal(1, 1), "k_p": LogNormal(1, 1)})
     assert [path for path, _ in branch.problems_of(several, [])] == [("prior", "k_1")]
     assert list(settings.problems_of(MODELS["maxwell"], [])) != []
+
+
+def test_as_many_walkers_as_the_sampler_wants() -> None:
+    """Twice the parameters: with fewer, emcee itself refuses to begin."""
+    model = model_named("generalized_maxwell", 5)
+    least = 2 * len(model.names)
+    (problem,) = PosteriorSettings(walkers=least - 1).problems_of(model, [])
+    said = f"found {least - 1}, allowed are at least {least} where 12 parameters are identified."
+    assert problem == (("walkers",), said)
+    assert not list(PosteriorSettings(walkers=least).problems_of(model, []))
+    assert not list(PosteriorSettings(walkers=least - 1).problems_of(model, ["k_1"]))
+    for walkers in (least - 1, least):
+        start = np.random.default_rng(0).normal(size=(walkers, 12))
+        sampler = emcee.EnsembleSampler(walkers, 12, lambda x: -float(x @ x))
+        if walkers < least:
+            with pytest.raises(RuntimeError, match="fewer walkers than twice"):
+                sampler.run_mcmc(start, 1)
+        else:
+            assert len(sampler.run_mcmc(start, 1).coords) == walkers

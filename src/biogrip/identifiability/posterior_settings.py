@@ -50,7 +50,7 @@ class PosteriorSettings:
     ] = False
 
     def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
-        """Find priors of what a model does not have, or of branches that are told by their order.
+        """Find priors of what a model does not have, and too few walkers for its parameters.
 
         Parameters
         ----------
@@ -60,6 +60,10 @@ class PosteriorSettings:
             Parameters that are not identified.
         """
         searched = [name for name in model.names if name not in known]
+        if self.walkers < 2 * len(searched):
+            # As emcee wants them: their differences have to span all directions.
+            text = f"found {self.walkers}, allowed are at least {2 * len(searched)}"
+            yield ("walkers",), f"{text} where {len(searched)} parameters are identified."
         branches = [name for pair in model.branches for name in pair] * (len(model.branches) > 1)
         for name in self.prior:
             if name not in searched:
