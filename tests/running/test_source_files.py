@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from biogrip.running.source_files import fingerprint, source_files
+from tests.helpers.places import EXAMPLE
 
 
 def stems(module: str) -> set[str]:
@@ -138,6 +139,10 @@ def test_what_starts_often_loads_no_library_that_it_does_not_use() -> None:
     stages = "biogrip.products.stages"
     assert not heavy & loaded_by(f"import {stages}.measurement, {stages}.identifications")
     assert not {*heavy, "numpy", "pyarrow"} & loaded_by("import biogrip.cli; biogrip.cli._parser()")
+    # Tables and figures are of a page that was not asked for.
+    read = "import biogrip.own_traces.identify; from biogrip.traces.plain_rows import plain_rows"
+    read += f"; from pathlib import Path; plain_rows(Path({str(EXAMPLE)!r}), 1, 2, (0, 1), ',')"
+    assert loaded_by(read) & {*heavy, "pyarrow"} == {"pyarrow", "scipy"}
 
 
 def test_a_fingerprint_changes_with_what_a_module_imports(

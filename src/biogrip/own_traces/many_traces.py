@@ -4,14 +4,16 @@ import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from biogrip.errors import BiogripError
 from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
-from biogrip.own_traces.page import Page
 from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
+
+if TYPE_CHECKING:
+    from biogrip.own_traces.page import Page
 
 _OF_QUANTITY = ("verdict", "value", "low", "high")
 
@@ -32,7 +34,7 @@ class Told:
     refused: dict[str, str]
 
 
-def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: Page | None) -> Told:
+def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | None") -> Told:
     """Identify traces, each by itself.
 
     Parameters

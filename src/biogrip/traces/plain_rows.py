@@ -20,6 +20,9 @@ _GAPS = ("", "-", "na", "NA", "n/a", "N/A", "nan", "NaN", "NAN")
 # More than that is no cell of a table, see `csv.field_size_limit`.
 _LONGEST_LINE = 100_000
 
+# Made without a number of Python's, whose conversion loads pandas first.
+_NO_NUMBER = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array([np.nan]))])[0]
+
 
 def plain_rows(
     path: Path, header_lines: int, width: int, wanted: Sequence[int], separator: str
@@ -86,8 +89,8 @@ def _parsed(
     rows = np.empty((len(table), len(chosen)))
     for place, name in enumerate(chosen):
         column = table[name]
-        # Arrow's own conversion loads pandas first.
-        filled = compute.fill_null(column, float("nan")).combine_chunks()
+        # Arrow's own conversion to numpy loads pandas first.
+        filled = compute.fill_null(column, _NO_NUMBER).combine_chunks()
         rows[:, place] = np.frombuffer(filled.buffers()[1])[filled.offset :][: len(filled)]
         # Infinity, or not a number in some other spelling.
         if np.count_nonzero(np.isfinite(rows[:, place])) != len(table) - column.null_count:
