@@ -88,7 +88,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     # One limit below each column of methods, whose names would be too wide otherwise.
     half = -(-len(curves) // 2)
     handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
-    drawn.legend(handles=handles, loc="outside lower center", ncols=2)
+    drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
     return drawn
 
 
