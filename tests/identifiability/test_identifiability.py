@@ -101,10 +101,19 @@ def test_quantities_and_their_gradients(form: str) -> None:
     moved = quantity.moved(x, quantity.log(x) + 0.7)
     assert quantity.log(moved) == pytest.approx(quantity.log(x) + 0.7, rel=1e-12)
     low, high = quantity.range(x - 1, x + 2)
-    places = (3 * np.array(place) - 1 for place in np.ndindex(2, 2, 2, 2))
+    # What the other members are is all the same: of a sum nothing, in series rigid.
+    others = {"sum": -50.0, "series": 50.0}.get(form)
+    places = (3 * np.array(place) - 1.0 for place in np.ndindex(2, 2, 2, 2))
     corners = [quantity.log(x + place) for place in places]
-    assert low == pytest.approx(min(corners))
-    assert high == pytest.approx(max(corners))
+    alone = []
+    for member in quantity.members if others is not None else ():
+        for place in (-1.0, 2.0):
+            at = x.copy()
+            at[list(quantity.members)] = others
+            at[member] = x[member] + place
+            alone.append(quantity.log(at))
+    assert low == pytest.approx(min(alone if form == "series" else corners))
+    assert high == pytest.approx(max(alone if form == "sum" else corners))
 
 
 @functools.cache

@@ -7,15 +7,17 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import MODELS, model_named, with_fixed
+from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.many_limits import many_limits
-from biogrip.identifiability.many_profiles import many_profiles
+from biogrip.identifiability.many_profiles import many_profiles, profiles_of
 from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identify.local_fit import FINE, local_fit
+from biogrip.response.linear import rotation, step_response
 from tests.helpers.definition import Held
-from tests.helpers.problems import MODEL, identified, of_case
+from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
 
 LOW = np.full(4, -3.0)
 HIGH = np.full(4, 4.0)
@@ -162,6 +164,31 @@ def test_limits_of_a_profile_are_those_near_the_optimum() -> None:
     for near, profiles in zip(limits, many_profiles(each, quantities), strict=True):
         ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
         np.testing.assert_allclose(ends, near, rtol=0, atol=1e-3)
+
+
+def test_the_search_range_determines_no_combination() -> None:
+    """Loud noise leaves only that the sample is not stiffer; two springs in series likewise.
+
+    Softer than the softest spring of the search range they could be only if both were at its end.
+    """
+    sample = np.array([[20.0, 5.0, 80.0, 1e-3]])
+    times = np.linspace(0.0, 400.0, 801)
+    clean_rad = rotation(step_response(GRIPPER, MODEL.network(sample)), TORQUE, times)[0]
+    noise = 4e-6 * np.random.default_rng(1).standard_normal(len(times))
+    posed = posed_for(MODEL, times, clean_rad + noise)
+    found, k_and_k_p = run("least_squares", posed), combinations_of(MODEL, [0, 1])
+    told = diagnose(posed, MODEL, found, confidence=0.95, noise_rad=1e-4)
+    series = next(q for q in k_and_k_p if q.form == "series")
+    # To first order it is known well enough to be looked at.
+    assert told.likelihood.deviation(series) < 0.5
+    for one in (profile(told.likelihood, series), profiles_of(told.likelihood, [series])[0]):
+        assert one.low is None
+        assert one.high is not None
+    assert told.trades == []
+    # With one spring as soft as it may be, and the other any, it is lower than any limit.
+    soft, best = posed.low[0], told.likelihood.best
+    assert series.log(np.array([soft, *best[1:]])) < soft + 1e-3
+    assert rest_fitted(told.likelihood, [0], [soft], best) < told.likelihood.threshold
 
 
 def test_points_of_a_valley_take_one_call() -> None:

@@ -111,6 +111,34 @@ def test_the_papers_traces_pass_and_not_in_a_wrong_unit(
         assert small.endswith("It would fit if it were 1000 times.")
 
 
+@pytest.mark.parametrize("samples", [10, 12, 15, 45, 57, 300])
+def test_what_rounding_leaves_of_a_torque_is_no_response(gripper: Gripper, samples: int) -> None:
+    """While one torque is held, the quickest lag is a constant: nothing of it is beside an offset.
+
+    The sample relaxes within the hold, so that its rotation is no constant.
+    """
+    torque = torque_history(PROTOCOLS["one hold"])
+    even = np.linspace(0.0, 60.0, samples + 1)[1:]
+    rng = np.random.default_rng(samples)
+    for times in (even, *np.sort(rng.uniform(0.1, 60.0, (20, samples)))):
+        clean = trace(gripper, torque, (10.0, 0.1, 100.0, 1.0), times)
+        assert np.ptp(clean) > 0.2 * clean.max()
+        noisy = clean + 0.01 * clean.max() * rng.standard_normal(samples)
+        for values in (clean, noisy):
+            check(recorded(times, values + 1e-4), gripper, torque, FILE, SI, offset=True)
+            assert "goes against the torque" in refusal(recorded(times, -values), gripper, torque)
+
+
+def test_a_rotation_too_large_to_be_squared_is_refused(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    for factor in (1e12, 1e160, 1e300):
+        said = refusal(recorded(times, factor * values), gripper, steps)
+        assert "as the largest with the noise smoothed out; allowed is at most 0.00545 rad" in said
+
+
 def test_the_largest_sample_and_the_smoothed_one_are_told(
     gripper: Gripper, steps: TorqueHistory
 ) -> None:

@@ -51,10 +51,11 @@ def many_limits(
     fits = fits or HeldFits(likelihoods, quantities)
     shape = (len(likelihoods), len(quantities), 2)
     trace, which, upper = (index.ravel() for index in np.indices(shape))
-    low, high = (end[which] for end in fits.ranges())
     stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[trace, which]
     # Inside and outside, by row.
     ends = np.stack((fits.at_best()[trace, which], np.full(len(trace), np.nan)))
+    low, high = (end[which] for end in fits.ranges())
+    low, high = np.minimum(low, ends[0]), np.maximum(high, ends[0])
     rises, x = np.zeros_like(ends), np.stack((fits.best[trace], fits.best[trace]))
     limits = np.full(len(trace), np.nan)
     left = np.arange(len(trace))

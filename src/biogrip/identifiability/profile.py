@@ -232,6 +232,7 @@ def limits_near(likelihood: Likelihood, quantity: Quantity) -> tuple[float | Non
     fits = _Held(likelihood, quantity, _FAST)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start, step = quantity.log(likelihood.best), likelihood.deviation(quantity)
+    ends = min(ends[0], start), max(ends[1], start)
     found = []
     for end, sign in zip(ends, (-1, 1), strict=True):
         inner = fits.best

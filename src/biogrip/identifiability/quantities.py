@@ -124,7 +124,12 @@ class Quantity:
         return moved
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
-        """Logarithms between which it can lie if the log-parameters lie within bounds."""
+        """Logarithms between which it can lie if the log-parameters lie within bounds.
+
+        Of a sum and a series combination, as far as one member can reach whatever the others
+        are: where all of them have to be at the ends of their ranges, it is these that keep
+        the quantity from going further, and not the trace.
+        """
         if self.form == "product":
             first = [
                 low[i] if s > 0 else -high[i] for i, s in zip(self.members, self.sign, strict=True)
@@ -133,7 +138,10 @@ class Quantity:
                 high[i] if s > 0 else -low[i] for i, s in zip(self.members, self.sign, strict=True)
             ]
             return float(sum(first)), float(sum(last))
-        return self.log(low), self.log(high)
+        members = list(self.members)
+        if self.form == "sum":
+            return self.log(low), float(np.max(high[members]))
+        return float(np.min(low[members])), self.log(high)
 
     @property
     def _sense(self) -> int:

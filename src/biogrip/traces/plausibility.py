@@ -59,6 +59,10 @@ _LAG_SHARES = (1e-6, 0.1, 10.0)
 _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
 # Share of a constant that offset and drift leave over, from which on it is one.
 _NO_CONSTANT = 1e-6
+# Share of a function's norm that may be rounding.
+_ROUNDING = 1e-9
+# Of free rotations: no noise, and no unit, is that large.
+_ABSURD = 1e9
 # Samples that are looked at at once.
 _AT_ONCE = 65_536
 
@@ -148,7 +152,11 @@ def check_recording(
         which the trace would do.
     """
     _check_times(recording, torque.end_s, path, columns)
-    trace, lagged = recording.rotation_rad, _lagged(torque)
+    trace, lagged, free = recording.rotation_rad, _lagged(torque), free_rotation(gripper, torque)
+    largest = float(np.abs(trace).max())
+    if largest > _ABSURD * free:
+        # Its square may be more than a number can be.
+        _check_turn(recording, largest, free, path, columns)
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
     if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
@@ -166,7 +174,7 @@ def check_recording(
         )
     turns = (fit.weights @ lagged(recording.time_s[some]) for some in _parts(len(trace)))
     turn = max(float(np.abs(part).max()) for part in turns)
-    _check_turn(recording, turn, free_rotation(gripper, torque), path, columns)
+    _check_turn(recording, turn, free, path, columns)
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -236,11 +244,21 @@ def _parts(samples: int) -> Iterator[slice]:
     return (slice(start, start + _AT_ONCE) for start in range(0, samples, _AT_ONCE))
 
 
+def _cleared(basis: Array, functions: Array) -> Array:
+    """Do as `without`, and leave nothing of functions that lie in the span but for rounding.
+
+    What rounding leaves of a lag that has long passed, beside an offset, would be a function like
+    any other, and among so few rows as good as any.
+    """
+    rest = without(basis, functions)
+    left, whole = np.linalg.norm(rest, axis=1), np.linalg.norm(functions, axis=1)
+    return np.where(left[:, None] > _ROUNDING * whole[:, None], rest, 0.0)
+
+
 def _fit(functions: _Functions) -> _Fit:
     nuisance = functions.nuisance
-    seen, trace = without(nuisance, functions.lagged), without(nuisance, functions.trace)
-    rounding = functions.samples * np.finfo(float).eps
-    found, _, rank, _ = np.linalg.lstsq(seen.T, trace, rounding)
+    seen, trace = _cleared(nuisance, functions.lagged), without(nuisance, functions.trace)
+    found, _, rank, _ = np.linalg.lstsq(seen.T, trace, _ROUNDING)
     weights: Array = np.asarray(found, np.float64)
     return _Fit(weights @ seen, weights, int(rank))
 
@@ -278,7 +296,7 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
     responses = _extreme_responses(functions.lagged, gripper)
     declared, freed = (
-        [_left_over(without(basis, trace), sign * without(basis, responses)) for sign in (1, -1)]
+        [_left_over(without(basis, trace), sign * _cleared(basis, responses)) for sign in (1, -1)]
         for basis in (nuisance, also)
     )
     if noise_rad is not None:
@@ -311,6 +329,8 @@ def _left_over(trace: Array, responses: Array) -> float:
 
     scale = np.linalg.norm(responses, axis=1)
     told = scale > 0
+    if not np.any(told):
+        return float(trace @ trace)
     return float(nnls((responses[told] / scale[told, None]).T, trace)[1] ** 2)
 
 

@@ -153,7 +153,7 @@ def read_history(
                 for group in range(file.num_row_groups)
             ]
         return pd.concat(parts, ignore_index=True)[columns]
-    except (KeyError, OSError, ValueError) as error:
+    except (KeyError, OSError, TypeError, ValueError, pa.ArrowException) as error:
         raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
 
 
