@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from biogrip.products.figures import overview, profiles, valley
 from biogrip.products.figures.decades import decade_ticks
-from biogrip.products.figures.style import figure, styled
+from biogrip.products.figures.style import figure, lay_out, styled
 
 BEST = 2.0
 
@@ -145,6 +145,19 @@ def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
     fit = drawn_valley(tmp_path, CLOSED, {"c": [2.0, 9.0], "c_p": [7.0, 1.0]})
     assert 0 < fit.get_xlim()[0] < 2
     assert fit.get_ylim()[1] > 7
+
+
+def test_a_paper_far_off_is_marked_and_leaves_the_valley_its_room(tmp_path: Path) -> None:
+    fits, size = {"c": [9.0], "c_p": [1.0]}, []
+    for c in (9.0, 1e5):
+        axes = drawn_valley(tmp_path, DEEP, fits, paper={"c": c, "c_p": 1.0})
+        with styled():
+            lay_out(axes.figure, 100)
+        size.append(axes.get_position().height)
+    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
+    assert float(np.asarray(beyond.get_xdata())[0]) == axes.get_xlim()[1]
+    # A third row of the legend is a twentieth of the figure.
+    assert size[1] > 0.85 * size[0]
 
 
 def test_where_truth_and_paper_coincide_both_are_seen(tmp_path: Path) -> None:

@@ -27,7 +27,8 @@ _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
 # this multiple of the sum, and are as long as this one at least.
 _DEEP, _AROUND, _FARTHEST, _LEAST = 10.83, 0.12, 1.15, 0.02
 
-_POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False}
+# The layout would make room at the origin for a name without points.
+_POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False, "in_layout": False}
 _FITS = _POINTS | {
     "color": FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
 }  # fmt: skip
