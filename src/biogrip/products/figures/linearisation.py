@@ -101,8 +101,11 @@ def _difference(axes: Axes, case: Compared) -> None:
     axes.axhline(0, color=TARGET, linewidth=0.6)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("nonlinear - linear rotation (mrad)")
-    peak = f"peak {1e3 * np.max(np.abs(linear)):.3g} mrad"
-    axes.annotate(peak, (0.98, 0.94), xycoords="axes fraction", ha="right", fontsize=7)
+    bottom, top = axes.get_ylim()
+    # Room above the curve for what is written there.
+    axes.set_ylim(bottom, top + 0.08 * (top - bottom))
+    peak = f"peak rotation {1e3 * np.max(np.abs(linear)):.3g} mrad"
+    axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 LINEARISATION_MAP = drawing(
