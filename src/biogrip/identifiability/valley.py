@@ -13,8 +13,9 @@ from biogrip.identifiability.profile import Likelihood
 from biogrip.identify.local_fit import FAIR, local_fit
 from biogrip.identify.many_fits import fit_together
 
-# Shares of the first in the sum, and sums over the best sum: fine where the valley is.
-_SHARES = np.linspace(0.002, 0.998, 25)
+# Shares of the first in the sum, fine where either is next to nothing, and sums over the best sum,
+# fine where the valley is.
+_SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
 _BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
 # Share of one more than the rise by which a fit has to become better to be news to its neighbours.
 _NEWS = 1e-3
