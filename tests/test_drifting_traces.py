@@ -78,7 +78,7 @@ def test_a_drift_that_a_sample_could_have_shown_is_suspected(tmp_path: Path) -> 
 
 
 def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
-    """Each would be once in two hundred times."""
+    """Each would be in three of a thousand traces, by each of the tests."""
     for seed in range(4):
         told, doubts = suspected(tmp_path, seed, 0 * DRIFT)
         assert (told.notes, doubts) == ([], [])
