@@ -2,6 +2,7 @@
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -217,6 +218,20 @@ def test_a_wrong_model_is_doubted() -> None:
     diagnosis = diagnose(posed, DAMPER, run("least_squares", posed), confidence=0.95)
     assert any("residuals are correlated" in note for note in diagnosis.notes)
     assert any("times the noise of the trace" in note for note in diagnosis.notes)
+
+
+@pytest.mark.parametrize(("times", "said"), [(0.5, False), (1.5, False), (2.5, True), (27, True)])
+def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool) -> None:
+    posed = problem("endothelial_cell", 1)
+    found = run("least_squares", posed)
+    noise_rad = times * found.misfit_rad
+    told = diagnose(posed, MODEL, found, confidence=0.95, noise_rad=noise_rad)
+    words = f"The noise that was given is {times:.2g} times what the fit leaves"
+    assert any(note.startswith(words) for note in told.notes) == said
+    # Of a trace without noise nothing is left at all, whatever noise it is held against.
+    exact = replace(found, misfit_rad=1e-3 * noise_rad)
+    told = diagnose(posed, MODEL, exact, confidence=0.95, noise_rad=noise_rad)
+    assert not any("that was given" in note for note in told.notes)
 
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:

@@ -312,11 +312,13 @@ def test_a_decimal_comma_among_commas_is_not_read_as_cells(tmp_path: Path) -> No
         (
             ["# x", "time_s,rotation", *ROWS],
             ", line 2, column 'rotation_rad': found no such column, allowed are time_s, rotation. "
-            "Did you mean 'rotation'?",
+            "Did you mean 'rotation'? Say which is which by --time and --rotation, or time and "
+            "rotation under measurement.",
         ),
         (
             [*ROWS],
-            ", line 1, column 'time_s': found no such column, allowed are 0, 0e-6.",
+            ", line 1, column 'time_s': found no such column, allowed are 0, 0e-6. Say which is "
+            "which by --time and --rotation, or time and rotation under measurement.",
         ),
         (
             ["time_s,rotation_rad,time_s", *ROWS],

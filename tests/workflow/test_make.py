@@ -135,6 +135,10 @@ def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
         (("erors", *CASE), "no product 'erors'. Did you mean 'errors'? Allowed: "),
         (("errors",), "errors: is made with --case, which is missing."),
         (
+            ("identification", *CASE, *METHOD, "--batch", "seeds_0-24"),
+            "--batch: found 'seeds_0-24'. Did you mean 'seeds_0-0'? Allowed: seeds_0-0, seeds_1-1.",
+        ),
+        (
             ("errors", "--case", "liquid_drop_3"),
             "--case: found 'liquid_drop_3'. Did you mean 'liquid_drop_2'? Allowed: liquid_drop_2.",
         ),
@@ -143,7 +147,7 @@ def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
         (("measurement", *CASE), "measurement: is made with --batch, which is missing."),
         (
             ("measurement", *CASE, "--batch", "0-1"),
-            "--batch: found '0-1', allowed is seeds_FIRST-LAST.",
+            "--batch: found '0-1'. Allowed: seeds_0-0, seeds_1-1.",
         ),
         (
             ("identification", *BATCH, "--method", "genetics"),

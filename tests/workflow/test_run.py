@@ -90,6 +90,10 @@ def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:
     (tiny_copy / errors).unlink()
     run = called(tiny_copy, "run", "overlay.yaml", "-j2", errors)
     assert run.status == 0, run.output
+    # What was asked for, not pages that an earlier run has made.
+    assert run.output.splitlines()[-1] == f"biogrip: done. Open {errors}."
+    run = called(tiny_copy, "run", "overlay.yaml", "-j2")
+    assert run.status == 0, run.output
     assert run.output.splitlines()[-1] == (
         "biogrip: done. Open results/report.html, results/summaries/liquid_drop_2.html."
     )

@@ -7,7 +7,7 @@ import numpy as np
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
-from biogrip.identifiability.whiteness import doubts_about_noise
+from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.problem import Problem
@@ -17,6 +17,8 @@ from biogrip.response.grip import Grip
 _TOO_MUCH = 1.2
 # A residual so far below the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
+# Nobody knows his noise to better than that, so that less of a misfit is worth a word.
+_TOO_LITTLE = 0.5
 
 
 @dataclass(frozen=True)
@@ -121,6 +123,11 @@ def _notes(likelihood: Likelihood) -> list[str]:
             "Intervals that allow for such noise are those of measurement.noise_model: coloured, "
             "or --noise-model coloured."
         )
+    if _too_little(likelihood):
+        notes.append(
+            f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
+            "fit leaves: its value, or its unit, is not the right one."
+        )
     scale = residuals.noise_scale_rad
     if misfit_rad > _TOO_MUCH * scale:
         notes.append(
@@ -128,3 +135,13 @@ def _notes(likelihood: Likelihood) -> list[str]:
             "protocol, the gripper or the unit is not the right one."
         )
     return notes
+
+
+def _too_little(likelihood: Likelihood) -> bool:
+    """Whether the noise leaves so small a misfit by chance only, which a chi-squared test tells."""
+    from scipy.special import chdtr
+
+    residuals = likelihood.problem.residuals
+    share = likelihood.misfit_rad / likelihood.noise_rad
+    left = max(residuals.free - len(likelihood.best), 1)
+    return share < _TOO_LITTLE and float(chdtr(left, residuals.samples * share**2)) < FALSE_ALARM

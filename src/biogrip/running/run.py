@@ -68,7 +68,7 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
         command += ["--configfile", *map(str, configs)]
     status = signals.supervise(command)
     if status == 0 and signals.first is None and not known.dry_run:
-        print(_to_open(folder / "results"))
+        print(_to_open(folder, rest))
     return status
 
 
@@ -185,10 +185,12 @@ class _Signals:
             os.kill(child.pid, signal.SIGINT)
 
 
-def _to_open(results: Path) -> str:
-    """Name what a reader should look at first."""
+def _to_open(folder: Path, arguments: list[str]) -> str:
+    """Name what a reader should look at first: the files that were asked for, else the pages."""
+    results = folder / "results"
     pages = sorted((results / "summaries").glob("*.html"))
-    shown = [results / "report.html", *pages]
+    asked = [folder / word for word in arguments if (folder / word).is_file()]
+    shown = asked or [results / "report.html", *pages]
     there = [str(path) for path in shown if path.is_file()]
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""
     return f"biogrip: done. Open {', '.join(there[:_SHOWN])}{more}." if there else "biogrip: done."

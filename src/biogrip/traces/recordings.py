@@ -23,6 +23,7 @@ MOST_ROWS = 10_000_000
 # Of the last time: closer ones are no clock's, but of numbers that damage made.
 _SHORTEST_STEP = 1e-18
 
+_WHICH = " Say which is which by --time and --rotation, or time and rotation under measurement."
 _SPELLED_OUT = {
     "s": ("sec", "secs", "second", "seconds"),
     "ms": ("msec", "millisecond", "milliseconds"),
@@ -188,12 +189,14 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
         If neither tells an allowed unit, or they contradict each other.
     """
     choices = ", ".join(allowed)
+    quantity = "time" if allowed is TIME_UNITS else "rotation"
     named = _unit_at_end(column, allowed)
     stated = named if given is None else _plain(given)
     if stated is None:
         raise BiogripError(
-            f"{place(path, column=column)}: found no unit, neither stated nor at the end of the "
-            f"name, allowed are {choices}."
+            f"{place(path, column=column)}: found no unit, neither stated (by --{quantity}-unit, "
+            f"or {quantity}_unit under measurement) nor at the end of the name; allowed are "
+            f"{choices}."
         )
     if stated not in allowed:
         raise BiogripError(
@@ -305,7 +308,7 @@ def _index(path: Path, line: int, names: list[str], column: str) -> int:
     if not indices:
         raise BiogripError(
             f"{place(path, line, column)}: found no such column, allowed are {_listed(names)}."
-            + nearest(column, names)
+            f"{nearest(column, names)}{_WHICH}"
         )
     if len(indices) > 1:
         raise BiogripError(

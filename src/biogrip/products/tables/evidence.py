@@ -155,7 +155,9 @@ def _grip_rows(case: Truth, target: Path) -> list[tuple[Cell, ...]]:
     if not len(reduced):
         return []
     lowest = reduced[np.argmin(force[reduced])]
-    remark = f"the lowest, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
+    remark = (
+        f"lowest of the samples, at {time_s[lowest]:.4g} s; negative: the jaws would have to pull"
+    )
     quantity = f"{case.title}: jaw force at the lower torque"
     return [(quantity, "uN", "maintains the grip", 1e6 * float(force[lowest]), remark)]
 
