@@ -19,7 +19,7 @@ from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
 from biogrip.own_design import designed
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.asked_design import plausible, wanted_of
+from biogrip.study.asked_design import plausible, plausible_ends, wanted_of
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from tests.helpers.default import study_of
@@ -268,6 +268,15 @@ def test_plausible_samples_fill_their_ranges() -> None:
         assert np.all((place > 0) & (place < 1))
         # Halton's sequence has one in nearly every tenth.
         assert len(np.unique(np.floor(10 * place))) >= 9
+
+
+def test_where_traces_tell_nothing_parameters_lie_within_both_ranges() -> None:
+    """Of what is asked, what is searched: k up to 9.9e7 N/m, dampers up to 9.9e4 N s/m."""
+    ranges = "{k: [1.0e-6, 1.0e+12], k_p: [2.0, 3.0], c: [5.0, 1.0e+7]}"
+    text = ASKED.replace("tried: 128", f"tried: 128, ranges: {ranges}")
+    low, high = plausible_ends(study_of(text).cases["liquid_drop_2"])
+    np.testing.assert_allclose(np.exp(low), [1.1e-4, 2.0, 5.0, 1.1e-5], rtol=1e-9)
+    np.testing.assert_allclose(np.exp(high), [9.9e7, 3.0, 9.9e4, 9.9e4], rtol=1e-9)
 
 
 @pytest.mark.parametrize(

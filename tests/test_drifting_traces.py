@@ -1,10 +1,11 @@
 """What drifts slowly beside the noise is said of a trace, and what does not is not."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from biogrip.arrays import Array
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
@@ -12,13 +13,14 @@ from biogrip.identifiability.whiteness import wandering
 from biogrip.identify.answer import silent
 from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.second_opinion import second_opinion
+from biogrip.own_traces.second_opinion import fall_of, second_opinion
 from biogrip.products.files.traces import Measurements
 from tests.helpers.problems import clean, run
 
 TIMES, CLEAN = clean("endothelial_cell", 5.0)
 SIGMA = 0.1 * float(CLEAN.max())
 DRIFT = SIGMA * TIMES / TIMES[-1]
+UNDECLARED = ReadAs()
 SLOW = SIGMA * np.sin(2 * np.pi * TIMES / 150)
 
 
@@ -33,10 +35,12 @@ def written(path: Path, rotation: Array) -> Path:
     return path
 
 
-def suspected(folder: Path, seed: int, added: Array) -> tuple[Diagnosis, list[str]]:
+def suspected(
+    folder: Path, seed: int, added: Array, declared: ReadAs = UNDECLARED
+) -> tuple[Diagnosis, list[str]]:
     """What is said of a trace, and of an offset and a drift in it."""
     rotation = trace(seed, added)
-    study = study_of(Wanted(written(folder / "t.csv", rotation), "liquid_drop", ReadAs(), None))
+    study = study_of(Wanted(written(folder / "t.csv", rotation), "liquid_drop", declared, None))
     (case,) = study.cases.values()
     problem = case.problem.of(TIMES, rotation)
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
@@ -74,10 +78,33 @@ def test_a_drift_that_a_sample_could_have_shown_is_suspected(tmp_path: Path) -> 
 
 
 def test_a_trace_that_does_not_drift_is_not_suspected(tmp_path: Path) -> None:
-    """Each would be once in two hundred times."""
+    """Each would be in three of a thousand traces, by each of the tests."""
     for seed in range(4):
         told, doubts = suspected(tmp_path, seed, 0 * DRIFT)
         assert (told.notes, doubts) == ([], [])
+
+
+def test_an_offset_beside_a_declared_drift_is_one_degree_of_freedom(tmp_path: Path) -> None:
+    """What is said of the fall of chi^2 is rounded to three digits, and its chance to one."""
+    declared = ReadAs(drift=True)
+    (said,) = suspected(tmp_path, 0, np.full(len(TIMES), 0.6 * SIGMA), declared)[1]
+    found = re.search(r"falls by (\S+); by chance it would once in (\S+) traces", said)
+    assert found is not None
+    assert float(found[2]) == pytest.approx(1 / chi2.sf(float(found[1]), 1), rel=0.6)
+
+
+@pytest.mark.parametrize("known", [None, 2.0])
+def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
+    known: float | None,
+) -> None:
+    """With the noise that is known, or that with which each residual is likeliest."""
+    residual = np.random.default_rng(4).standard_normal(50)
+    fits = 2.0 * residual, 1.7 * residual
+    before_rad, after_rad = (float(np.sqrt(np.mean(fit**2))) for fit in fits)
+    before = norm.logpdf(fits[0], scale=known or before_rad).sum()
+    after = norm.logpdf(fits[1], scale=known or after_rad).sum()
+    found = fall_of(50, before_rad, after_rad, known)
+    assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 
 def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:

@@ -1,10 +1,12 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import biogrip
 from biogrip import library
+from tests.response.test_nonlinear import ARM, TIMES, symmetric_radau
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
 
@@ -24,6 +26,28 @@ def test_what_the_documentation_shows_runs(
     (k_p,) = (f for f in told.findings if f.quantity.label == "k_p")  # type: ignore[attr-defined]
     assert k_p.low < 5.0 < k_p.high
     assert (tmp_path / "fit.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_gives() -> None:
+    """Against Radau without inertia; at ten times the paper's torque a cell shows 3e-4 of it."""
+    gripper = library.Gripper(1.5e-3, 60.0, ARM, ARM)
+    protocol = (library.held(200.0, 1.6e-8), library.held(200.0, 3.2e-9))
+    sample = {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3}
+    linear, nonlinear = (
+        library.simulate(
+            library.set_up(
+                gripper, protocol, library.Sample("generalized_maxwell"), nonlinear=nonlinear
+            ),
+            sample,
+            TIMES,
+        )
+        for nonlinear in (False, True)
+    )
+    ends = [(200.0, 1.6e-8), (400.0, 3.2e-9)]
+    peak = float(nonlinear.max())
+    expected = symmetric_radau(gripper, np.array(list(sample.values())), ends, TIMES, peak)
+    np.testing.assert_allclose(nonlinear, expected, rtol=0, atol=1e-6 * peak)
+    assert np.max(np.abs(linear - expected)) > 1e-4 * peak
 
 
 def test_all_of_the_library_can_be_had_from_the_package() -> None:

@@ -54,6 +54,14 @@ def _random(seed: int, samples: int) -> tuple[Array, Array]:
     return told, rng.integers(1, 8, 40).astype(float)
 
 
+def test_samples_weigh_by_a_power_of_the_root_of_their_determinant() -> None:
+    """Of two parameters roots of 36 and 9, so 36 to 9 of squares."""
+    covariances = np.array([np.diag([4.0, 9.0]), np.diag([1.0, 9.0])])
+    of_samples, of_covariances = Criterion("D", "worst", (0, 1)).weights(covariances, 2.0)
+    assert of_samples == pytest.approx([0.8, 0.2])
+    np.testing.assert_allclose(of_covariances[0], np.diag([1 / 4, 1 / 9]))
+
+
 @pytest.mark.parametrize("over", OVER)
 @pytest.mark.parametrize("name", CRITERIA)
 def test_nothing_else_is_better_than_the_gap_says(name: str, over: str) -> None:

@@ -218,3 +218,12 @@ def test_what_each_instrument_added_is_its_own() -> None:
         residual[201:] / joint.residuals.weights[1],
     )
     assert halves[0] == pytest.approx(halves[1], abs=1e-15)
+
+
+def test_the_colour_of_all_is_known_as_badly_as_that_of_the_least_known() -> None:
+    """Student's t of few degrees of freedom is the wider one."""
+    parts = [
+        problem.residuals.with_freedom(freedom)
+        for problem, freedom in zip(traces([0.1, 0.1], [101, 101]), (7.0, 30.0), strict=True)
+    ]
+    assert JointResiduals(parts, [1e-6, 1e-6]).freedom == 7.0

@@ -94,7 +94,21 @@ def test_cells_are_shrunk_by_how_well_they_are_known() -> None:
     found = dish(y, s)
     moved = (y - found.shrunk) / (y - found.centre)
     assert moved == pytest.approx(s**2 / (s**2 + found.spread**2), rel=1e-9)
-    assert np.all(found.shrunk_deviations < np.maximum(s, found.spread))
+
+
+def test_shrunk_cells_are_the_normal_equations_of_all_cells_and_the_median() -> None:
+    """Cells within the spread of the median, estimates within their errors of the cells."""
+    y, s = np.array([0.0, 0.5, 1.0, 2.0]), np.array([0.3, 0.4, 0.3, 0.5])
+    found = dish(y, s)
+    precision = np.diag([*1 / s**2, 0.0])
+    for cell in range(4):
+        apart = np.eye(5)[cell] - np.eye(5)[4]
+        precision += np.outer(apart, apart) / found.spread**2
+    covariance = np.linalg.inv(precision)
+    assert found.shrunk == pytest.approx((covariance @ [*y / s**2, 0.0])[:4], rel=1e-9)
+    # With the estimated spread Q is 3, as statsmodels meets it: to 1e-5.
+    expected = np.sqrt(np.diag(covariance)[:4])
+    assert found.shrunk_deviations == pytest.approx(expected, rel=1e-4)
 
 
 def test_neither_order_nor_unit_matters() -> None:

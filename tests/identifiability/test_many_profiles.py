@@ -7,6 +7,7 @@ import pytest
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import MODELS, model_named, with_fixed
+from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.held_fits import HeldFits
@@ -222,3 +223,38 @@ def test_a_model_with_one_parameter_has_a_profile() -> None:
     alone = profile(likelihood, quantities[0])
     ends = np.array([alone.low, alone.high], dtype=float)
     np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
+
+
+class TwoBasins(HeldFits):
+    """Rises in two basins, which fits do not leave; a second parameter says in which they are."""
+
+    def __init__(self) -> None:
+        self.threshold = np.array([4.0])
+
+    def at(
+        self, trace: IntArray, which: IntArray, targets: Array, near: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Rises of 0.3 t^2 or, from -1, of 5 + (t - 3)^2."""
+        first = near[:, 1] > -1
+        rises = np.where(first, 0.3 * targets**2, 5 + (targets - 3) ** 2)
+        return rises, np.column_stack((targets, np.where(first, 1.0, -1.0)))
+
+
+def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
+    """There it is below the threshold, at 2.7, so that the crossing lies further out."""
+    none = np.zeros(1, dtype=np.int64)
+    brackets = Brackets(
+        none,
+        none,
+        inside=np.array([0.0]),
+        outside=np.array([3.0]),
+        inside_rise=np.array([0.0]),
+        outside_rise=np.array([5.0]),
+        inside_x=np.array([[0.0, 1.0]]),
+        outside_x=np.array([[3.0, -1.0]]),
+        elsewhere=np.empty((0, 1, 2)),
+    )
+    found = crossings(TwoBasins(), brackets, 1e-7, 1e-6)
+    assert np.isnan(found.at[0])
+    assert found.outside_rise[0] == pytest.approx(2.7)
+    assert found.outside_x.tolist() == [[3.0, 1.0]]

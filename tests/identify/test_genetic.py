@@ -93,6 +93,14 @@ def test_children_are_cut_and_swapped_parents() -> None:
     np.testing.assert_array_equal(cuts[:125], cuts[125:])
 
 
+def test_a_cut_beyond_the_last_gene_is_made_before_it() -> None:
+    """Of models with few parameters; else children would be their parents."""
+    parents = np.repeat(np.arange(250)[:, None], 2, axis=1)
+    settings = replace(PAPER, first_cut=99, last_cut=99)
+    children = crossed(parents, settings, np.random.default_rng(3))
+    assert np.all(children[:, 0] != children[:, 1])
+
+
 def test_rank_mating_prefers_the_best() -> None:
     parents = np.repeat(np.arange(250)[:, None], 12, axis=1)
     settings = replace(PAPER, mating="rank", population=20_250)

@@ -10,7 +10,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, model_named
-from biogrip.identify import genetic_refined, least_squares
+from biogrip.identify import genetic_refined, least_squares, settling
 from biogrip.identify.answer import Identification
 from biogrip.identify.levenberg_marquardt import Normal, bounded_step
 from biogrip.identify.local_fit import FINE, ROUGH, local_fit
@@ -123,6 +123,19 @@ def test_an_optimum_is_settled_from_wherever_it_was_found() -> None:
     best = np.log([answer.parameters for answer in identified(problems, [0] * 6)])
     beside = fits.fitted(best + 0.02 * np.random.default_rng(3).normal(size=best.shape), traces)
     np.testing.assert_allclose(settled(fits, beside, traces).x, best, rtol=0, atol=1e-8)
+
+
+def test_steps_that_lead_away_are_taken_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the curvatures are not those of the way ahead, what was found before counts."""
+    problems = of_case("endothelial_cell", 2)
+    fits, traces = ManyFits(problems), np.arange(2)
+    truth = np.log([SAMPLES["endothelial_cell"][name] for name in MODEL.names])
+    near = fits.fitted(np.tile(truth, (2, 1)), traces, FINE)
+    monkeypatch.setattr(settling, "_newton_step", lambda fits, curved, x: np.full(x.shape, 0.5))
+    kept = settled(fits, near, traces)
+    # k_p to 1e-5: of the others the traces tell less.
+    np.testing.assert_allclose(kept.x[:, 1], near.x[:, 1], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(kept.misfit_rad, near.misfit_rad, rtol=1e-9)
 
 
 def same(one: Identification, other: Identification) -> bool:

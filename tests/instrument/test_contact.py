@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.instrument.actuator import torque
 from biogrip.instrument.contact import contact
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.linkage import displacement_of_tip, rotation_of_tip
@@ -19,6 +20,12 @@ def test_the_tips_close_by_what_the_sample_leaves(gripper: Gripper, size_um: flo
     assert travel == pytest.approx(0.5e-6 * (150 - size_um), rel=1e-10)
     assert before - after == pytest.approx(found.closing_rad)
     assert found.torque_Nm == pytest.approx(4.4e-7 * found.closing_rad)
+
+
+def test_of_unequal_arms_the_stiffer_one_asks_for_the_torque(unequal_gripper: Gripper) -> None:
+    found = contact(unequal_gripper, 150e-6, TABLE_2, 60e-6)
+    assert found.torque_Nm == pytest.approx(5.5e-7 * found.closing_rad)
+    assert torque(TABLE_2, found.voltage_V) == pytest.approx(found.torque_Nm)
 
 
 def test_largest_sample_costs_ten_milliradian(gripper: Gripper) -> None:

@@ -20,6 +20,7 @@ from biogrip.errors import BiogripError
 from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
+from biogrip.products.report import page
 from biogrip.running.sheet import Sheet, files_of, sheets_of
 from biogrip.study.source import overlaid, read_config
 from tests.helpers.default import plan_of
@@ -111,6 +112,20 @@ def test_the_sheets_make_every_job_of_every_product_once(everything: list[Sheet]
         made = [dict(job) for sheet in sheets for job in sheet.jobs]
         plan = everything[0].plan
         assert sorted(made, key=str) == sorted(map(dict, product.jobs(plan)), key=str), product.name
+
+
+def test_the_page_names_the_rule_that_makes_each_file(everything: list[Sheet]) -> None:
+    """Cases have not all the same figures, so there are several rules of a sheet."""
+    rules = {
+        pattern.format(**job): sheet.name
+        for sheet in everything
+        for job in sheet.jobs
+        for pattern in sheet.outputs.values()
+    }
+    shown = page.settings(everything[0].plan.study, {})
+    entries = (*shown.figures, *shown.tables)
+    assert {entry.file: entry.rule for entry in entries} == {e.file: rules[e.file] for e in entries}
+    assert {"case_figures", "case_figures_2"} < {entry.rule for entry in entries}
 
 
 @pytest.mark.parametrize("overlay", OVERLAYS, ids=" ".join)

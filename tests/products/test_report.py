@@ -1,5 +1,6 @@
 """The page of a study in a real browser: whole, legible, and its explorer right."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -79,6 +80,17 @@ def test_the_page_needs_nothing_else(opened: Opened, report: Path) -> None:
     assert opened.page.evaluate(f"{missing}.filter(i => !i.naturalWidth).length") == 0
     assert opened.page.evaluate("document.images.length") > 10
     assert opened.problems == []
+
+
+def test_the_page_says_how_everything_in_it_was_made(report: Path) -> None:
+    """Of the config that is what anybody can type, nothing of the code."""
+    made = re.findall(r'<details class="made">(.*?)</details>', report.read_text("utf-8"), re.S)
+    assert len(made) > 30
+    said = (
+        r"<summary>How it was made</summary>\s*Rule <code>\w+</code>, file "
+        r"<code>results/[\w./-]+</code>; again by <code>biogrip make [\w -]+</code>\.\s*"
+    )
+    assert [text for text in made if not re.fullmatch(said, text)] == []
 
 
 def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:

@@ -15,7 +15,7 @@ from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.products.figures import robustness as figure
 from biogrip.products.figures.style import styled
 from biogrip.products.files.identifications import columns
-from biogrip.products.heat_maps import HeatMaps, heat_maps
+from biogrip.products.heat_maps import CAPTION, HeatMaps, heat_maps
 from biogrip.products.stages import sweep_points as stage
 from biogrip.products.tables.robustness import robustness
 from biogrip.response.linear import rotation, step_response
@@ -184,6 +184,28 @@ def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged:
     assert "Share within 2 % of the noise, genetic algorithm" in [c.heading for c in table.columns]
     assert "reconstructed" in table.columns[2].heading
     assert "reconstructed" not in table.columns[1].heading
+
+
+@pytest.mark.parametrize(
+    ("marked", "said"),
+    [
+        ("[]", None),
+        ("[measurement.rate_Hz]", None),
+        (
+            "[gripper.left, search_range, gripper.arm_length_m]",
+            "gripper.left, gripper.arm_length_m",
+        ),
+    ],
+)
+def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
+    marked: str, said: str | None, judged: Path
+) -> None:
+    study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
+    caption = robustness(heat_maps(study, study.sweeps["both"]), [judged]).caption
+    assert ("econstructed" in caption) == (said is not None)
+    assert said is None or caption.endswith(f": {said}.")
+    # Of any config's heat maps the report says the same.
+    assert "econstructed" not in CAPTION
 
 
 def _bounds(**percent: list[float]) -> list[tuple[str, float]]:

@@ -26,10 +26,12 @@ from biogrip.experiment.sample import (
     maxwell,
 )
 from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.response.free_recovery import smooth_pieces
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.unilateral import UnilateralResponse, unilateral_response
 from tests.helpers.responses import random_samples
+from tests.response.test_protocols import EDGES, TORQUE
 
 # Slow arms, which an integrator can follow through contact and flight.
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)
@@ -256,3 +258,13 @@ def test_ends_do_not_depend_on_when_one_looks(gripper: Gripper) -> None:
     np.testing.assert_array_equal(whole.rotation_rad[:, ::37], some.rotation_rad)
     assert whole.parted_s == some.parted_s
     assert len(whole.parted_s) > 3
+
+
+def test_pieces_of_a_protocol_are_its_torque() -> None:
+    """A ramp, sinusoids, and what squares of voltages make of them."""
+    pieces = smooth_pieces(TORQUE)
+    assert [start for start, _, _ in pieces] == EDGES[:-1].tolist()
+    for start, length, forcing in pieces:
+        elapsed = np.linspace(0, length, 50, endpoint=False)
+        expected = torque_at(TORQUE, start + elapsed)
+        np.testing.assert_allclose(forcing.at(elapsed)[0], expected, rtol=0, atol=1e-21)

@@ -141,6 +141,16 @@ def test_cleaning_removes_what_was_written_and_nothing_else(results: Path) -> No
     assert left == {"b.json", "tables", "tables/paper.tex"}
 
 
+def test_cleaning_counts_what_it_removes(results: Path, tmp_path: Path) -> None:
+    """Neither what is gone already, nor a link, which is nobody's to remove."""
+    write_text(tmp_path / "mine.log", "")
+    Journal(results).note_logs([results / "a.log"])
+    (results / "a.log").symlink_to(tmp_path / "mine.log")
+    (results / "b.json").unlink()
+    assert clean(results) == f"1 files of {results} removed."
+    assert (results / "a.log").is_symlink()
+
+
 def test_verifying_names_what_is_missing(results: Path) -> None:
     assert verify(results) == f"2 files of {results} are what was written."
     (results / "b.json").unlink()

@@ -14,6 +14,7 @@ from biogrip.products.digest import digest
 from biogrip.products.tables import coverage
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
+from tests.helpers.default import study_of
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
 DROP = "sample: {model: liquid_drop, k: 1.0, k_p: 1.0, c: 1.0}"
@@ -259,3 +260,12 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     changed = coverage.settings(wider)
     assert digest(changed["endothelial_cell"]) != digest(settings["endothelial_cell"])
     assert digest(changed["my_drop"]) == digest(settings["my_drop"])
+
+
+@pytest.mark.parametrize(("noise_model", "along"), [("white", False), ("coloured", True)])
+def test_a_coloured_noise_model_has_every_identification_fit_an_offset_and_a_drift(
+    noise_model: str, along: bool
+) -> None:
+    study = study_of(f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
+    found = {(case.problem.offset, case.problem.drift) for case in study.cases.values()}
+    assert found == {(along, along)}

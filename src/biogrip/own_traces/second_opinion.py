@@ -20,8 +20,9 @@ def second_opinion(
 ) -> list[str]:
     """Fit an offset and a drift along, and say so if they explain the trace far better.
 
-    By the likelihood ratio: chi^2 would fall by as much as chi-squared with as many
-    degrees of freedom as are added (Wilks 1938), more in one of 200 traces.
+    By the likelihood ratio: where neither is in the trace, chi^2 falls as chi-squared with
+    as many degrees of freedom as are added is distributed (Wilks 1938). What it would do in
+    less than the share `FALSE_ALARM` of traces is said.
 
     Parameters
     ----------

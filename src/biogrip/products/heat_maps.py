@@ -54,6 +54,8 @@ class HeatMaps:
         What changes.
     near_noise_tolerance
         By which share a misfit may exceed the noise, to count as near it.
+    reconstructed
+        Keys of the gripper whose values the paper does not give.
     """
 
     title: str
@@ -62,6 +64,7 @@ class HeatMaps:
     rows: ShownAxis
     columns: ShownAxis
     near_noise_tolerance: float
+    reconstructed: tuple[str, ...]
 
 
 def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
@@ -74,6 +77,7 @@ def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
         _shown(study, sweep.rows),
         _shown(study, sweep.columns),
         study.near_noise_tolerance,
+        study.reconstructed("gripper"),
     )
 
 
@@ -123,6 +127,5 @@ CAPTION = (
     "that is more, in both quantities below. Then, for the best and for the worst determined "
     "quantity, the median absolute error of these seeds, beside the standard deviation that noise "
     "leaves at least (the Cramer-Rao bound, to first order, rest known). A median over all seeds "
-    "would jump with the share. The gripper's values are reconstructed: the paper's are not "
-    "available to us."
+    "would jump with the share."
 )

@@ -166,7 +166,7 @@ def clean(results: Path) -> str:
         What was done, and what was left.
     """
     manifest = Manifest(results)
-    left = []
+    removed, left = 0, []
     for path in manifest.paths:
         file = results / path
         if file.is_symlink() or not file.is_file():
@@ -175,7 +175,7 @@ def clean(results: Path) -> str:
             left.append(str(file))
         else:
             file.unlink()
-    removed = len(manifest.paths) - len(left)
+            removed += 1
     own = [results / JOURNALS, results / NAME]
     for file in [*(results / JOURNALS).glob("*.jsonl"), *own[1:]]:
         file.unlink(missing_ok=True)

@@ -2,13 +2,13 @@
 
 import re
 import shlex
-from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from biogrip.products.digest import digest
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
+from biogrip.products.together import together
 from biogrip.running.source_files import fingerprint
 
 _CONSTRAINTS = {
@@ -133,34 +133,8 @@ class Sheet:
 
 
 def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
-    """Put products together that are made by one job.
-
-    All outputs of a rule are made, and not every case has every figure: of a sheet
-    there is a rule for each set of products that cases have in common.
-    """
-    together: dict[str, list[Product]] = defaultdict(list)
-    for product in products:
-        together[product.sheet or product.name].append(product)
-    found = []
-    for name, members in together.items():
-        if not members[0].asked:
-            found.append(Sheet(name, tuple(members), plan))
-        for number, (makes, jobs) in enumerate(_in_common(members, plan).items(), 1):
-            label = name if number == 1 else f"{name}_{number}"
-            found.append(Sheet(label, tuple(members[i] for i in makes), plan, tuple(jobs)))
-    return found
-
-
-def _in_common(members: list[Product], plan: Plan) -> dict[tuple[int, ...], list[Wildcards]]:
-    """Jobs by the indices of the products that they have."""
-    makes: dict[tuple[tuple[str, str], ...], list[int]] = defaultdict(list)
-    for index, product in enumerate(members):
-        for job in product.jobs(plan):
-            makes[tuple(job.items())].append(index)
-    found: dict[tuple[int, ...], list[Wildcards]] = defaultdict(list)
-    for items, indices in makes.items():
-        found[tuple(indices)].append(dict(items))
-    return found
+    """Put products together that are made by one job."""
+    return [Sheet(each.rule, each.products, plan, each.jobs) for each in together(products, plan)]
 
 
 def files_of(sheets: Iterable[Sheet]) -> list[str]:

@@ -103,9 +103,9 @@ class MeasurementBlock:
         str | None,
         Key(
             "What noise is taken for where a trace is judged. `white`: samples are independent; "
-            "`coloured`: it may remember and have a spectrum 1/f, an offset and a drift are fitted "
-            "along, and samples that stand out are left out, so that intervals are wider and stay "
-            "honest. By default white.",
+            "`coloured`: it may remember and have a spectrum 1/f, and samples that stand out are "
+            "left out, so that intervals are wider and stay honest; every identification, judged "
+            "or not, then fits an offset and a drift along. By default white.",
             choices=NOISE_MODELS,
         ),
     ] = None

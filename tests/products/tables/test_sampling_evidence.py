@@ -3,7 +3,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.products.tables.sampling_evidence import sampling_evidence, settings
+from biogrip.products.tables.sampling_evidence import (
+    SAMPLING_EVIDENCE,
+    sampling_evidence,
+    settings,
+)
 from tests.helpers.default import STUDY
 
 SETTINGS = settings(STUDY)
@@ -50,3 +54,9 @@ def test_what_the_paper_does_not_give_has_no_row() -> None:
     rows = sampling_evidence({**SETTINGS, "liquid_drop_2": changed}).rows
     assert [row[1] for row in rows if row[0] == "liquid_drop_2"] == ["k", "c"]
     assert sampling_evidence({}).rows == []
+
+
+def test_no_caption_says_how_much_noise_there_is() -> None:
+    """It is the same for any config."""
+    captions = SAMPLING_EVIDENCE.caption, sampling_evidence(SETTINGS).caption
+    assert all("the study's noise" in caption and "%" not in caption for caption in captions)

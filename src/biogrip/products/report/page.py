@@ -4,7 +4,7 @@ import json
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.report.explorer_data import CaseFiles, ExploredCase, explorer_data
 from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.together import together
 from biogrip.study.study import Study
 from biogrip.study.typed import plain
 
@@ -59,8 +60,6 @@ class Entry:
         The rule of the workflow that makes it.
     command
         What makes it again.
-    uses
-        What of the config it is made from.
     """
 
     name: str
@@ -69,7 +68,6 @@ class Entry:
     file: str
     rule: str
     command: str
-    uses: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -215,6 +213,12 @@ def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildca
 
 
 def _entries(plan: Plan, kinds: tuple[str, str]) -> Iterable[Entry]:
+    rules = {
+        (product.name, *job.items()): each.rule
+        for each in together(products().values(), plan)
+        for product in each.products
+        for job in each.jobs
+    }
     for product, job, file in _files(plan, kinds):
         options = "".join(f" --{name} {value}" for name, value in job.items())
         yield Entry(
@@ -222,16 +226,9 @@ def _entries(plan: Plan, kinds: tuple[str, str]) -> Iterable[Entry]:
             job.get("case") or job.get("sweep") or "",
             product.caption,
             file,
-            product.sheet or product.name,
+            rules[product.name, *job.items()],
             f"biogrip make {product.name}{options}",
-            _uses(product.settings(plan.study, job)),
         )
-
-
-def _uses(chosen: object) -> tuple[str, ...]:
-    if is_dataclass(chosen) and not isinstance(chosen, type):
-        return tuple(field.name for field in fields(chosen))
-    return ()
 
 
 def _reads(kinds: tuple[str, str]) -> Reads:

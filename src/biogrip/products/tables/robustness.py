@@ -71,8 +71,12 @@ def robustness(maps: HeatMaps, points: list[Path]) -> Table:
         "more, in both. Bound is the standard deviation that noise leaves at least, to first order "
         "and with parameters without information taken as known; the median absolute error of an "
         "estimator that attains it is 0.67 of that. Without noise, the misfit of the truth rounded "
-        "to two digits stands for the noise. The gripper's values are reconstructed."
+        "to two digits stands for the noise."
     )
+    if maps.reconstructed:
+        caption += (
+            f" Reconstructed, as the paper does not give them: {', '.join(maps.reconstructed)}."
+        )
     return Table(caption, columns, rows)
 
 

@@ -103,9 +103,10 @@ SAMPLING_EVIDENCE = table(
     sampling_evidence,
     name="sampling_evidence",
     item="evidence: sampling",
-    caption="The errors that the paper prints, beside the standard deviations that 10 % noise "
-    "leaves at least at several sampling rates. Only near the rate at which the two are alike, on "
-    "average over the rows, can the paper's traces have been sampled; that rate is reconstructed.",
+    caption="The errors that the paper prints, beside the standard deviations that the study's "
+    "noise leaves at least at several sampling rates. Only near the rate at which the two are "
+    "alike, on average over the rows, can the paper's traces have been sampled; that rate is "
+    "reconstructed.",
     sheet="tables",
     settings=settings,
     when=lambda study: bool(study.published),

@@ -1,0 +1,58 @@
+"""Which products one job makes together, and what the rule of such jobs is called."""
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.product import Product
+
+
+@dataclass(frozen=True)
+class Together:
+    """Products that one job makes.
+
+    Parameters
+    ----------
+    rule
+        Name of the rule.
+    products
+        What is made.
+    jobs
+        All jobs that make these products; wildcards of each.
+    """
+
+    rule: str
+    products: tuple[Product, ...]
+    jobs: tuple[Wildcards, ...]
+
+
+def together(products: Iterable[Product], plan: Plan) -> list[Together]:
+    """Put products together that are made by one job.
+
+    All outputs of a rule are made, and not every case has every figure: of a sheet
+    there is a rule for each set of products that cases have in common.
+    """
+    sheets: dict[str, list[Product]] = defaultdict(list)
+    for product in products:
+        sheets[product.sheet or product.name].append(product)
+    found = []
+    for name, members in sheets.items():
+        if not members[0].asked:
+            found.append(Together(name, tuple(members), ()))
+        for number, (makes, jobs) in enumerate(_in_common(members, plan).items(), 1):
+            rule = name if number == 1 else f"{name}_{number}"
+            found.append(Together(rule, tuple(members[i] for i in makes), tuple(jobs)))
+    return found
+
+
+def _in_common(members: list[Product], plan: Plan) -> dict[tuple[int, ...], list[Wildcards]]:
+    """Jobs by the indices of the products that they have."""
+    makes: dict[tuple[tuple[str, str], ...], list[int]] = defaultdict(list)
+    for index, product in enumerate(members):
+        for job in product.jobs(plan):
+            makes[tuple(job.items())].append(index)
+    found: dict[tuple[int, ...], list[Wildcards]] = defaultdict(list)
+    for items, indices in makes.items():
+        found[tuple(indices)].append(dict(items))
+    return found
