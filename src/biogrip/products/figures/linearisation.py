@@ -1,4 +1,4 @@
-"""Linear against nonlinear model: their difference, and the domain in which they agree to 1 %."""
+"""Linear against nonlinear model: their difference, and the domain in which they agree."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from biogrip.products.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.stages.model_difference import Settings, scaled, settings
-from biogrip.products.tables.linearisation import CAPTION
+from biogrip.products.tables.linearisation import CAPTION, LIMIT_PERCENT
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 
@@ -53,11 +53,11 @@ def draw(settings: Settings, differences: Path) -> Figure:
             cmap="cividis_r",
             shading="nearest",
         )
-        if np.nanmax(shares) > 1:
+        if np.nanmax(shares) > LIMIT_PERCENT:
             lines = axes.contour(
-                grid.columns, grid.index, shares, [1.0], colors="black", linewidths=1.2
+                grid.columns, grid.index, shares, [LIMIT_PERCENT], colors="black", linewidths=1.2
             )
-            axes.clabel(lines, fmt="1 %%", fontsize=7)
+            axes.clabel(lines, fmt=f"{LIMIT_PERCENT:g} %%", fontsize=7)
         axes.set_yscale("log")
         axes.set_yticks(
             [0.3, 1, 3, 10, 30], ["0.3", "1", "3", "10", "30"] if index == 0 else [""] * 5
