@@ -7,7 +7,8 @@ A number stands between two comments, of which the first says where it comes fro
 It names a table, or a section of the benchmarks, rows by their columns (``=``, ``!=``, and ``|``
 between alternatives), a column and a format of Python's; ``%`` formats shares. Of several rows the
 lowest and the highest are shown, or, with ``| each``, all that differ in the order of the table.
-``count`` in the place of a column is the number of rows.
+``count`` in the place of a column is the number of rows. In a row of a Markdown table, where ``|``
+would end the cell even in a comment, ``\\|`` stands for it.
 """
 
 import json
@@ -44,8 +45,12 @@ def renewed_numbers(text: str, published: Path = PUBLISHED) -> str:
         If a mark cannot be read, or names a table, column or row that there is not.
     """
     return _NUMBER.sub(
-        lambda match: f"{match[1]}{_number(match['what'], published)}{match[4]}", text
+        lambda match: f"{match[1]}{_number(_unescaped(match['what']), published)}{match[4]}", text
     )
+
+
+def _unescaped(what: str) -> str:
+    return what.replace(r"\|", "|")
 
 
 def _number(what: str, published: Path) -> str:

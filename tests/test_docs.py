@@ -30,6 +30,14 @@ def test_links_lead_somewhere(document: str | Path) -> None:
     assert [link for link in own if not (path.parent / link).exists()] == []
 
 
+@pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_mark_cuts_a_cell(document: Path) -> None:
+    """GitHub cuts rows of tables at every unescaped bar, in comments as well."""
+    rows = [line for line in document.read_text(encoding="utf-8").splitlines() if line[:1] == "|"]
+    marks = [mark for row in rows for mark in re.findall(r"<!--=.*?-->", row)]
+    assert [mark for mark in marks if re.search(r"(?<!\\)\|", mark)] == []
+
+
 def test_the_readme_leads_to_every_document() -> None:
     """Directly or by another: else nobody would find it, nor the test above its links."""
     found, left = set(), ["README.md"]

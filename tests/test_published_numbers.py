@@ -30,6 +30,7 @@ def published(tmp_path: Path) -> Path:
         ("methods[case=cell|drop].evaluations | .3g", "1,340 to 18,000"),
         ("methods[case=cell].evaluations | .2f", "5278.50"),
         ("methods[method=genetic].count | d", "2"),
+        (r"methods[case=drop\|cell, method=genetic].share \| .0% \| each", "46 and 96 %"),
     ],
 )
 def test_numbers_come_from_the_published_tables(what: str, shown: str, published: Path) -> None:

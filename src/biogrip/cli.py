@@ -94,7 +94,7 @@ def _parser() -> argparse.ArgumentParser:
     for name, text in (
         ("case", "of which case"),
         ("method", "by which method"),
-        ("batch", "of which seeds, e.g. seeds_0-24"),
+        ("batch", "of which seeds, e.g. seeds_0-49"),
         ("sweep", "of which sweep"),
         ("seed", "of which seed"),
     ):

@@ -15,6 +15,8 @@ from tests.helpers.runs import COMPARED, SMALL, TINY, Tree, copied_tree, replace
 
 # Tables that put cases together and have a row, or a few, for each.
 JOINT = ("errors", "linearisation", "methods", "models", "coverage", "mechanics", "contact_loss")
+# What takes long before anything is judged.
+_MADE = {"target", "measurement", "identification", "model_fits", "contact_loss"}
 NEW_CASE = """  my_cell:
     sample: {model: liquid_drop, k: 20.0, k_p: 5.0, c: 8e1}
 """
@@ -87,6 +89,37 @@ def test_a_setting_reruns_what_depends_on_it(
     stages = {"target", "measurement", "identification"}
     assert {stage for stage in stages if run.jobs(stage)} == rerun
     assert run.jobs("case_tables") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "spared"),
+    [
+        ("cases:\n", "cases:\n  liquid_drop_2: {title: A drop}\n", {*_MADE, "model_difference"}),
+        (
+            "cases:\n",
+            "cases:\n  liquid_drop_2: {published: {generation: 62}}\n",
+            {*_MADE, "model_difference", "judgement"},
+        ),
+        (
+            "cases:\n",
+            "search_range: {alpha: {exponent: [-2, 0]}}\ncases:\n",
+            {*_MADE, "intervals", "judgement", "expectation"},
+        ),
+        (
+            "cases:\n",
+            "gripper: {uncertainty: {left: {stiffness_Nm_per_rad: 1.0e-9}}}\ncases:\n",
+            {*_MADE, "expectation"},
+        ),
+        ("starts: 3", "starts: 4", {"target", "measurement", "expectation"}),
+    ],
+)
+def test_a_setting_reruns_nothing_that_does_not_use_it(
+    tiny_copy: Path, old: str, new: str, spared: set[str]
+) -> None:
+    run = snakemake(tiny_copy, "-n", config=replaced(TINY, old, new))
+    assert run.status == 0, run.output
+    assert not spared & set(run.all_jobs())
+    assert run.jobs("report") == 1
 
 
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: Path) -> None:

@@ -71,6 +71,15 @@ class CaseProblem:
         """Sample model without the parameters that are known."""
         return with_fixed(self.model, self.fixed)
 
+    def searched_for(self, *models: SampleModel) -> "CaseProblem":
+        """Return what fits of models depend on: no range of what these have no parameter of."""
+        chosen = {p.range_name for model in models for p in model.parameters}
+        return replace(self, ranges={n: r for n, r in self.ranges.items() if n in chosen})
+
+    def to_identify(self, *models: SampleModel) -> "CaseProblem":
+        """Return what `of` and `for_model` depend on: judgements alone allow for more."""
+        return replace(self.searched_for(*models), coloured=False, uncertainty={})
+
     @property
     def plain(self) -> bool:
         """Whether noise is taken for white, and the gripper for known."""

@@ -34,8 +34,6 @@ class CaseSettings:
         Of the sensor.
     before, after
         Protocol and sampling of the study, and of the case.
-    covered
-        Whether its seeds are there to be held against the bound.
     title
         In print.
     """
@@ -46,7 +44,6 @@ class CaseSettings:
     noise_rad: float
     before: Experiment
     after: Experiment
-    covered: bool
     title: str
 
 
@@ -69,7 +66,6 @@ def settings(study: Study) -> dict[str, CaseSettings]:
             asked.noise_rad,
             before,
             (case.phases, case.sampling),
-            case.coverage_seeds > 0,
             case.title,
         )
     return found

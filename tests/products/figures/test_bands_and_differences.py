@@ -91,7 +91,7 @@ def test_each_case_is_compared_under_its_own_protocol(tmp_path: Path) -> None:
     own = "protocol: {phases: [{duration_s: 10.0, torque_Nm: 0.8e-9}]}"
     study = study_of(f"cases: {{{CASE}: {{{own}}}}}")
     settings = model_difference.settings(study)
-    protocols = {name: phases for name, (_, _, phases) in settings.cases.items()}
+    protocols = {name: case.phases for name, case in settings.cases.items()}
     assert len(protocols[CASE]) == 1
     assert len(protocols["liquid_drop_2"]) == 2
     few = model_difference.Settings({CASE: settings.cases[CASE]})
@@ -101,7 +101,8 @@ def test_each_case_is_compared_under_its_own_protocol(tmp_path: Path) -> None:
     ours, theirs = (DIFFERENCES.read(tmp_path / f"{name}.csv") for name in ("own", "study"))
     assert not np.allclose(ours["difference_over_peak"], theirs["difference_over_peak"], rtol=0.1)
     with styled():
-        figure = linearisation.draw(few, tmp_path / "own.csv")
+        shown = linearisation.Settings(few.cases, {CASE: "A drop"})
+        figure = linearisation.draw(shown, tmp_path / "own.csv")
     assert figure.axes[0].get_xlim()[1] == pytest.approx(10.0, rel=0.1)
 
 
@@ -110,7 +111,8 @@ def test_the_difference_of_the_models_is_drawn_and_small_is_yellow(tmp_path: Pat
     few = model_difference.Settings({CASE: cases[CASE]})
     model_difference.compare(few, tmp_path / "d.csv")
     with styled():
-        figure = linearisation.draw(few, tmp_path / "d.csv")
+        shown = linearisation.Settings(few.cases, {CASE: "A drop"})
+        figure = linearisation.draw(shown, tmp_path / "d.csv")
     curve = np.abs(np.asarray(figure.axes[0].lines[0].get_ydata()))
     # At twenty times the torque the peak is tens of mrad, and the models differ by some percent.
     assert 0.01 < curve.max() < 5

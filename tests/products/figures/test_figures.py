@@ -104,6 +104,8 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     legend = axes[0].get_legend()
     assert legend
     assert legend.get_texts()[0].get_text() == label
+    # Generations end before mutation starts.
+    assert not axes[0].texts
 
 
 @pytest.mark.parametrize(

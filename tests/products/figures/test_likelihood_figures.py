@@ -11,7 +11,7 @@ from matplotlib.patches import Rectangle
 
 from biogrip.products.figures import overview, profiles, valley
 from biogrip.products.figures.decades import decade_ticks
-from biogrip.products.figures.style import figure, styled
+from biogrip.products.figures.style import figure, lay_out, styled
 
 BEST = 2.0
 
@@ -83,10 +83,12 @@ def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> Non
     assert all(low <= tick <= high for tick in ticks)
 
 
-def test_fits_beyond_a_valleys_axes_are_marked(tmp_path: Path) -> None:
+def drawn_valley(
+    folder: Path, rises: list[list[float]], fits: dict[str, list[float]], **known: Any
+) -> Any:
+    """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
     shares = np.linspace(0.1, 0.9, 5)
     sums = 10 * np.array([[0.9], [1.0], [1.1]])
-    rises = np.tile([[50.0], [0.0], [60.0]], (1, 5))
     grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "rises": rises}
     axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
     found = {
@@ -95,19 +97,75 @@ def test_fits_beyond_a_valleys_axes_are_marked(tmp_path: Path) -> None:
         "grids": [{key: np.asarray(each).tolist() for key, each in grid.items()}],
         "best": [9.0, 1.0],
     }
-    path = tmp_path / "v.json"
+    path = folder / "v.json"
     path.write_text(json.dumps({"quantities": [], "trades": [], "notes": [], "valley": found}))
-    rows = {"c_Ns_per_m": [3.0, 4e4, 5.0], "c_p_Ns_per_m": [7.0, 10.0, 5.0]}
-    frame = pd.DataFrame(rows).assign(case="x", method="least_squares", seed=range(3))
+    rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
+    frame = pd.DataFrame(rows).assign(case="x", method="least_squares")
+    frame["seed"] = range(len(frame))
     for column in ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"):
         frame[column] = 1
-    frame.to_csv(tmp_path / "found.csv", index=False)
-    settings = valley.Settings("A drop", "least_squares", {}, {})
+    frame.to_csv(folder / "found.csv", index=False)
+    settings = valley.Settings(
+        "A drop", "least_squares", known.get("truth", {}), known.get("paper", {})
+    )
     with styled():
-        axes = valley.draw(settings, path, tmp_path / "found.csv").axes[0]
+        return valley.draw(settings, path, folder / "found.csv").axes[0]
+
+
+DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]
+# Deep at its last point alone, where c is 9.
+CLOSED = [[900.0] * 5, [900.0, 900.0, 900.0, 900.0, 0.0], [900.0] * 5]
+
+
+def test_fits_beyond_a_valleys_axes_are_marked(tmp_path: Path) -> None:
+    axes = drawn_valley(tmp_path, DEEP, {"c": [3.0, 4e4, 5.0], "c_p": [7.0, 10.0, 5.0]})
     (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
     np.testing.assert_allclose(np.asarray(beyond.get_xydata()), [[11.5, 10.0]])
     assert beyond.get_marker() == ">"
+
+
+def test_a_valleys_axes_end_around_what_is_in_it(tmp_path: Path) -> None:
+    """Fits, truth, paper and where it is deep; each of them widens the axes, none is cut off."""
+    near = {"c": [8.9, 9.05], "c_p": [1.1, 0.95]}
+    narrow = drawn_valley(tmp_path, CLOSED, near)
+    # The root of the rise, 30 at the next point, (7, 3), is below that of 10.83 for 0.11 of the way
+    # there, which is as far as (8.78, 1.22); the fits end at (9.05, 0.95).
+    low, high = narrow.get_xlim()
+    assert 8.5 < low < 8.78 < 9.05 < high < 9.3
+    low, high = narrow.get_ylim()
+    assert 0.7 < low < 0.95 < 1.22 < high < 1.5
+    wide = drawn_valley(tmp_path, DEEP, near)
+    assert wide.get_xlim()[0] < 1
+    assert wide.get_xlim()[1] > 9
+    known = {"c": 6.0, "c_p": 4.0}
+    for name in ("truth", "paper"):
+        axes = drawn_valley(tmp_path, CLOSED, near, **{name: known})
+        assert axes.get_xlim()[0] < 6 < 9.05 < axes.get_xlim()[1]
+        assert axes.get_ylim()[0] < 0.95 < 4 < axes.get_ylim()[1]
+    fit = drawn_valley(tmp_path, CLOSED, {"c": [2.0, 9.0], "c_p": [7.0, 1.0]})
+    assert 0 < fit.get_xlim()[0] < 2
+    assert fit.get_ylim()[1] > 7
+
+
+def test_a_paper_far_off_is_marked_and_leaves_the_valley_its_room(tmp_path: Path) -> None:
+    fits, size = {"c": [9.0], "c_p": [1.0]}, []
+    for c in (9.0, 1e5):
+        axes = drawn_valley(tmp_path, DEEP, fits, paper={"c": c, "c_p": 1.0})
+        with styled():
+            lay_out(axes.figure, 100)
+        size.append(axes.get_position().height)
+    (beyond,) = (line for line in axes.lines if line.get_label() == "beyond the axis")
+    assert float(np.asarray(beyond.get_xdata())[0]) == axes.get_xlim()[1]
+    # A third row of the legend is a twentieth of the figure.
+    assert size[1] > 0.85 * size[0]
+
+
+def test_where_truth_and_paper_coincide_both_are_seen(tmp_path: Path) -> None:
+    known = {"c": 9.0, "c_p": 1.0}
+    axes = drawn_valley(tmp_path, CLOSED, {"c": [9.0], "c_p": [1.0]}, truth=known, paper=known)
+    marks = {line.get_label(): line for line in axes.lines}
+    assert marks["truth"].get_zorder() > marks["paper"].get_zorder()
+    assert marks["paper"].get_markerfacecolor() == "none"
 
 
 def test_the_overview_marks_what_is_off_its_axis() -> None:

@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 
 from biogrip.identifiability.at_truth import bounds_percent
-from biogrip.products.designed_cases import settings
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.stages.judgement import expect, expected_settings
 from biogrip.products.stages.target import settings as target_settings
 from biogrip.products.stages.target import simulate
-from biogrip.products.tables.designed import designed
+from biogrip.products.tables.designed import designed, settings
 from biogrip.study.study import Study
 from tests.helpers.default import study_of
 
@@ -83,4 +82,4 @@ def test_seeds_beside_it(tmp_path: Path) -> None:
 
 
 def test_the_default_study_has_none() -> None:
-    assert settings(study_of()) == {}
+    assert settings(study_of()).cases == {}

@@ -5,7 +5,9 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
 
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import near_noise, near_noise_words, typical
@@ -76,22 +78,15 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     axes.plot([], [], color=FITTED, label=typical_in_words(found))
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
-    if settings.mutation_start is not None:
-        axes.axvline(settings.mutation_start, color=TARGET, linestyle=":", linewidth=0.8)
-        axes.annotate(
-            "mutation starts",
-            (settings.mutation_start, 0.62),
-            xycoords=("data", "axes fraction"),
-            xytext=(3, 0),
-            textcoords="offset points",
-            fontsize=7,
-        )
+    last = int(history["generation"].max())
+    if settings.mutation_start is not None and settings.mutation_start <= last:
+        _mutation(axes, settings.mutation_start, last)
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
-    axes.set_xlim(0, history["generation"].max())
+    axes.set_xlim(0, last)
     axes.set_xlabel(METHODS[settings.method].step)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
@@ -102,6 +97,22 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     axes.set_title(settings.title + share)
     axes.legend(loc="upper right")
     return drawn
+
+
+def _mutation(axes: Axes, start: int, last: int) -> None:
+    """Mark where mutation starts; it is said below the noise, where hardly a misfit gets."""
+    axes.axvline(start, color=TARGET, linestyle=":", linewidth=0.8)
+    before = start > last / 2
+    axes.annotate(
+        "mutation starts",
+        (start, 0.03),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3 if before else 3, 0),
+        textcoords="offset points",
+        ha="right" if before else "left",
+        fontsize=7,
+        path_effects=[withStroke(linewidth=2, foreground="white")],
+    )
 
 
 CONVERGENCE = drawing(

@@ -1,5 +1,7 @@
 """Linear against nonlinear model: their difference, and the domain in which they agree."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -7,20 +9,34 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
-from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.truth import Truth
-from biogrip.instrument.gripper import Gripper
+from biogrip.experiment.protocol import torque_history
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
-from biogrip.products.stages.model_difference import Settings, scaled, settings
+from biogrip.products.stages.model_difference import Compared, scaled
+from biogrip.products.stages.model_difference import settings as compared
 from biogrip.products.tables.linearisation import CAPTION, LIMIT_PERCENT
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
+from biogrip.study.study import Study
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is compared, and what it is called in print, by name."""
+
+    cases: Mapping[str, Compared]
+    titles: Mapping[str, str]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what is compared."""
+    cases = compared(study).cases
+    return Settings(cases, {name: study.cases[name].title for name in cases})
 
 
 def draw(settings: Settings, differences: Path) -> Figure:
@@ -37,8 +53,10 @@ def draw(settings: Settings, differences: Path) -> Figure:
     cases = dict(list(settings.cases.items())[:_MOST_CASES])
     drawn = figure(PAGE_IN, 2.6)
     traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
-    _difference(traces, *list(cases.values())[-1])
-    for index, (name, (truth, *_)) in enumerate(cases.items()):
+    last = list(cases)[-1]
+    _difference(traces, cases[last])
+    panel(traces, "a", f"{settings.titles[last]}, {_SHOWN_FACTOR:g} x torque")
+    for index, name in enumerate(cases):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
             index="torque_factor", columns="reference_angle_deg", values="difference_over_peak"
@@ -66,15 +84,15 @@ def draw(settings: Settings, differences: Path) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:
             axes.set_ylabel("torque / protocol's torque")
-        panel(axes, "bcd"[index], truth.title, most_letters=19)
+        panel(axes, "bcd"[index], settings.titles[name], most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
 
 
-def _difference(axes: Axes, truth: Truth, gripper: Gripper, phases: tuple[Phase, ...]) -> None:
+def _difference(axes: Axes, case: Compared) -> None:
     """Draw nonlinear minus linear rotation, for the traces themselves cannot be told apart."""
-    network = truth.model.sample(truth.parameters)
-    torque = scaled(torque_history(phases), _SHOWN_FACTOR)
+    gripper, network = case.gripper, case.network
+    torque = scaled(torque_history(case.phases), _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     linear = rotation(response, torque, time_s)[0]
@@ -83,9 +101,11 @@ def _difference(axes: Axes, truth: Truth, gripper: Gripper, phases: tuple[Phase,
     axes.axhline(0, color=TARGET, linewidth=0.6)
     axes.set_xlabel("time (s)")
     axes.set_ylabel("nonlinear - linear rotation (mrad)")
-    peak = f"peak {1e3 * np.max(np.abs(linear)):.3g} mrad"
-    axes.annotate(peak, (0.98, 0.94), xycoords="axes fraction", ha="right", fontsize=7)
-    panel(axes, "a", f"{truth.title}, {_SHOWN_FACTOR:g} x torque")
+    bottom, top = axes.get_ylim()
+    # Room above the curve for what is written there.
+    axes.set_ylim(bottom, top + 0.08 * (top - bottom))
+    peak = f"peak rotation {1e3 * np.max(np.abs(linear)):.3g} mrad"
+    axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
 LINEARISATION_MAP = drawing(

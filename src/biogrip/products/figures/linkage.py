@@ -8,14 +8,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
-from biogrip.experiment.truth import Truth
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.experiment.protocol import torque_history
 from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.elements import damper, spring
 from biogrip.products.figures.nomenclature import nomenclature
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
+from biogrip.products.stages.model_difference import Compared
+from biogrip.products.stages.model_difference import settings as compared
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Study
 
@@ -31,13 +32,12 @@ class Settings:
     """The gripper, and what closes it onto which samples."""
 
     gripper: Gripper
-    truths: tuple[tuple[Truth, CaseProblem], ...]
+    cases: tuple[Compared, ...]
 
 
 def settings(study: Study) -> Settings:
     """Choose the gripper and the samples."""
-    cases = [study.cases[name] for name in study.simulated]
-    return Settings(study.gripper, tuple((case.truth, case.problem) for case in cases))
+    return Settings(study.gripper, tuple(compared(study).cases.values()))
 
 
 def draw(settings: Settings) -> Figure:
@@ -102,12 +102,10 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
 def _largest_rotation_rad(settings: Settings) -> float:
     """Largest rotation of all samples; that of the drawing if there is none."""
     peaks = [0.0]
-    for truth, problem in settings.truths:
-        time_s = np.linspace(0.0, problem.torque.end_s, 401)
-        network = truth.model.sample(truth.parameters)
-        rotation = simulated_rotation(
-            problem.gripper, network, problem.torque, time_s, nonlinear=False
-        )
+    for case in settings.cases:
+        torque = torque_history(case.phases)
+        time_s = np.linspace(0.0, torque.end_s, 401)
+        rotation = simulated_rotation(case.gripper, case.network, torque, time_s, nonlinear=False)
         peaks.append(float(rotation.max()))
     return max(peaks) or _SEEN_RAD
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,7 +42,10 @@ SEEN = 0.1
 
 _POINTS = 121
 _TITLE_LETTERS = 28
-_COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, GREY)
+_STYLES: tuple[dict[str, Any], ...] = (
+    *({"color": colour} for colour in (BLUE, ORANGE, GREEN)),
+    *({"color": colour, "linestyle": (0, (2, 2))} for colour in (PURPLE, SKY, GREY)),
+)
 
 
 @dataclass(frozen=True)
@@ -146,8 +150,12 @@ def _moduli(
 
 
 def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Array) -> None:
-    for parameter, row, colour in zip(model.parameters, relative, _COLOURS, strict=False):
-        axes.plot(time_s, row, color=colour, linewidth=1, label=parameter.symbol)
+    # Where curves coincide each is seen beside the thinner ones on top of it, and through dashes.
+    widths = np.linspace(2.2, 1.0, len(model.parameters))
+    for parameter, row, style, width in zip(
+        model.parameters, relative, _STYLES, widths, strict=False
+    ):
+        axes.plot(time_s, row, linewidth=width, label=parameter.symbol, **style)
     axes.axhspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
     axes.set_xlim(time_s[0], time_s[-1])
     axes.set_xlabel("time (s)")

@@ -23,8 +23,24 @@ from biogrip.products.product import JUDGEMENT, the
 from biogrip.study.study import Case, Study
 
 _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
-# Axes end at this multiple of the sum.
-_SHOWN = 1.15
+# Axes show the valley up to this rise, and around it this share of what they show; they end at
+# this multiple of the sum, and are as long as this one at least.
+_DEEP, _AROUND, _FARTHEST, _LEAST = 10.83, 0.12, 1.15, 0.02
+
+# The layout would make room at the origin for a name without points.
+_POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False, "in_layout": False}
+_FITS = _POINTS | {
+    "color": FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
+}  # fmt: skip
+# Open, and below the truth, which it may coincide with.
+_THE_PAPERS = _POINTS | {
+    "color": PAPER, "marker": "D", "markersize": 6, "markerfacecolor": "none",
+    "markeredgewidth": 1.4, "zorder": 4,
+}  # fmt: skip
+_TRUE = _POINTS | {
+    "color": TARGET, "marker": "*", "markersize": 7, "markeredgecolor": "white",
+    "markeredgewidth": 0.6, "zorder": 5,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -70,6 +86,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     drawn = figure(COLUMN_IN, 3.1)
     axes = drawn.subplots()
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
+    shown = []
     for grid in valley["grids"]:
         # The square root of the rise is nearly straight, so that is what is interpolated.
         roots = np.sqrt(np.maximum(np.array(grid["rises"], dtype=float), 0.0))
@@ -81,6 +98,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
             colors=colours,
             extend="max",
         )
+        shown += [path.vertices for path in filled.get_paths()[: _LEVELS.index(_DEEP)]]
     total = sum(valley["best"])
     label = f"{x['symbol']} + {y['symbol']} = {total:.3g} {x['unit']}"
     axes.plot([0, total], [total, 0], color=TARGET, linewidth=0.8, linestyle="--", label=label)
@@ -88,31 +106,25 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
     points = first_seeds(identified)[columns].to_numpy(float)
     label = f"{METHODS[settings.method].title}, {drawn_seeds}"
-    _points(axes, points, _SHOWN * total, label)
-    for place, color, marker, name in (
-        (settings.parameters, TARGET, "*", "truth"),
-        (settings.identified, PAPER, "D", "paper"),
-    ):
-        if {x["name"], y["name"]} <= set(place):
-            axes.plot(
-                place[x["name"]],
-                place[y["name"]],
-                marker,
-                color=color,
-                markersize=7 if marker == "*" else 4.5,
-                markeredgecolor="white",
-                markeredgewidth=0.6,
-                linestyle="",
-                clip_on=False,
-                zorder=4,
-                label=name,
-            )
-    axes.set_xlim(0, _SHOWN * total)
-    axes.set_ylim(0, _SHOWN * total)
+    known = [
+        (np.array([[place[x["name"]], place[y["name"]]]]), style, name)
+        for place, style, name in (
+            (settings.identified, _THE_PAPERS, "paper"),
+            (settings.parameters, _TRUE, "truth"),
+        )
+        if {x["name"], y["name"]} <= set(place)
+    ]
+    places = [np.array([valley["best"]]), points, *(place for place, *_ in known)]
+    low, high = _window(np.concatenate([*shown, *places]), total)
+    _points(axes, points, high, _FITS, label)
+    for place, style, name in known:
+        _points(axes, place, high, style, name)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
     axes.set_xlabel(f"{x['symbol']} ({x['unit']})")
     axes.set_ylabel(f"{y['symbol']} ({y['unit']})")
     axes.set_title(settings.title)
-    axes.set_aspect("equal")
+    axes.set_box_aspect(1)
     drawn.legend(loc="outside lower center", ncols=2)
     bar = drawn.colorbar(filled, ax=axes, ticks=list(np.sqrt(_LEVELS)))
     bar.ax.set_yticklabels([f"{level:g}" for level in _LEVELS])
@@ -120,24 +132,33 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     return drawn
 
 
-def _points(axes: Axes, points: Array, end: float, label: str) -> None:
-    """Draw fits, and triangles on the edge for those beyond the axes."""
-    style: dict[str, Any] = {"color": FITTED, "linestyle": "", "markeredgewidth": 0, "alpha": 0.8}
-    right, above = (points > end).T
+def _window(places: Array, total: float) -> tuple[Array, Array]:
+    """Lower and upper ends of both axes around places, (n, 2), as far as the axes may go."""
+    places = np.minimum(places, _FARTHEST * total)
+    low, high = places.min(axis=0), places.max(axis=0)
+    around = np.maximum(_AROUND * (high - low), (_LEAST * total - (high - low)) / 2)
+    return np.maximum(low - around, 0.0), np.minimum(high + around, _FARTHEST * total)
+
+
+def _points(axes: Axes, points: Array, ends: Array, style: dict[str, Any], label: str) -> None:
+    """Draw points, and triangles on the edge for those beyond the axes."""
+    right, above = (points > ends).T
     inside = ~right & ~above
-    axes.plot(*points[inside].T, "o", markersize=2.5, clip_on=False, label=label, **style)
+    axes.plot(*points[inside].T, **style, label=label)
     for marker, outside in ((">", right), ("^", above & ~right)):
         if np.any(outside):
-            at = np.minimum(points[outside], end).T
-            axes.plot(*at, marker, markersize=4.5, clip_on=False, label="beyond the axis", **style)
+            at = np.minimum(points[outside], ends).T
+            beyond = style | {"marker": marker, "markersize": 4.5}
+            axes.plot(*at, **beyond, label="beyond the axis")
 
 
 VALLEY = drawing(
     draw,
     name="valley",
-    caption="Rise of χ² over c and c_p, all else fitted: the valley along which they trade "
-    "against each other, its arm along which c is that of a branch too weak and slow to be seen "
-    "(it goes on further), and where the fits of all seeds lie in it. White: not computed.",
+    caption="Rise of χ² over c and c_p, all else fitted, around the fits of all seeds and where it "
+    f"is below {_DEEP:g}: the valley along which they trade against each other and, if it is that "
+    "deep, its arm along which c is that of a branch too weak and slow to be seen (it goes on "
+    "further). White: not computed.",
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -9,7 +10,7 @@ from matplotlib.figure import Figure
 from biogrip.identify.methods import METHODS
 from biogrip.identify.success import chi_square_rise, near_noise_words
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import COLUMN_IN, GREY, METHOD_STYLES, TARGET, figure
+from biogrip.products.figures.style import COLUMN_IN, METHOD_STYLES, TARGET, figure
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import the
 from biogrip.study.study import Case, Study
@@ -56,31 +57,25 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     found = read_identifications(identifications)
     rise = np.maximum(chi_square_rise(found, settings.samples), _LOWEST)
     tolerance = settings.optimum_tolerance
-    drawn = figure(COLUMN_IN, 3.0)
+    drawn = figure(COLUMN_IN, 3.15)
     axes = drawn.subplots()
     methods = found["method"].unique()
+    curves = []
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for method, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         mine = np.sort(rise[found["method"] == method])
         share = 100 * np.mean(mine <= tolerance)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{METHODS[method].title}: {share:.0f} %"
-        axes.plot(place, mine, label=label, linewidth=width, **METHOD_STYLES[method])
-    axes.axhline(tolerance, color=TARGET, linewidth=0.8, linestyle="--")
+        curves += axes.plot(place, mine, label=label, linewidth=width, **METHOD_STYLES[method])
     near = settings.samples * ((1 + settings.near_noise_tolerance) ** 2 - 1)
-    axes.axhline(near, color=GREY, linewidth=0.8, linestyle=":")
-    for height, text in (
-        (tolerance, "global optimum"),
-        (near, near_noise_words(settings.near_noise_tolerance)),
-    ):
-        axes.annotate(
-            text,
-            (99.0, height),
-            xytext=(0, 2),
-            textcoords="offset points",
-            fontsize=6.5,
-            ha="right",
-        )
+    # Named in the legend, for a curve may pass anywhere along them.
+    words = near_noise_words(settings.near_noise_tolerance)
+    line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
+    limits = [
+        axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
+        axes.axhline(near, linestyle=":", label=words, **line),
+    ]
     axes.set_yscale("log")
     axes.set_ylim(_LOWEST / 2, 5 * max(near, float(rise.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
@@ -90,7 +85,10 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     axes.set_xlabel("seeds, sorted (%)")
     axes.set_ylabel("Δχ² over the lowest known")
     axes.set_title(f"{settings.title}: share at the global optimum")
-    drawn.legend(loc="outside lower center", ncols=2)
+    # One limit below each column of methods, whose names would be too wide otherwise.
+    half = -(-len(curves) // 2)
+    handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
+    drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
     return drawn
 
 

@@ -51,7 +51,8 @@ class Settings:
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the identification of a case by a method depends on."""
     case, method = study.case(job["case"]), job["method"]
-    return Settings(study.study_seed, case.name, case.problem, method, case.method(method))
+    problem = case.problem.to_identify(case.problem.model)
+    return Settings(study.study_seed, case.name, problem, method, case.method(method))
 
 
 def identify(

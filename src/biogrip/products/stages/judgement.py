@@ -71,17 +71,24 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class ExpectedSettings(Settings):
+class ExpectedSettings:
     """How a target is judged as if it had noise.
 
     Parameters
     ----------
+    case, problem
+        Whose it is, and what its identification would assume.
+    confidence
+        Of the limits.
     parameters
         True values by name, SI units.
     noise
         The noise.
     """
 
+    case: str
+    problem: CaseProblem
+    confidence: float
     parameters: Mapping[str, float]
     noise: Noise
 
@@ -94,14 +101,16 @@ def settings_of(study: Study, case: Case) -> Settings:
 
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the judgement of a case depends on."""
-    return settings_of(study, study.case(job["case"]))
+    chosen = settings_of(study, study.case(job["case"]))
+    problem = chosen.problem
+    return replace(chosen, problem=problem.searched_for(problem.model))
 
 
 def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
     """Choose what the judgement of a target depends on."""
     case = study.case(job["case"])
-    judged = settings_of(study, case)
-    return ExpectedSettings(**vars(judged), parameters=case.parameters, noise=case.noise)
+    problem = case.problem.to_identify(case.problem.model)
+    return ExpectedSettings(case.name, problem, case.confidence, case.parameters, case.noise)
 
 
 def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:

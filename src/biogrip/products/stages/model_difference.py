@@ -8,8 +8,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
-from biogrip.experiment.sample import Network
-from biogrip.experiment.truth import Truth
+from biogrip.experiment.sample import Network, Sample
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import Product, Weight
@@ -22,22 +21,44 @@ FACTORS = np.geomspace(0.25, 32.0, 15)
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What is compared.
+class Compared:
+    """A case of which the models are compared.
 
     Parameters
     ----------
-    cases
-        Sample, gripper and protocol of each case, by name.
+    sample, parameters
+        The model, and true values in SI units by name.
+    gripper, phases
+        With what, and under what.
     """
 
-    cases: Mapping[str, tuple[Truth, Gripper, tuple[Phase, ...]]]
+    sample: Sample
+    parameters: Mapping[str, float]
+    gripper: Gripper
+    phases: tuple[Phase, ...]
+
+    @property
+    def network(self) -> Network:
+        """The sample."""
+        return self.sample.model.sample(self.parameters)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is compared, by name."""
+
+    cases: Mapping[str, Compared]
 
 
 def settings(study: Study) -> Settings:
     """Choose what is compared."""
     cases = {name: study.cases[name] for name in study.simulated}
-    return Settings({n: (case.truth, case.gripper, case.phases) for n, case in cases.items()})
+    return Settings(
+        {
+            name: Compared(case.sample, case.parameters, case.gripper, case.phases)
+            for name, case in cases.items()
+        }
+    )
 
 
 def compare(settings: Settings, differences: Path) -> None:
@@ -46,13 +67,12 @@ def compare(settings: Settings, differences: Path) -> None:
 
 
 def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
-    for name, (truth, gripper, phases) in settings.cases.items():
-        torque = torque_history(phases)
-        model = truth.model
-        values = [truth.parameters[p] for p in model.names]
+    for name, case in settings.cases.items():
+        torque, model = torque_history(case.phases), case.sample.model
+        values = [case.parameters[p] for p in model.names]
         network = model.network(np.tile(values, (len(FACTORS), 1)))
         for angle in ANGLES_DEG:
-            turned = replace(gripper, reference_angle_deg=float(angle))
+            turned = replace(case.gripper, reference_angle_deg=float(angle))
             shares = difference_over_peak(turned, network, torque, FACTORS)
             for factor, share in zip(FACTORS, shares, strict=True):
                 yield name, f"{angle:g}", f"{factor:.4g}", f"{share:.4g}"

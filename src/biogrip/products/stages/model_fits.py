@@ -43,8 +43,11 @@ class Settings:
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the fits of a case depend on."""
     case = study.case(job["case"])
-    fits = case.method("least_squares")
-    return Settings(study.study_seed, case.name, case.problem, fits, study.models_of(case))
+    fits, models = case.method("least_squares"), study.models_of(case)
+    problem = case.problem.to_identify(
+        case.problem.model, *(CANDIDATES[name].model for name in models)
+    )
+    return Settings(study.study_seed, case.name, problem, fits, models)
 
 
 def fit(

@@ -29,8 +29,8 @@ class Settings:
 
     Parameters
     ----------
-    title
-        Name of the case in print.
+    case
+        Its name.
     gripper, phases, sampling
         With what, under what, and when.
     sample, parameters
@@ -41,7 +41,7 @@ class Settings:
         How far the comb drives can turn the arms.
     """
 
-    title: str
+    case: str
     gripper: Gripper
     phases: tuple[Phase, ...]
     sampling: Sampling
@@ -56,7 +56,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what a case's target depends on."""
     case = study.case(job["case"])
     return Settings(
-        case.title,
+        case.name,
         case.gripper,
         case.phases,
         case.sampling,
@@ -107,7 +107,7 @@ def _say_if_contact_is_lost(settings: Settings, network: Network, torque: Torque
         if settings.unilateral
         else "unless it sticks to them, contact is lost there (contact: unilateral simulates that)"
     )
-    warn(f"{settings.title}: under this protocol {words}; {then}.")
+    warn(f"{settings.case}: under this protocol {words}; {then}.")
 
 
 def _check(settings: Settings, time_s: Array, simulated: Array) -> None:

@@ -9,8 +9,8 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
+from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
-from biogrip.experiment.truth import Truth
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
@@ -46,15 +46,16 @@ class CaseSettings:
 
     Parameters
     ----------
-    truth, gripper, phases, sampling, noise
-        What makes its traces.
+    sample, parameters, gripper, phases, sampling, noise
+        What makes its traces; true values by name, SI units.
     problem, least_squares
         How they are identified.
     seeds
         How many are.
     """
 
-    truth: Truth
+    sample: Sample
+    parameters: Mapping[str, float]
     gripper: Gripper
     phases: tuple[Phase, ...]
     sampling: Sampling
@@ -83,12 +84,13 @@ def settings(study: Study) -> Settings:
         study.study_seed,
         {
             name: CaseSettings(
-                case.truth,
+                case.sample,
+                case.parameters,
                 case.gripper,
                 case.phases,
                 case.sampling,
                 case.noise,
-                case.problem,
+                case.problem.to_identify(case.problem.model),
                 case.method("least_squares"),
                 min(case.seeds, _MOST_SEEDS),
             )
@@ -116,8 +118,8 @@ def contact_loss(settings: Settings) -> Table:
 
 
 def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
-    torque, model = torque_history(case.phases), case.truth.model
-    network = model.sample(case.truth.parameters)
+    torque, model = torque_history(case.phases), case.sample.model
+    network = model.sample(case.parameters)
     if grip_of(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
         return []
     time_s = case.sampling.over(torque.end_s)
@@ -141,7 +143,7 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
     rows: list[tuple[Cell, ...]] = []
     for index, quantity in enumerate(model.quantities):
         label = " + ".join(parameter.name for parameter in quantity)
-        target = case.truth.target(quantity)
+        target = sum(case.parameters[parameter.name] for parameter in quantity)
         given, wrong, cut = (None if values is None else values[index] for values in found)
         errors = [_error(target, value) for value in (wrong, cut)]
         unit = quantity[0].unit
@@ -177,7 +179,7 @@ def _medians(
     return [*medians, float(np.median([one.misfit_rad for one in found]))]
 
 
-def _error(target: float | None, value: float | None) -> float | None:
+def _error(target: float, value: float | None) -> float | None:
     error = 100 * (target - value) / target if target and value is not None else None
     return None if error is None or abs(error) > _MEANS_LITTLE else error
 

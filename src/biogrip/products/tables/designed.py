@@ -1,6 +1,7 @@
 """What designed experiments tell beside the study's own, and whether they keep their promise."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,14 @@ import pandas as pd
 
 from biogrip.design.schedule import forces
 from biogrip.experiment.protocol import torque_history
-from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases, settings
+from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases
+from biogrip.products.designed_cases import settings as experiments
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.study.study import Study
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -32,15 +35,31 @@ _COLUMNS = (
 )
 
 
-def designed(
-    settings: Mapping[str, CaseSettings], expected: list[Path], intervals: list[Path]
-) -> Table:
+@dataclass(frozen=True)
+class Settings:
+    """The experiments by case, and of which cases seeds are there to be held against the bound."""
+
+    cases: Mapping[str, CaseSettings]
+    covered: tuple[str, ...]
+
+
+def settings(study: Study) -> Settings:
+    """Choose what is held against one another."""
+    return Settings(experiments(study), tuple(covered_cases(study)))
+
+
+def covered_cases(study: Study) -> list[str]:
+    """Name the cases of which intervals are known."""
+    return [name for name in designed_cases(study) if study.cases[name].coverage_seeds > 0]
+
+
+def designed(settings: Settings, expected: list[Path], intervals: list[Path]) -> Table:
     """Hold bounds of both experiments, and estimates of many seeds, against one another.
 
     Parameters
     ----------
     settings
-        The experiments, by case.
+        The experiments, and which cases have intervals.
     expected
         Verdicts of their traces without noise, JSON, in their order.
     intervals
@@ -48,9 +67,9 @@ def designed(
     """
     files = iter(intervals)
     rows: list[tuple[Cell, ...]] = []
-    for (name, case), foreseen in zip(settings.items(), expected, strict=True):
+    for (name, case), foreseen in zip(settings.cases.items(), expected, strict=True):
         verdicts = {each["quantity"]: each for each in read_verdicts(foreseen)["quantities"]}
-        found = INTERVALS.read(next(files)) if case.covered else None
+        found = INTERVALS.read(next(files)) if name in settings.covered else None
         truths = np.array([[case.parameters[name] for name in case.model.names]])
         before, after = (
             bounds(case, experiment, truths)[0] for experiment in (case.before, case.after)
@@ -109,10 +128,7 @@ DESIGNED = table(
     settings=settings,
     reads={
         "expected": of_cases(EXPECTED, designed_cases),
-        "intervals": of_cases(
-            INTERVALS.path,
-            lambda study: [n for n in designed_cases(study) if study.cases[n].coverage_seeds > 0],
-        ),
+        "intervals": of_cases(INTERVALS.path, covered_cases),
     },
     when=lambda study: bool(designed_cases(study)),
 )
