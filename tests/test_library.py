@@ -6,6 +6,7 @@ import pytest
 
 import biogrip
 from biogrip import library
+from tests.helpers.default import STUDY
 from tests.response.test_nonlinear import ARM, TIMES, symmetric_radau
 
 DOCUMENT = Path(__file__).parents[1] / "docs" / "library.md"
@@ -53,6 +54,11 @@ def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_giv
 def test_all_of_the_library_can_be_had_from_the_package() -> None:
     assert set(library.__all__) == biogrip._LIBRARY
     assert all(getattr(biogrip, name) is getattr(library, name) for name in library.__all__)
+
+
+def test_it_identifies_as_the_default_study() -> None:
+    assert STUDY.ranges == library._RANGES
+    assert all(case.method("least_squares") == library._BUDGET for case in STUDY.cases.values())
 
 
 def test_what_is_not_there_is_said_as_everywhere() -> None:

@@ -12,7 +12,6 @@ from tests.response.test_whitening import correlation
 
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
-NONE = np.zeros((0, 200))
 
 
 def restricted(time_s: Array, rows: Array, left: Array, colour: Colour) -> float:

@@ -35,7 +35,6 @@ SAMPLES = {
     "liquid_drop_1": (9.5, 1.0e-4, 10.0, 1.0e-4),
     "liquid_drop_2": (1.0, 1.0e-4, 10.0, 1.0e-3),
 }
-FREE_RAD = 1.6e-9 / 4.4e-7
 PROTOCOLS = {
     "one hold": (held(60.0, 1e-9),),
     "ramp": (Phase(100.0, Load(0.0, 2e-11), Load(0.0, 2e-11)), held(50.0, 0.0)),

@@ -16,6 +16,7 @@ def whole(samples: Array, capacity: Array) -> IntArray:
     """Round numbers of samples, so that their sum stays."""
     counts = np.floor(samples + 1e-9)
     missing = round(float(samples.sum() - counts.sum()))
+    # A linear program may have overfilled cells by its tolerance; these get no more.
     room = counts < capacity
     order = np.argsort(-np.where(room, samples - counts, -1.0), kind="stable")
     counts[order[:missing]] += 1

@@ -12,7 +12,8 @@ from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.response.sensitivity import rotation_and_sensitivity
 
-_DETERMINED_PERCENT = 100.0
+DETERMINED_PERCENT = 100.0
+"""Bound from which on a quantity does not count as determined."""
 
 
 def bounds_percent(
@@ -62,7 +63,7 @@ def bounds_percent(
 def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     """Return the best and the worst determined quantity of several points.
 
-    Only those count whose bound is below 100 % at half of the points or more. A sum
+    Only those count whose bound is below `DETERMINED_PERCENT` at half of the points or more. A sum
     stands for its parts: that they trade against each other, far from where they
     are, no bound of first order shows.
 
@@ -79,6 +80,6 @@ def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     medians = sorted((float(np.median(found)), label) for label, found in percents.items())
     parts = {part for label in percents if " + " in label for part in label.split(" + ")}
     determined = [
-        label for percent, label in medians if percent < _DETERMINED_PERCENT and label not in parts
+        label for percent, label in medians if percent < DETERMINED_PERCENT and label not in parts
     ]
     return determined[:1] + determined[1:][-1:]

@@ -32,7 +32,9 @@ from biogrip.identify.problem import Problem
 # Steps away from the best fit, in standard deviations, that every profile has.
 _NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
 _POINTS = 35
-_CERTAIN = 0.999
+CERTAIN = 0.999
+"""Confidence with which a profile has to rise, at an end of the range, for that side to close."""
+
 MISSED = 0.05
 """Chi^2 that the prior, by which optima are chosen where the trace says nothing, may cost.
 
@@ -78,7 +80,7 @@ class Likelihood:
         holds with more than the confidence.
     certainty
         Rise that a profile must have reached at the end of the range to be closed
-        there; the same at 99.9 %. A profile that levels off between the two has
+        there; the same at `CERTAIN`. A profile that levels off between the two has
         a confidence limit by the luck of the noise alone.
     """
 
@@ -154,7 +156,7 @@ def likelihood_of(
     noise_rad
         Standard deviation of the noise if it is known.
     """
-    levels = (confidence, _CERTAIN)
+    levels = (confidence, CERTAIN)
     if noise_rad is not None:
         threshold, certainty = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
     else:

@@ -1,4 +1,4 @@
-"""The rotary comb drive: capacitance, torque and voltage (eqs. 7-9)."""
+"""The rotary comb drive: torque and voltage (eqs. 7-9)."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -55,11 +55,6 @@ def capacitance_slope(comb: CombDrive) -> float:
     ln_b = np.log((outer + d + g) / (outer + d))
     total = np.sum(1 / ln_a) + np.sum(1 / ln_b)
     return float(VACUUM_PERMITTIVITY_F_PER_M * comb.thickness_m * total)
-
-
-def capacitance(comb: CombDrive, overlap_rad: ArrayLike) -> Array:
-    """Capacitance C_T in F at an overlap angle in rad (eq. 7)."""
-    return capacitance_slope(comb) * np.asarray(overlap_rad, dtype=float)
 
 
 def torque(comb: CombDrive, voltage_V: ArrayLike) -> Array:

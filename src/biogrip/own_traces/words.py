@@ -9,6 +9,7 @@ import numpy as np
 from tabulate import tabulate
 
 from biogrip.digits import with_unit
+from biogrip.identifiability.marginals import AGREES
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -60,7 +61,7 @@ def _posterior(told: Mapping[str, Any]) -> list[str]:
     return [
         f"Posterior, median and {100 * told['confidence']:g} % interval ({prior}):",
         *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in told["quantities"]),
-        *(f"  {item['why']}" for item in told["quantities"] if item["against_profile"] != "agrees"),
+        *(f"  {item['why']}" for item in told["quantities"] if item["against_profile"] != AGREES),
         told["in_words"],
         *evidence_in_words(told["evidence"]),
     ]

@@ -6,8 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-_SMALLEST, _LARGEST = 250, 1000
-_BATCHES = 8
+from biogrip.study.config import LARGEST_BATCH, SMALLEST_BATCH, USUAL_BATCHES
 
 
 class Batch(NamedTuple):
@@ -65,7 +64,7 @@ def seeds_a_batch(seeds: int) -> int:
     Enough that starting a job is little beside its work and that there are not
     too many jobs to plan, and no more than fit into little memory.
     """
-    return min(max(_SMALLEST, -(-seeds // _BATCHES)), _LARGEST)
+    return min(max(SMALLEST_BATCH, -(-seeds // USUAL_BATCHES)), LARGEST_BATCH)
 
 
 def existing_batches(folder: Path) -> list[Batch]:

@@ -8,7 +8,10 @@ from typing import Any
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.study.study import Study
 
-TABLE_KINDS = (".csv", ".md", ".tex", ".html")
+PUBLISHED_TABLE_KINDS = (".csv", ".md", ".tex")
+"""HTML is for the report alone."""
+
+TABLE_KINDS = (*PUBLISHED_TABLE_KINDS, ".html")
 FIGURE_KINDS = (".png", ".pdf")
 
 

@@ -21,8 +21,8 @@ class Grip:
 
     Parameters
     ----------
-    largest_N, largest_at_s
-        The hardest press, and when.
+    largest_N
+        The hardest press.
     lowest_N, lowest_at_s
         The hardest pull, negative; or the gentlest press after the hardest. And when.
     pulls_from_s
@@ -30,7 +30,6 @@ class Grip:
     """
 
     largest_N: float
-    largest_at_s: float
     lowest_N: float
     lowest_at_s: float
     pulls_from_s: float | None
@@ -70,7 +69,6 @@ def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlin
     least = first + int(np.argmin(told[first:]))
     return Grip(
         float(told[most] * least_told),
-        float(time_s[most]),
         float(told[least] * least_told),
         float(time_s[least]),
         float(time_s[negative[0]]) if len(negative) else None,

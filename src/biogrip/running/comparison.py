@@ -5,6 +5,7 @@ from pathlib import Path
 import pandas as pd
 
 from biogrip.errors import BiogripError
+from biogrip.products.product import PUBLISHED_TABLE_KINDS
 
 _SHOWN = 40
 
@@ -49,8 +50,8 @@ def compare(published: Path, now: Path) -> str:
 
 
 def _tables(folder: Path) -> set[str]:
-    """Names of the tables to compare: HTML is for the report alone."""
-    return {path.name for path in folder.glob("*.*") if path.suffix in (".csv", ".md", ".tex")}
+    """Names of the tables to compare."""
+    return {path.name for path in folder.glob("*.*") if path.suffix in PUBLISHED_TABLE_KINDS}
 
 
 def _missing(names: set[str], folder: Path) -> list[str]:

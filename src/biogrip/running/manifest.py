@@ -13,6 +13,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from biogrip.errors import BiogripError
+from biogrip.files import scratch_of
 from biogrip.running.journal import JOURNALS, Record, sha256_of
 
 NAME = "manifest.jsonl"
@@ -123,7 +124,7 @@ class Manifest:
         text += json.dumps({"sha256_of_the_lines_above": _digest(text)}) + "\n"
         for copy in (self._results / NAME, self._results / JOURNALS / NAME):
             copy.parent.mkdir(parents=True, exist_ok=True)
-            scratch = copy.with_name(f".{copy.name}.{os.getpid()}.part")
+            scratch = scratch_of(copy)
             scratch.write_text(text, encoding="utf-8", newline="\n")
             os.replace(scratch, copy)
         for journal in self._closed:

@@ -7,13 +7,14 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.products.product import FIGURE_KINDS, PUBLISHED_TABLE_KINDS
 from biogrip.running.journal import sha256_of
 from biogrip.running.manifest import set_aside
 
 SUMS = "SHA256SUMS"
 """Names of what was published and its hashes; ``sha256sum --check`` reads it."""
 
-FOLDERS = {"tables": (".csv", ".md", ".tex"), "figures": (".png", ".pdf")}
+FOLDERS = {"tables": PUBLISHED_TABLE_KINDS, "figures": FIGURE_KINDS}
 
 
 def publish(results: Path, published: Path, only: str = "*") -> str:

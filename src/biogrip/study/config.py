@@ -12,10 +12,15 @@ from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Key, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.readings import ReadingBlock
+from biogrip.study.sweep_checks import MOST_POINTS
 from biogrip.study.sweeps import SweepBlock
 from biogrip.study.typed import parts
 
+SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
+"""Seeds a job takes at least and at most, and between these in how many, if a study is silent."""
+
 _MOST_BATCHES = 10_000
+_MOST_CASES = 2000
 # Of the names in a message.
 _SHOWN = 6
 _CASE_NAME = Key(
@@ -92,9 +97,10 @@ class StudyConfig(Shared):
     batch_size: Annotated[
         int | None,
         Key(
-            "How many seeds one job takes. If it is not given, 250; for more than 2000 seeds, an "
-            "eighth of them, for more than 8000, 1000. Changes no result, only how much of a job "
-            "is start-up.",
+            f"How many seeds one job takes. If it is not given, {SMALLEST_BATCH}; for more than "
+            f"{USUAL_BATCHES * SMALLEST_BATCH} seeds, 1/{USUAL_BATCHES} of them, for more than "
+            f"{USUAL_BATCHES * LARGEST_BATCH}, {LARGEST_BATCH}. Changes no result, only how much "
+            "of a job is start-up.",
             low=1,
             high=100_000,
         ),
@@ -122,11 +128,11 @@ class StudyConfig(Shared):
     cases: Annotated[
         Mapping[Annotated[str, _CASE_NAME], CaseBlock],
         Key(
-            "The samples of the study, by name, at most 2000. Any of the blocks "
+            f"The samples of the study, by name, at most {_MOST_CASES}. Any of the blocks "
             f"{', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for this "
             "case alone.",
             fewest=1,
-            most=2000,
+            most=_MOST_CASES,
         ),
     ]
     only: Annotated[
@@ -135,16 +141,16 @@ class StudyConfig(Shared):
             "Names of the cases that the study has, the others being left out. If it is not "
             "given, all that stand under `cases`.",
             fewest=1,
-            most=2000,
+            most=_MOST_CASES,
             unique=True,
         ),
     ] = ()
     sweeps: Annotated[
         Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
         Key(
-            "Grids of cases for heat maps, by name, of at most 2000 points together. Every point "
-            "is a case like another, but for the two values; it is identified, and shown in heat "
-            "maps and their table only."
+            f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points together. "
+            "Every point is a case like another, but for the two values; it is identified, and "
+            "shown in heat maps and their table only."
         ),
     ] = field(default_factory=dict)
     readings: Annotated[

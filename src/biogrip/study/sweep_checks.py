@@ -18,7 +18,7 @@ from biogrip.study.sweeps import (
 from biogrip.study.typed import keys
 
 _AXES = ("rows", "columns")
-_MOST_POINTS = 2000
+MOST_POINTS = 2000
 _LONGEST_NAME = 200
 
 
@@ -47,8 +47,8 @@ def sweep_problems(
         len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
         for sweep in sweeps.values()
     )
-    if not problems and points > _MOST_POINTS:
-        problems = [(("sweeps",), f"found {points} points, allowed are {_MOST_POINTS} together.")]
+    if not problems and points > MOST_POINTS:
+        problems = [(("sweeps",), f"found {points} points, allowed are {MOST_POINTS} together.")]
     yield from problems
     if not problems:
         yield from _name_problems(sweeps, cases)

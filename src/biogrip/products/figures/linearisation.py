@@ -1,4 +1,4 @@
-"""Linear against nonlinear model: their difference, and the domain in which they agree to 1 %."""
+"""Linear against nonlinear model: their difference, and the domain in which they agree."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.stages.model_difference import Compared, scaled
 from biogrip.products.stages.model_difference import settings as compared
-from biogrip.products.tables.linearisation import CAPTION
+from biogrip.products.tables.linearisation import CAPTION, LIMIT_PERCENT
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.study.study import Study
@@ -71,11 +71,11 @@ def draw(settings: Settings, differences: Path) -> Figure:
             cmap="cividis_r",
             shading="nearest",
         )
-        if np.nanmax(shares) > 1:
+        if np.nanmax(shares) > LIMIT_PERCENT:
             lines = axes.contour(
-                grid.columns, grid.index, shares, [1.0], colors="black", linewidths=1.2
+                grid.columns, grid.index, shares, [LIMIT_PERCENT], colors="black", linewidths=1.2
             )
-            axes.clabel(lines, fmt="1 %%", fontsize=7)
+            axes.clabel(lines, fmt=f"{LIMIT_PERCENT:g} %%", fontsize=7)
         axes.set_yscale("log")
         axes.set_yticks(
             [0.3, 1, 3, 10, 30], ["0.3", "1", "3", "10", "30"] if index == 0 else [""] * 5

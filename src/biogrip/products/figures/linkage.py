@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle
 
 from biogrip.experiment.protocol import torque_history
+from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.elements import damper, spring
@@ -19,8 +20,6 @@ from biogrip.products.stages.model_difference import settings as compared
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Study
 
-# Section 2: the largest sample the gripper is made for; the model itself needs no size.
-_SAMPLE_M = 120e-6
 _ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 0}
 
 
@@ -63,7 +62,7 @@ def _joints(gripper: Gripper, closing_rad: float = 0.0) -> dict[str, tuple[float
         1e3 * gripper.arm_length_m,
         math.radians(gripper.reference_angle_deg),
     )
-    base = 0.5e3 * _SAMPLE_M + length * math.cos(angle)
+    base = 0.5e3 * LARGEST_M + length * math.cos(angle)
     tip_x = -base + length * math.cos(angle - closing_rad)
     tip_y = length * math.sin(angle - closing_rad)
     return {"A": (-base, 0), "B": (tip_x, tip_y), "C": (-tip_x, tip_y), "D": (base, 0)}
@@ -75,7 +74,7 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
     axes.plot(*zip(joints["D"], joints["C"], strict=True), color=BLUE, linewidth=2.5)
     axes.plot(*zip(joints["A"], joints["D"], strict=True), color=GREY, linewidth=1)
     middle = joints["B"][1]
-    axes.add_patch(Circle((0, middle), 0.5e3 * _SAMPLE_M, color=ORANGE))
+    axes.add_patch(Circle((0, middle), 0.5e3 * LARGEST_M, color=ORANGE))
     for name, (x, y) in joints.items():
         axes.plot(x, y, "o", color="white", markeredgecolor=BLACK, markersize=4)
         side = -1 if x < 0 else 1
@@ -127,7 +126,7 @@ def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
             axes.plot(*zip(joints[foot], joints[tip], strict=True), color=colour, linewidth=2)
         axes.plot([], [], color=colour, linewidth=2, label=label)
     (b_x, b_y), (c_x, _) = moved["B"], moved["C"]
-    height = 1e6 * _SAMPLE_M
+    height = 1e6 * LARGEST_M
     axes.add_patch(Circle((0, reference["B"][1]), height / 2, fill=False, color=GREY))
     theta = np.linspace(0, 2 * np.pi, 200)
     axes.fill(
@@ -204,13 +203,13 @@ LINKAGE = drawing(
     draw,
     name="linkage",
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
-    "of 120 µm; (b) its tips at the reference and closed as far as the study's softest sample lets "
-    "them, the rotation enlarged as it says, and their displacements along x; (c) "
-    "what the angles and displacements are called: reference (hat, soft lines), deformed (tilde, "
-    "hard lines), increments theta = tilde - hat and the closing rotations phi, displacements u of "
-    "the tips and x of the node between spring and damper, all to the right; (d) the constitutive "
-    "models. Arm length and angle are those of the config; in the default study they "
-    "are reconstructed.",
+    f"of {1e6 * LARGEST_M:g} µm; (b) its tips at the reference and closed as far as the study's "
+    "softest sample lets them, the rotation enlarged as it says, and their displacements along x; "
+    "(c) what the angles and displacements are called: reference (hat, soft lines), deformed "
+    "(tilde, hard lines), increments theta = tilde - hat and the closing rotations phi, "
+    "displacements u of the tips and x of the node between spring and damper, all to the right; "
+    "(d) the constitutive models. Arm length and angle are those of the config; in the default "
+    "study they are reconstructed.",
     settings=settings,
     sheet="study_figures",
 )

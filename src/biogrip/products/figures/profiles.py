@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
+from biogrip.identifiability.profile import CERTAIN
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
@@ -69,7 +70,7 @@ def draw_profiles(
         axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
         for rise, style, label in (
             (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
-            (found["certainty"], ":", "99.9 %, to close a side"),
+            (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
             line = axes.axhline(rise, color=TARGET, linestyle=style, linewidth=0.7)
             if index == 0:

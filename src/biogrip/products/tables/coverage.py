@@ -139,12 +139,12 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
     """Bound, spread and intervals of a quantity that traces should determine; else empty."""
     if found.empty:
         return [None] * 8
-    spread = _spread(found["estimate"], truth)
+    spread = _spread(found["estimate"])
     return [
         bound,
         spread,
         spread / bound,
-        _spread(found["estimate_rest_known"], truth) / bound,
+        _spread(found["estimate_rest_known"]) / bound,
         float(np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth))),
         100 * confidence,
         100 * float(np.mean(_holds(found, truth))),
@@ -161,9 +161,9 @@ def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
         yield int(np.sum(holds[chosen]))
 
 
-def _spread(estimates: "pd.Series[float]", truth: float) -> float:
+def _spread(estimates: "pd.Series[float]") -> float:
     """Standard deviation of the logarithm in percent."""
-    return 100 * float(np.std(np.log(estimates.to_numpy(float) / truth), ddof=1))
+    return 100 * float(np.std(np.log(estimates.to_numpy(float)), ddof=1))
 
 
 def _holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:

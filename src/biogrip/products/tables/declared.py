@@ -55,16 +55,16 @@ def table(
     scope = Scope(cases, sweeps, when)
     whose = scope.whose
     path = stem.format(name=name) + (f"_{whose}" if whose else "")
+    writes = {kind[1:]: path + kind for kind in TABLE_KINDS}
 
     @wraps(make)
     def written(given: object, *, csv: Path, **files: Any) -> None:
-        for other in ("md", "tex", "html"):
-            del files[other]
-        write(make(given, **files), csv)
+        inputs = {key: file for key, file in files.items() if key not in writes}
+        write(make(given, **inputs), csv)
 
     return Product(
         name,
-        {kind[1:]: path + kind for kind in TABLE_KINDS},
+        writes,
         written,
         partial(scope.settings, settings),
         scope.jobs,

@@ -1,4 +1,4 @@
-"""The domain in which the paper's linearisation is good to 1 %."""
+"""The domain in which the paper's linearisation is good."""
 
 from pathlib import Path
 
@@ -9,17 +9,19 @@ from biogrip.products.product import the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 
+LIMIT_PERCENT = 1.0
+"""Difference up to which it is, as a share of the peak."""
+
 _COLUMNS = (
     Column("case", "Case"),
     Column("reference_angle_deg", "Reference angle (deg)"),
     Column("difference_percent", "Difference at the protocol's torque (%)", 2),
-    Column("factor_for_1_percent", "Torque factor for 1 %", 3),
+    Column(f"factor_for_{LIMIT_PERCENT:g}_percent", f"Torque factor for {LIMIT_PERCENT:g} %", 3),
 )
-_LIMIT = 0.01
 
 
 def linearisation(settings: None, differences: Path) -> Table:
-    """Find, for every case and angle, the multiple of the torque at which 1 % is reached.
+    """Find, for every case and angle, the multiple of the torque that reaches `LIMIT_PERCENT`.
 
     Parameters
     ----------
@@ -39,25 +41,26 @@ def linearisation(settings: None, differences: Path) -> Table:
         rows.append((case, float(angle), 100 * float(at_one), _crossing(factor, share)))
     caption = (
         "Largest difference of the linear from the nonlinear model, as a share of the peak, at the "
-        "torque of the case's protocol, and the multiple of that torque at which it reaches 1 % "
-        f"(empty: not up to {factor[-1]:g})."
+        "torque of the case's protocol, and the multiple of that torque at which it reaches "
+        f"{LIMIT_PERCENT:g} % (empty: not up to {factor[-1]:g})."
     )
     return Table(caption, _COLUMNS, rows)
 
 
 def _crossing(factor: np.ndarray, share: np.ndarray) -> float | None:
-    above = np.flatnonzero(share >= _LIMIT)
+    limit = LIMIT_PERCENT / 100
+    above = np.flatnonzero(share >= limit)
     if not len(above) or above[0] == 0:
         return None if not len(above) else float(factor[0])
     last = above[0]
     pair = slice(last - 1, last + 1)
-    return float(np.exp(np.interp(np.log(_LIMIT), np.log(share[pair]), np.log(factor[pair]))))
+    return float(np.exp(np.interp(np.log(limit), np.log(share[pair]), np.log(factor[pair]))))
 
 
 CAPTION = (
     "The largest difference of the linear from the nonlinear model over the protocol, as a share "
     "of the peak, over the reference angle and multiples of the torque of the case's protocol. "
-    "Left of and above the 1 % line the paper's linearisation is worse than that."
+    f"Left of and above the {LIMIT_PERCENT:g} % line the paper's linearisation is worse than that."
 )
 
 LINEARISATION = table(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR
 from biogrip.products.files.posterior import TOLD, read_posterior
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -12,7 +13,7 @@ from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.tables.verdicts import target_of
 from biogrip.study.study import Study
 
-_IN_WORDS = {"agrees": "the same", "differs": "another interval", "prior": "an end is the prior's"}
+_IN_WORDS = {AGREES: "the same", DIFFERS: "another interval", PRIOR: "an end is the prior's"}
 
 _COLUMNS = (
     Column("case", "Case"),

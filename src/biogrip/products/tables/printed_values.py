@@ -3,9 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from biogrip.experiment.truth import Truth
 from biogrip.identify.genome import GeneRange, nearest_encodable
 from biogrip.products.tables.declared import table
+from biogrip.products.tables.errors import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
 
@@ -52,7 +55,7 @@ def printed_values(settings: Settings) -> Table:
                 errors: tuple[Cell, Cell] = (None, None)
                 if quantity == "identified" and target:
                     printed = published.error_percent.get(name)
-                    errors = (printed, 100 * (target - value) / target)
+                    errors = (printed, float(error_percent(target, np.array([value]))[0]))
                 distance = 100 * (value - nearest) / value
                 within = "yes" if genes.low <= value <= genes.high else "no"
                 rows.append(

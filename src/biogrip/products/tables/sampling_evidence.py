@@ -8,7 +8,7 @@ import numpy as np
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.experiment.truth import Truth
-from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.identifiability.at_truth import DETERMINED_PERCENT, bounds_percent
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.products.tables.declared import table
@@ -17,7 +17,6 @@ from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
-_DETERMINED_PERCENT = 100.0
 # Where c and c_p trade against each other, each alone is far less certain than their sum.
 _TRADING = 2.0
 
@@ -79,7 +78,7 @@ def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
         bounds = [found[index][1] for found in at_truth]
         members = [names[member] for member in q.members]
         known = all(member in identified for member in members)
-        if q in shown and known and min(bounds) < _DETERMINED_PERCENT:
+        if q in shown and known and min(bounds) < DETERMINED_PERCENT:
             target, found = (sum(of[m] for m in members) for of in (truth, identified))
             error = float(error_percent(target, np.array([found]))[0])
             rows.append((name, q.label, error, *bounds))
