@@ -5,7 +5,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,8 +69,8 @@ def scale_section() -> Section:
         planning_s, planning = _study(Path(name), overlay, "--dry-run")
     rows = [
         *({"process": kind, **vars(of_kind)} for kind, of_kind in seen.items()),
-        {"process": _ALL, **vars(_together(seen)), "wall_s": wall_s, **sizes},
-        {"process": _PLANNING, **vars(_together(planning)), "wall_s": planning_s},
+        {"process": _ALL, **vars(_together(seen.values())), "wall_s": wall_s, **sizes},
+        {"process": _PLANNING, **vars(_together(planning.values())), "wall_s": planning_s},
     ]
     columns: dict[str, Callable[[Row], str]] = {
         "process": lambda row: row["process"].replace("_", " "),
@@ -106,7 +106,7 @@ def watched(command: Sequence[str], folder: Path) -> dict[str, Seen]:
     by_kind: dict[str, list[Seen]] = defaultdict(list)
     for (kind, _), one in seen.items():
         by_kind[kind].append(one)
-    kinds = {kind: _together(dict(enumerate(some))) for kind, some in by_kind.items()}
+    kinds = {kind: _together(some) for kind, some in by_kind.items()}
     return dict(sorted(kinds.items(), key=lambda item: -item[1].processor_s))
 
 
@@ -140,11 +140,11 @@ def _kind(command: Sequence[str]) -> str | None:
     return command[command.index("make") + 1] if "make" in command[:-1] else None
 
 
-def _together(seen: dict[Any, Seen]) -> Seen:
+def _together(seen: Collection[Seen]) -> Seen:
     return Seen(
-        sum(one.processes for one in seen.values()),
-        sum(one.processor_s for one in seen.values()),
-        max(one.largest_MB for one in seen.values()),
+        sum(one.processes for one in seen),
+        sum(one.processor_s for one in seen),
+        max(one.largest_MB for one in seen),
     )
 
 

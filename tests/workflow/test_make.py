@@ -118,6 +118,17 @@ def test_what_was_deleted_is_made_again_as_it_was(
     assert main(["verify"]) == 0
 
 
+def test_a_batch_of_another_plan_is_made(tiny_copy: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one that a larger study left, and that runs again as its code has changed."""
+    monkeypatch.chdir(tiny_copy)
+    both = (*CASE, "--batch", "seeds_0-1")
+    assert main(["make", "measurement", *both]) == 0
+    assert main(["make", "identification", *both, *METHOD]) == 0
+    folder = tiny_copy / "results" / "identifications" / "liquid_drop_2" / "least_squares"
+    rows = [(folder / f"seeds_{seeds}.csv").read_text().splitlines() for seeds in ("0-0", "1-1")]
+    assert (folder / "seeds_0-1.csv").read_text().splitlines() == [*rows[0], *rows[1][1:]]
+
+
 def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
     """As all tests here but in a process of its own."""
     (tiny_copy / "results" / "tables" / "errors_liquid_drop_2.csv").unlink()
@@ -147,7 +158,7 @@ def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
         (("measurement", *CASE), "measurement: is made with --batch, which is missing."),
         (
             ("measurement", *CASE, "--batch", "0-1"),
-            "--batch: found '0-1'. Allowed: seeds_0-0, seeds_1-1.",
+            "--batch: found '0-1', allowed is seeds_FIRST-LAST.",
         ),
         (
             ("identification", *BATCH, "--method", "genetics"),

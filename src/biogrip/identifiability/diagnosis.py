@@ -114,10 +114,9 @@ def _pulling(grip: Grip, last_s: float) -> list[str]:
 
 def _notes(likelihood: Likelihood) -> list[str]:
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
-    residual = residuals.left(likelihood.best)
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return []
-    notes = doubts_about_noise(residual)
+    notes = doubts_about_noise(residuals.left(likelihood.best))
     if notes and not residuals.coloured:
         notes.append(
             "Intervals that allow for such noise are those of measurement.noise_model: coloured, "

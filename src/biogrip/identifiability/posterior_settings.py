@@ -50,7 +50,7 @@ class PosteriorSettings:
     ] = False
 
     def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
-        """Find priors of what a model does not have, and too few walkers for its parameters.
+        """Find too few walkers, and priors of what a model lacks or tells by its order.
 
         Parameters
         ----------

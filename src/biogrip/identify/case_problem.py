@@ -71,14 +71,14 @@ class CaseProblem:
         """Sample model without the parameters that are known."""
         return with_fixed(self.model, self.fixed)
 
-    def searched_for(self, *models: SampleModel) -> "CaseProblem":
-        """Return what fits of models depend on: no range of what these have no parameter of."""
-        chosen = {p.range_name for model in models for p in model.parameters}
+    def searched_for(self, *others: SampleModel) -> "CaseProblem":
+        """Return what fits of its model, and of others, depend on: no range but of their own."""
+        chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
         return replace(self, ranges={n: r for n, r in self.ranges.items() if n in chosen})
 
-    def to_identify(self, *models: SampleModel) -> "CaseProblem":
+    def to_identify(self, *others: SampleModel) -> "CaseProblem":
         """Return what `of` and `for_model` depend on: judgements alone allow for more."""
-        return replace(self.searched_for(*models), coloured=False, uncertainty={})
+        return replace(self.searched_for(*others), coloured=False, uncertainty={})
 
     @property
     def plain(self) -> bool:

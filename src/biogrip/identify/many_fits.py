@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, IntArray, parts
 from biogrip.identify.levenberg_marquardt import (
     Constraint,
     Minima,
@@ -82,11 +82,11 @@ class ManyFits:
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
         if len(x) <= size:
             return self._normal_of(rows_of(x, *beside), x, trace)
-        parts = [
+        normals = [
             self._normal_of(rows_of(x[some], *(row[some] for row in beside)), x[some], trace[some])
-            for some in (slice(start, start + size) for start in range(0, len(x), size))
+            for some in parts(len(x), size)
         ]
-        found = zip(*(part.parts for part in parts), strict=True)
+        found = zip(*(normal.parts for normal in normals), strict=True)
         return Normal(*(np.concatenate(part) for part in found))
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:

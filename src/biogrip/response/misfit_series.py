@@ -19,7 +19,7 @@ from itertools import combinations
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, IntArray, parts
 from biogrip.experiment.protocol import TorqueHistory, drives
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -142,8 +142,7 @@ class SeriesMisfit:
         populations, size = parameters.shape[:2]
         some = max(1, _AT_ONCE // size)
         misfit = np.empty((populations, size))
-        for start in range(0, populations, some):
-            these = slice(start, start + some)
+        for these in parts(populations, some):
             misfit[these] = self._of_some(parameters[these], traces[these])
         return misfit
 

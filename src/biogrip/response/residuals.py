@@ -1,12 +1,11 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
-from collections.abc import Iterator
 from copy import copy
 from functools import cached_property
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -139,20 +138,18 @@ class Residuals:
         weights = self._condensed.cleared(residual)
         gradient = sum(
             self._simulated(log_parameters, self._time_s[some])[1] @ weights[some]
-            for some in self._blocks()
+            for some in parts(self.samples, _SAMPLES_AT_ONCE)
         )
         return np.asarray(gradient), self._rms(residual)
 
     def left(self, log_parameters: Array) -> Array:
         """Residuals alone, (n_samples,) in rad."""
-        rotation = np.concatenate(
-            [self._simulated(log_parameters, self._time_s[some])[0] for some in self._blocks()]
+        simulated = (
+            self._simulated(log_parameters, self._time_s[some])[0]
+            for some in parts(self.samples, _SAMPLES_AT_ONCE)
         )
+        rotation = np.concatenate(list(simulated))
         return self._condensed.cleared(rotation) - self._rotation_rad
-
-    def _blocks(self) -> Iterator[slice]:
-        starts = range(0, self.samples, _SAMPLES_AT_ONCE)
-        return (slice(start, start + _SAMPLES_AT_ONCE) for start in starts)
 
     def _rms(self, residual: Array) -> float:
         return float(np.linalg.norm(residual)) / np.sqrt(self.samples)
@@ -244,9 +241,11 @@ class Residuals:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         # As many modes at once, about.
         few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
-        parts = range(0, len(log_parameters), few)
         return np.concatenate(
-            [self._corrections(log_parameters[start : start + few], slopes) for start in parts]
+            [
+                self._corrections(log_parameters[some], slopes)
+                for some in parts(len(log_parameters), few)
+            ]
         )
 
     def _corrections(self, log_parameters: Array, slopes: bool) -> Array:
@@ -278,8 +277,7 @@ class Residuals:
             In rad.
         """
         misfit = np.empty(len(parameters))
-        for start in range(0, len(parameters), _AT_ONCE):
-            some = slice(start, start + _AT_ONCE)
+        for some in parts(len(parameters), _AT_ONCE):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.condensed_trace
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)

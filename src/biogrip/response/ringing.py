@@ -21,7 +21,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from biogrip.arrays import Array, ComplexArray, IntArray
+from biogrip.arrays import Array, ComplexArray, IntArray, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -100,8 +100,7 @@ def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
         mixing = np.concatenate((mixing.real, -mixing.imag), axis=2)
     rows = np.empty((n, 1 + count, len(time_s)))
     at_once = max(1, _AT_ONCE // (m * len(time_s)))
-    for start in range(0, n, at_once):
-        some = slice(start, start + at_once)
+    for some in parts(n, at_once):
         both = np.concatenate(growth_of_modes(modes.rates[some], torque, time_s), axis=1)
         both = both.reshape(-1, 2 * drives * m, len(time_s))
         if np.iscomplexobj(both):

@@ -6,7 +6,7 @@ Modes with their derivatives (`biogrip.response.modes`, with inertia
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -59,8 +59,7 @@ def rotation_and_sensitivity(
     else:
         modes = modes_of(gripper, model, parameters[None], symmetric=torque.symmetric)
         rows = np.empty((1 + len(parameters), len(time_s)))
-        for start in range(0, len(time_s), _AT_ONCE):
-            some = slice(start, start + _AT_ONCE)
+        for some in parts(len(time_s), _AT_ONCE):
             rows[:, some] = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s[some]))
         phi, slopes = rows[0], rows[1:]
     if nonlinear:

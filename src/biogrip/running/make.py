@@ -52,12 +52,16 @@ def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
             raise BiogripError(
                 f"--{name}: found '{job[name]}'.{hint} Allowed: {', '.join(allowed[:20])}."
             )
-    if "batch" in job:
-        jobs = [each for product in sheet.products for each in product.jobs(sheet.plan)]
-        rest = {name: value for name, value in job.items() if name != "batch"}
-        batches = {each["batch"]: None for each in jobs if rest.items() <= each.items()}
-        if job["batch"] not in batches:
-            hint, some = nearest(job["batch"], batches), ", ".join(list(batches)[:20])
-            raise BiogripError(f"--batch: found '{job['batch']}'.{hint} Allowed: {some}.")
     if "seed" in job and not job["seed"].isdigit():
         raise BiogripError(f"--seed: found '{job['seed']}', allowed is a number.")
+    if "batch" in job:
+        _check_batch(sheet, job)
+
+
+def _check_batch(sheet: Sheet, job: Mapping[str, str]) -> None:
+    """See that a batch has what it is made of, not that it is planned: it may be of another plan."""
+    for file in (Path(file) for files in sheet.inputs(dict(job)).values() for file in files):
+        if file.stem == job["batch"] and not file.exists():
+            there = sorted(path.stem for path in file.parent.glob(f"*{file.suffix}"))
+            hint, some = nearest(file.stem, there), ", ".join(there[:20])
+            raise BiogripError(f"--batch: found '{file.stem}'.{hint} Allowed: {some}.")

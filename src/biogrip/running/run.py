@@ -189,8 +189,11 @@ def _to_open(folder: Path, arguments: list[str]) -> str:
     """Name what a reader should look at first: the files that were asked for, else the pages."""
     results = folder / "results"
     pages = sorted((results / "summaries").glob("*.html"))
-    asked = [folder / word for word in arguments if (folder / word).is_file()]
-    shown = asked or [results / "report.html", *pages]
-    there = [str(path) for path in shown if path.is_file()]
+    asked = [folder / word for word in arguments]
+    there = _files(asked) or _files([results / "report.html", *pages])
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""
     return f"biogrip: done. Open {', '.join(there[:_SHOWN])}{more}." if there else "biogrip: done."
+
+
+def _files(paths: list[Path]) -> list[str]:
+    return [str(path) for path in paths if path.is_file()]

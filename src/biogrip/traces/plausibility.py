@@ -17,13 +17,13 @@ References
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at
 from biogrip.instrument.gripper import Gripper
@@ -172,7 +172,7 @@ def check_recording(
             "It would fit if it were -1 times (is opening counted as positive?), or if an offset "
             "or drift of the instrument, where it has one, were declared."
         )
-    turns = (fit.weights @ lagged(recording.time_s[some]) for some in _parts(len(trace)))
+    turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
     _check_turn(recording, turn, free, path, columns)
 
@@ -230,7 +230,7 @@ def _functions(
     samples = len(recording.time_s)
     constant = np.full(samples, samples**-0.5)
     rows: Array | None = None
-    for some in _parts(samples):
+    for some in parts(samples, _AT_ONCE):
         own = lagged(recording.time_s[some])
         columns = np.vstack((own, nuisance[:, some], constant[some], recording.rotation_rad[some]))
         below = columns.T if rows is None else np.vstack((rows, columns.T))
@@ -238,10 +238,6 @@ def _functions(
     assert rows is not None
     lags, others = np.split(rows.T, [len(own)])
     return _Functions(lags, others[:-2], others[-2:-1], others[-1], samples)
-
-
-def _parts(samples: int) -> Iterator[slice]:
-    return (slice(start, start + _AT_ONCE) for start in range(0, samples, _AT_ONCE))
 
 
 def _cleared(basis: Array, functions: Array) -> Array:

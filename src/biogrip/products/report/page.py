@@ -99,6 +99,7 @@ class Settings:
 def settings(study: Study, _: Wildcards) -> Settings:
     """Choose what the page shows."""
     plan = Plan(study, Path("results"))
+    rules = _rules(plan)
     return Settings(
         tuple(
             ExploredCase(
@@ -112,8 +113,8 @@ def settings(study: Study, _: Wildcards) -> Settings:
             for case in study.cases.values()
         ),
         (study.shown, *(method for method in study.methods if method != study.shown)),
-        tuple(_entries(plan, _FIGURES)),
-        tuple(_entries(plan, _TABLES)),
+        tuple(_entries(plan, _FIGURES, rules)),
+        tuple(_entries(plan, _TABLES, rules)),
         yaml.safe_dump(plain(study.config), allow_unicode=True),
         {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
     )
@@ -212,13 +213,19 @@ def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildca
                 yield product, job, file
 
 
-def _entries(plan: Plan, kinds: tuple[str, str]) -> Iterable[Entry]:
-    rules = {
+def _rules(plan: Plan) -> dict[tuple[Any, ...], str]:
+    """Which rule makes a product's job."""
+    return {
         (product.name, *job.items()): each.rule
         for each in together(products().values(), plan)
         for product in each.products
         for job in each.jobs
     }
+
+
+def _entries(
+    plan: Plan, kinds: tuple[str, str], rules: Mapping[tuple[Any, ...], str]
+) -> Iterable[Entry]:
     for product, job, file in _files(plan, kinds):
         options = "".join(f" --{name} {value}" for name, value in job.items())
         yield Entry(

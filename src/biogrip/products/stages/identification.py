@@ -51,8 +51,8 @@ class Settings:
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the identification of a case by a method depends on."""
     case, method = study.case(job["case"]), job["method"]
-    problem = case.problem.to_identify(case.problem.model)
-    return Settings(study.study_seed, case.name, problem, method, case.method(method))
+    problem, of_method = case.problem.to_identify(), case.method(method)
+    return Settings(study.study_seed, case.name, problem, method, of_method)
 
 
 def identify(

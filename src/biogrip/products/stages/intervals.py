@@ -72,7 +72,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     return Settings(
         study.study_seed,
         case.name,
-        case.problem.searched_for(case.problem.model),
+        case.problem.searched_for(),
         case.method("least_squares"),
         case.parameters,
         case.noise,

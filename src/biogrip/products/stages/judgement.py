@@ -102,14 +102,13 @@ def settings_of(study: Study, case: Case) -> Settings:
 def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the judgement of a case depends on."""
     chosen = settings_of(study, study.case(job["case"]))
-    problem = chosen.problem
-    return replace(chosen, problem=problem.searched_for(problem.model))
+    return replace(chosen, problem=chosen.problem.searched_for())
 
 
 def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
     """Choose what the judgement of a target depends on."""
     case = study.case(job["case"])
-    problem = case.problem.to_identify(case.problem.model)
+    problem = case.problem.to_identify()
     return ExpectedSettings(case.name, problem, case.confidence, case.parameters, case.noise)
 
 

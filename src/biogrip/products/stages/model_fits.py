@@ -44,9 +44,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the fits of a case depend on."""
     case = study.case(job["case"])
     fits, models = case.method("least_squares"), study.models_of(case)
-    problem = case.problem.to_identify(
-        case.problem.model, *(CANDIDATES[name].model for name in models)
-    )
+    problem = case.problem.to_identify(*(CANDIDATES[name].model for name in models))
     return Settings(study.study_seed, case.name, problem, fits, models)
 
 

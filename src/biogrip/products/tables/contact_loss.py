@@ -90,7 +90,7 @@ def settings(study: Study) -> Settings:
                 case.phases,
                 case.sampling,
                 case.noise,
-                case.problem.to_identify(case.problem.model),
+                case.problem.to_identify(),
                 case.method("least_squares"),
                 min(case.seeds, _MOST_SEEDS),
             )
