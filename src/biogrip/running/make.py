@@ -59,7 +59,7 @@ def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
 
 
 def _check_batch(sheet: Sheet, job: Mapping[str, str]) -> None:
-    """See that a batch has what it is made of, not that it is planned: it may be of another plan."""
+    """See that a batch has what it is made of, planned or not: it may be of another plan."""
     for file in (Path(file) for files in sheet.inputs(dict(job)).values() for file in files):
         if file.stem == job["batch"] and not file.exists():
             there = sorted(path.stem for path in file.parent.glob(f"*{file.suffix}"))
