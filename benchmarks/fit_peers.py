@@ -1,8 +1,8 @@
 """Local fits and confidence limits in the libraries of others.
 
 All see the residuals that our own fits see, condensed to some fifty rows in units of
-the noise, with exact derivatives by the log-parameters, as in `Objective`: what has
-been computed at a point is kept there for them. Each is set up as its documentation shows.
+the noise, with exact derivatives by the log-parameters, and the prior, as in `Objective`: what
+has been computed at a point is kept there for them. Each is set up as its documentation shows.
 """
 
 from collections.abc import Sequence
@@ -16,12 +16,52 @@ from scipy.special import chdtr
 
 from benchmarks.starts import Started
 from biogrip.arrays import Array
-from biogrip.identify.local_fit import ROUGH, Objective, local_fit
+from biogrip.identify.local_fits import FINE, PRIOR_WIDTH, ROUGH
 from biogrip.identify.multi_start import FINISHED
 from biogrip.identify.problem import Problem as Posed
 
 # Of pyPESTO's steps along a profile, in standard deviations: first, smallest and largest.
 _STEPS = (0.5, 0.1, 1.0)
+
+
+class Objective:
+    """Rows of the residuals in units of the noise, and of the prior, for one point at a time.
+
+    Parameters
+    ----------
+    posed
+        What is fitted.
+    """
+
+    def __init__(self, posed: Posed) -> None:
+        self.low, self.high = posed.low, posed.high
+        self._residuals = posed.residuals
+        self._middle = 0.5 * (posed.low + posed.high)
+        self._prior = np.eye(len(self._middle)) / PRIOR_WIDTH
+        self._last: tuple[Array, Array, Array, float] | None = None
+
+    def rows(self, x: Array) -> Array:
+        """Rows, (n_rows,), at log-parameters (n_parameters,)."""
+        return self._at(x)[1]
+
+    def jacobian(self, x: Array) -> Array:
+        """Their Jacobian, (n_rows, n_parameters)."""
+        return self._at(x)[2]
+
+    def misfit_rad(self, x: Array) -> float:
+        """RMS misfit."""
+        return self._at(x)[3]
+
+    def _at(self, x: Array) -> tuple[Array, Array, Array, float]:
+        """All of it; the last is kept, for rows and Jacobian are asked for in turn."""
+        if self._last is None or not np.array_equal(self._last[0], x):
+            found = self._residuals.condensed_responses(x[None])[0]
+            found[0] -= self._residuals.condensed_trace
+            misfit_rad = float(np.linalg.norm(found[0])) / np.sqrt(self._residuals.samples)
+            found /= self._residuals.noise_scale_rad
+            rows = np.append(found[0], (x - self._middle) / PRIOR_WIDTH)
+            self._last = x.copy(), rows, np.concatenate((found[1:].T, self._prior)), misfit_rad
+        return self._last
 
 
 def by_scipy(trace: Started) -> Array:
@@ -37,10 +77,25 @@ def by_scipy(trace: Started) -> Array:
 
 def by_scipy_in_two_turns(trace: Started) -> Array:
     """Fit by the same roughly from every start, and only the best of these to the end."""
-    rough = [local_fit(trace.posed, start, ROUGH) for start in trace.starts]
-    rough.sort(key=lambda fit: fit.misfit_rad)
-    fine = [local_fit(trace.posed, fit.log_parameters) for fit in rough[:FINISHED]]
-    return min(fine, key=lambda fit: fit.misfit_rad).log_parameters
+    objective = Objective(trace.posed)
+    rough = [_local_fit(objective, start, ROUGH) for start in trace.starts]
+    rough.sort(key=objective.misfit_rad)
+    fine = [_local_fit(objective, x, FINE) for x in rough[:FINISHED]]
+    return min(fine, key=objective.misfit_rad)
+
+
+def _local_fit(objective: Objective, start: Array, tolerance: float) -> Array:
+    inside = 1e-9 * (objective.high - objective.low)
+    found: Array = least_squares(
+        objective.rows,
+        np.clip(start, objective.low + inside, objective.high - inside),
+        objective.jacobian,
+        (objective.low, objective.high),
+        ftol=tolerance,
+        xtol=FINE,
+        gtol=FINE,
+    ).x
+    return found
 
 
 def by_lmfit(trace: Started) -> Array:

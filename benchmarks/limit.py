@@ -13,7 +13,6 @@ from benchmarks.starts import Started, fitted, started
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array, IntArray
 from biogrip.identify.genetic import evolve, evolve_many
-from biogrip.identify.problem import condensed_of
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.mode_rows import ModeRows
@@ -106,8 +105,7 @@ class WatchedRows(ModeRows):
 
 def watched_fits(problems: Sequence[Problem]) -> tuple[WatchedRows, list[Started]]:
     """Return traces to fit, and what watches the rows of all of their responses."""
-    first = problems[0]
-    condensed = condensed_of(first.steps, first.time_s, offset=False, drift=False)
+    condensed = problems[0].condensed()
     rows = WatchedRows(condensed.of_modes)
     # Made once and kept there.
     vars(condensed)["of_modes"] = rows

@@ -6,17 +6,16 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq, least_squares
 
-from benchmarks.fit_peers import lmfit_limits, minimizer, multi_start, pypesto_limits
+from benchmarks.fit_peers import Objective, lmfit_limits, minimizer, multi_start, pypesto_limits
 from benchmarks.section import Row, Section, number, times_ours
 from benchmarks.setup import Problem, problem
 from benchmarks.starts import fitted, started
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
-from biogrip.identifiability.many_limits import many_limits
-from biogrip.identifiability.many_profiles import many_profiles
-from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
-from biogrip.identify.local_fit import Objective
 
 _BATCH, _ROUNDS = 10, 5
 _PARAMETERS = ("k", "k_p", "c")
@@ -64,8 +63,8 @@ def compared(problems: Sequence[Problem], rounds: int) -> list[Row]:
     best = fit.minimize()
     from_optimum = multi_start(posed, likelihood.best[None])
     ways: dict[str, Callable[[], Array]] = {
-        OURS: lambda: many_limits([likelihood], quantities)[0],
-        SIDE_BY_SIDE: lambda: many_limits(likelihoods, quantities)[0],
+        OURS: lambda: near_limits([likelihood], quantities)[0],
+        SIDE_BY_SIDE: lambda: near_limits(likelihoods, quantities)[0],
         WHOLE: partial(_whole, likelihood, quantities),
         LMFIT: partial(lmfit_limits, fit, best, which),
         PYPESTO: partial(pypesto_limits, *from_optimum, which),
@@ -149,5 +148,5 @@ def _likelihoods(problems: Sequence[Problem]) -> list[Likelihood]:
 
 
 def _whole(likelihood: Likelihood, quantities: Sequence[Quantity]) -> Array:
-    profiles = many_profiles([likelihood], quantities)[0]
+    (profiles,) = profiles_of([likelihood], quantities)
     return np.array([[profile.low, profile.high] for profile in profiles], dtype=float)

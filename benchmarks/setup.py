@@ -14,11 +14,13 @@ from biogrip.experiment.sample import SampleModel, model_named
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
-from biogrip.identify.problem import condensed_of, problem_of
+from biogrip.identify.problem import problem_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import misfit_of
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.response.residuals import Residuals
 from biogrip.study.load import load_study
 from biogrip.study.method_blocks import MethodBlocks
 
@@ -68,9 +70,15 @@ class Problem:
 
     def misfit(self, *, nonlinear: bool = False) -> Callable[[Array], Array]:
         """Return the study's misfit of a population against the trace."""
-        return misfit_of(
-            self.gripper, self.model, self.steps, self.time_s, self.trace_rad, nonlinear=nonlinear
-        )
+        given = self.steps, self.time_s, self.trace_rad
+        condensed = self.condensed(nonlinear=nonlinear)
+        residuals = Residuals(self.gripper, self.model, *given, condensed)
+        return misfit_of(residuals, self.gripper, *given)
+
+    def condensed(self, *, nonlinear: bool = False) -> Condensed:
+        """What stands for the samples of all traces of the case."""
+        none = nuisance_basis(self.time_s, offset=False, drift=False)
+        return Condensed(self.steps, self.time_s, none, nonlinear=nonlinear)
 
     def posed(self, condensed: Condensed | None = None) -> Posed:
         """Pose the identification as the study does."""
@@ -81,7 +89,7 @@ class Problem:
             self.time_s,
             self.trace_rad,
             self.ranges,
-            condensed=condensed,
+            condensed or self.condensed(),
         )
 
     def population(self, count: int = POPULATION) -> Array:
@@ -135,6 +143,5 @@ def problem(
 
 def posed_together(problems: Sequence[Problem], condensed: Condensed | None = None) -> list[Posed]:
     """Pose the identification of traces of one case, condensed once for all as in the study."""
-    first = problems[0]
-    condensed = condensed or condensed_of(first.steps, first.time_s, offset=False, drift=False)
+    condensed = condensed or problems[0].condensed()
     return [p.posed(condensed) for p in problems]

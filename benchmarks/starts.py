@@ -9,8 +9,7 @@ import numpy as np
 from benchmarks.setup import Problem, posed_together
 from biogrip.arrays import Array
 from biogrip.identify.answer import silent
-from biogrip.identify.many_starts import best_of_many_starts
-from biogrip.identify.multi_start import Row, screened
+from biogrip.identify.multi_start import Row, best_of_starts, screened
 from biogrip.identify.problem import Problem as Posed
 from biogrip.response.condensed import Condensed
 
@@ -26,7 +25,7 @@ class Started:
     starts : (n_starts, n_parameters)
         Log-parameters.
     before
-        First row of the history, see `best_of_many_starts`.
+        First row of the history, see `best_of_starts`.
     """
 
     posed: Posed
@@ -49,7 +48,7 @@ def started(problems: Sequence[Problem], condensed: Condensed | None = None) -> 
 
 def fitted(traces: Sequence[Started]) -> Array:
     """Fit traces side by side as the study does; log-parameters, (n_traces, n_parameters)."""
-    answers = best_of_many_starts(
+    answers = best_of_starts(
         [trace.posed for trace in traces],
         [trace.starts for trace in traces],
         [trace.before for trace in traces],

@@ -15,7 +15,7 @@ import yaml
 
 from benchmarks.batch import in_batch
 from benchmarks.limit import watched, watched_fits, watched_identification
-from benchmarks.misfit import by_lsim, by_radau, misfit_50_digits, vectorised
+from benchmarks.misfit import by_lsim, by_radau, in_blocks, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.sampling_gap import feasible, gap_of, typical_bound
 from benchmarks.scale import watched as watched_processes
@@ -50,6 +50,7 @@ def test_all_ways_to_the_misfit_agree(noisy: Problem) -> None:
     exact = [misfit_50_digits(noisy, sample) for sample in samples]
     np.testing.assert_allclose(noisy.misfit()(samples), exact, rtol=1e-9)
     np.testing.assert_allclose(vectorised(noisy, samples), exact, rtol=1e-13)
+    np.testing.assert_allclose(in_blocks(noisy, samples), exact, rtol=1e-13)
     np.testing.assert_allclose(by_lsim(noisy, samples), exact, rtol=1e-5)
     np.testing.assert_allclose(by_radau(noisy, samples), exact, rtol=1e-6)
 

@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.field.elements import Maxwell
 from benchmarks.field.fitted import Fitted, Limits, Method
 from benchmarks.field.traces import Trace
-from biogrip.identifiability.many_limits import limits_of
-from biogrip.identifiability.profile import likelihood_of
+from biogrip.identifiability.likelihood import likelihood_of
+from biogrip.identifiability.limits import limits_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.library import Identification, identify_sample
 

@@ -1,12 +1,39 @@
 """How numbers and their units are written."""
 
+import numpy as np
+
+from biogrip.arrays import Array
+
 # Far more than is determined, far fewer than those in which processors differ.
 _DIGITS = 5
+# Fits know chi^2 to 0.001; in what lies below, processors may differ.
+_RISE_DECIMALS = 4
+
+# Powers of ten as Python reads them: a processor may compute others.
+_LARGEST = 300
+_TENS = np.array([float(f"1e{exponent}") for exponent in range(-_LARGEST, _LARGEST + 1)])
 
 
 def rounded(value: float | None) -> float | None:
     """Return a number to five significant digits."""
     return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def rounded_rise(rise: float) -> float:
+    """Return a rise of chi^2 to five digits, and no finer than fits know it."""
+    return float(f"{round(rise, _RISE_DECIMALS):.{_DIGITS}g}") + 0.0
+
+
+def significant(values: Array, digits: int) -> Array:
+    """Round numbers to significant digits, to the same bits on every processor."""
+    values = np.array(values, dtype=float)
+    sizes = np.abs(values)
+    usual = (sizes > _TENS[2 * digits]) & (sizes < _TENS[-2 * digits])
+    shift = digits + _LARGEST - _TENS.searchsorted(sizes[usual], side="right")
+    # Numbers and powers of ten are whole or divided once, so that decimals come out as such.
+    up, down = np.maximum(shift, 0) + _LARGEST, np.maximum(-shift, 0) + _LARGEST
+    values[usual] = np.rint(values[usual] / _TENS[down] * _TENS[up]) / _TENS[up] * _TENS[down]
+    return values
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -42,7 +42,6 @@ def set_up(
     ranges: Mapping[str, GeneRange] | None = None,
     fixed: Mapping[str, float] | None = None,
     nonlinear: bool = False,
-    inertia: bool = False,
 ) -> CaseProblem:
     """Describe an experiment.
 
@@ -58,8 +57,6 @@ def set_up(
         Parameters that are known, by name, SI units.
     nonlinear
         Whether the nonlinear model is solved.
-    inertia
-        Whether the model that is fitted has the arms' inertia, as what is simulated always has.
     """
     return CaseProblem(
         gripper,
@@ -68,7 +65,6 @@ def set_up(
         sample,
         dict(fixed or {}),
         nonlinear=nonlinear,
-        inertia=inertia,
     )
 
 

@@ -11,10 +11,12 @@ from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.groups.replicates import joint_problem
 from biogrip.identify.answer import Identification
-from biogrip.identify.multi_start import fitted_from
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.multi_start import identify_from
+from biogrip.identify.problem import Problem
+from biogrip.response.inertia import ringing_s
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
+from tests.helpers.problems import problem_alone
 
 CASE = STUDY.cases["endothelial_cell"]
 MODEL = MODELS["generalized_maxwell"]
@@ -33,13 +35,14 @@ def posed(name: str) -> Problem:
     network = MODEL.network(np.exp(TRUTH)[None])
     clean = simulated_rotation(CASE.gripper, network, torque, times, nonlinear=False)[0]
     noisy = clean + NOISE_RAD * np.random.default_rng(len(name)).standard_normal(len(times))
-    return problem_of(
-        CASE.gripper, MODEL, torque, times, noisy, CASE.ranges, inertia=True, noise_rad=NOISE_RAD
+    rings_s = ringing_s(CASE.gripper)
+    return problem_alone(
+        CASE.gripper, MODEL, torque, times, noisy, ringing_s=rings_s, noise_rad=NOISE_RAD
     )
 
 
 def from_truth(problem: Problem) -> Identification:
-    return fitted_from(problem, TRUTH)
+    return identify_from(problem, TRUTH)
 
 
 def told(problem: Problem, drawn: int, before: Earlier | None = None) -> Earlier:
@@ -106,7 +109,7 @@ def test_a_fit_starts_from_what_was_told_before() -> None:
     """An identifier that is lost alone is brought back by samples that were plausible before."""
     problem = joint_problem([posed("slow"), posed("fast")], 2 * [NOISE_RAD])
     right = told(problem, 4)
-    lost = fitted_from(problem, np.array([problem.low[0], *TRUTH[1:3], problem.high[3]]))
+    lost = identify_from(problem, np.array([problem.low[0], *TRUTH[1:3], problem.high[3]]))
     assert lost.misfit_rad > 1.05 * right.misfit_rad
     ends = problem.low, problem.high
     rng = np.random.default_rng(0)

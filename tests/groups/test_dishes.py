@@ -16,7 +16,8 @@ from biogrip.groups.dishes import (
 from biogrip.groups.joint_fit import JointFit
 from biogrip.groups.power import power
 from biogrip.identifiability.diagnosis import Diagnosis
-from biogrip.identifiability.profile import Likelihood, Profile
+from biogrip.identifiability.likelihood import Likelihood
+from biogrip.identifiability.profiles import Profile
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import Finding
 

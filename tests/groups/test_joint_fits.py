@@ -10,12 +10,21 @@ from biogrip.arrays import Array
 from biogrip.groups.joint_fit import JointFit, fitted_jointly
 from biogrip.groups.replicates import JointResiduals, joint_problem
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.profile import limits_near
+from biogrip.identifiability.limits import near_limits
 from biogrip.identify.answer import Identification
-from biogrip.identify.many_fits import ManyFits
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.local_fits import LocalFits
+from biogrip.identify.problem import Problem
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.problems import GRIPPER, MODEL, RANGES, SAMPLES, TORQUE, posed_for, run
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    SAMPLES,
+    TORQUE,
+    condensed_rows,
+    posed_for,
+    problem_alone,
+    run,
+)
 
 CELL = "endothelial_cell"
 
@@ -114,7 +123,7 @@ def test_chi_squared_rises_at_the_limits_by_the_threshold(
             )
             rise = 2 * found.cost - ours @ ours
             assert rise == pytest.approx(likelihood.threshold, rel=0.01)
-        near = limits_near(likelihood, finding.quantity)
+        ((near,),) = near_limits([likelihood], [finding.quantity])
         assert near == pytest.approx((finding.profile.low, finding.profile.high), abs=1e-3)
 
 
@@ -177,7 +186,7 @@ def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> N
     joint = joint_problem(uneven, [1e-6, 5e-6, 2e-5])
     x = np.log([[20.0, 10.0, 250.0, 1.0]])
     residual, slopes = joint.residuals(x[0])
-    rows, condensed = joint.residuals.condensed(x[0])
+    rows, condensed = condensed_rows(joint.residuals, x[0])
     assert rows @ rows == pytest.approx(residual @ residual, rel=1e-9)
     assert condensed @ condensed.T == pytest.approx(slopes @ slopes.T, rel=1e-6)
     misfit = np.sqrt(residual @ residual / len(residual))
@@ -187,7 +196,7 @@ def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> N
     gradient, root_mean_square = joint.residuals.gradient(x[0])
     assert gradient == pytest.approx(slopes @ residual, rel=1e-9)
     assert root_mean_square == pytest.approx(misfit, rel=1e-12)
-    normal = ManyFits([joint]).normal(x, np.array([0]))
+    normal = LocalFits([joint]).normal(x, np.array([0]))
     assert normal.misfit_rad[0] == pytest.approx(misfit, rel=1e-9)
 
 
@@ -202,13 +211,13 @@ def test_what_each_instrument_added_is_its_own() -> None:
     clean = rotation(step_response(GRIPPER, MODEL.network(np.exp(truth))), TORQUE, times)[0]
     measured = [clean + added for added in (1e-5, -3e-5)]
     shifted = [
-        problem_of(GRIPPER, MODEL, TORQUE, times, trace, RANGES, offset=True, nonlinear=True)
+        problem_alone(GRIPPER, MODEL, TORQUE, times, trace, offset=True, nonlinear=True)
         for trace in measured
     ]
     joint = joint_problem(shifted, [1e-6, 3e-6])
     assert isinstance(joint.residuals, JointResiduals)
     residual, slopes = joint.residuals(truth[0])
-    rows, condensed = joint.residuals.condensed(truth[0])
+    rows, condensed = condensed_rows(joint.residuals, truth[0])
     assert joint.residuals.free == 2 * (plain.residuals.free - 1)
     assert rows @ rows == pytest.approx(residual @ residual, rel=1e-5)
     assert condensed @ condensed.T == pytest.approx(slopes @ slopes.T, rel=1e-4)

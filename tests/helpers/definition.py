@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.special import expit, log_expit
 
 from biogrip.arrays import Array
-from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 
 CANDIDATES = 400

@@ -20,15 +20,15 @@ from biogrip.groups.dishes import log_deviation
 from biogrip.groups.population import FEWEST_CELLS, Estimates, population_of
 from biogrip.groups.power import power
 from biogrip.groups.shift import shift
-from biogrip.identifiability.many_profiles import profiles_of_many
-from biogrip.identifiability.profile import MISSED, Likelihood, Profile, likelihood_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.profiles import Profile, profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
-from biogrip.identify.problem import condensed_of, problem_of
+from biogrip.identify.problem import problem_of
 from biogrip.products.stages.full_judgements import refitted
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.places import ROOT
-from tests.helpers.problems import GRIPPER, MODEL, RANGES, SAMPLES, TORQUE, identified
+from tests.helpers.problems import GRIPPER, MODEL, RANGES, SAMPLES, TORQUE, condensed_of, identified
 
 TABLE = ROOT / "results" / "published" / "groups" / "tables" / "dishes.csv"
 CELL = SAMPLES["endothelial_cell"]
@@ -55,7 +55,7 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
     truth = np.log([CELL[name] for name in MODEL.names])
     varied = np.array([name != "c_p" for name in MODEL.names])
     times = sample_times(400.0, rate_Hz)
-    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
+    condensed = condensed_of(TORQUE, times)
     logs, problems = [], []
     for pair in pairs:
         rng = np.random.default_rng([pair, 20])
@@ -74,7 +74,7 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
                     times,
                     add_noise(clean, NOISE, rng),
                     RANGES,
-                    condensed=condensed,
+                    condensed,
                 )
                 for clean in responses
             ]
@@ -100,14 +100,14 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
 
 def profiles(likelihoods: list[Likelihood]) -> list[list[tuple[Likelihood, Profile]]]:
     """Profiles of the quantities, followed again where one has led deeper."""
-    own = profiles_of_many(likelihoods, QUANTITIES, smooth=False)
+    own = profiles_of(likelihoods, QUANTITIES, smooth=False)
     for index, likelihood in enumerate(likelihoods):
         lowest = min(own[index], key=lambda each: float(each.rises.min()))
         if lowest.rises.min() < -MISSED:
             deeper = refitted(likelihood, lowest.lowest, CONFIDENCE)
             if deeper is not None:
                 likelihoods[index] = deeper
-                own[index] = profiles_of_many([deeper], QUANTITIES, smooth=False)[0]
+                own[index] = profiles_of([deeper], QUANTITIES, smooth=False)[0]
     return [
         [(likelihood, each) for each in some]
         for likelihood, some in zip(likelihoods, own, strict=True)

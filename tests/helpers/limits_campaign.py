@@ -12,17 +12,17 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.many_limits import limits_of as limits_near
-from biogrip.identifiability.many_profiles import profiles_of
-from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
 from biogrip.identify.methods import identifier
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along
 from tests.helpers.places import EXAMPLE
-from tests.helpers.problems import MODEL, SAMPLES, problem, run, study_torque
+from tests.helpers.problems import MODEL, SAMPLES, posed_for, problem, run
 
 ALLOWED = 0.01
 # Random starts at a limit; steps on the way to one.
@@ -41,9 +41,7 @@ def likelihood_for(case: str, seed: int) -> Likelihood:
 @functools.cache
 def _example() -> Problem:
     time_s, rotation_rad = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1, unpack=True)
-    gripper, torque = STUDY.gripper, study_torque()
-    ranges = STUDY.ranges
-    return problem_of(gripper, MODEL, torque, time_s, rotation_rad, ranges)
+    return posed_for(MODEL, time_s, rotation_rad)
 
 
 def example(name: str) -> Likelihood:
@@ -60,8 +58,8 @@ def misses(
     """Quantity, whose limit, its logarithm, and by what share of the threshold the rise misses."""
     rng = np.random.default_rng(0)
     starts, steps = effort
-    profiles = profiles_of(likelihood, quantities)
-    near = limits_near([likelihood], quantities)[0]
+    (profiles,) = profiles_of([likelihood], quantities)
+    (near,) = near_limits([likelihood], quantities)
     for quantity, found, limits in zip(quantities, profiles, near, strict=True):
         for limit in (found.low, found.high):
             if limit is not None:
@@ -97,7 +95,7 @@ def differences(limits: Array) -> Array:
 
 def limits_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[tuple[float, float]]:
     """Limits of quantities' profiles, NaN where there is none."""
-    found = profiles_of(likelihood, quantities)
+    (found,) = profiles_of([likelihood], quantities)
     return [
         (np.nan if p.low is None else p.low, np.nan if p.high is None else p.high) for p in found
     ]

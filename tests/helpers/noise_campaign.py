@@ -16,11 +16,12 @@ from scipy.special import chdtrc
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
-from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
-from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.multi_start import identify_from
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
 from biogrip.own_traces.second_opinion import fall_of
@@ -121,7 +122,7 @@ def seen(kind: Kind, seed: int) -> Seen:
     truth = posed.logs(case.parameters)
 
     def find(problem: Problem) -> Identification:
-        return fitted_from(problem, truth)
+        return identify_from(problem, truth)
 
     plain = posed.of(time_s, trace)
     ignored = _likelihood(plain, find(plain))
@@ -150,12 +151,11 @@ def _likelihood(problem: Problem, found: Identification) -> Likelihood:
 def _held(
     likelihood: Likelihood, every: Sequence[Quantity], truth: Array
 ) -> list[tuple[float, bool]]:
-    found = []
-    for quantity in every:
-        low, high = limits_near(likelihood, quantity)
-        low, high = -np.inf if low is None else low, np.inf if high is None else high
-        found.append((high - low, low <= quantity.log(truth) <= high))
-    return found
+    (limits,) = near_limits([likelihood], every)
+    low, high = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
+    logs = np.array([quantity.log(truth) for quantity in every])
+    held = (low <= logs) & (logs <= high)
+    return list(zip((high - low).tolist(), held.tolist(), strict=True))
 
 
 def counted(kind: Kind, found: Sequence[Seen]) -> pd.DataFrame:

@@ -29,10 +29,9 @@ from biogrip.identifiability.prior import prior_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.sampling import sampled
 from biogrip.identify.answer import silent
-from biogrip.identify.problem import condensed_of, problem_of
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.places import ROOT
-from tests.helpers.problems import GRIPPER, MODEL, RANGES, TORQUE
+from tests.helpers.problems import GRIPPER, MODEL, RANGES, TORQUE, posed_for
 
 TABLE = ROOT / "results/published/posterior_calibration/tables/posterior_calibration.csv"
 QUANTITIES = parameters_and_sum(MODEL)
@@ -63,8 +62,7 @@ def drawn(number: int, settings: PosteriorSettings = SETTINGS) -> Draw:
     clean = rotation(step_response(GRIPPER, MODEL.network(np.exp(truth))), TORQUE, times)[0]
     level = np.exp(rng.uniform(np.log(LEAST_NOISE), np.log(MOST_NOISE)))
     trace = clean + level * np.max(np.abs(clean)) * rng.standard_normal(len(times))
-    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
-    problem = problem_of(GRIPPER, MODEL, TORQUE, times, trace, RANGES, condensed=condensed)
+    problem = posed_for(MODEL, times, trace)
     posterior = Posterior(problem, prior)
     found = sampled(posterior, settings, rng, silent)
     samples = found.log_parameters.reshape(-1, len(low))

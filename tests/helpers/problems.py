@@ -12,8 +12,12 @@ from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.identify import least_squares
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.methods import identifier
-from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.identify.problem import Problem, problem_of
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.response.residuals import Residuals
 from tests.helpers.default import STUDY
 
 MODEL = MODELS["generalized_maxwell"]
@@ -37,15 +41,50 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
     times, response = clean(case, rate_Hz)
     rng = np.random.default_rng([seed, 7])
     trace = add_noise(response, Noise("gaussian", level, "peak"), rng)
-    gripper, torque = STUDY.gripper, study_torque()
-    ranges = STUDY.ranges
-    return problem_of(gripper, MODEL, torque, times, trace, ranges)
+    return posed_for(MODEL, times, trace)
 
 
 def run(method: str, posed: Problem, seed: int = 0) -> Identification:
     identify = identifier(method, STUDY.config.of_methods.of(method))
     (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
     return answer
+
+
+def condensed_of(
+    torque: TorqueHistory,
+    time_s: Array,
+    *,
+    offset: bool = False,
+    drift: bool = False,
+    nonlinear: bool = False,
+    ringing_s: float = 0.0,
+) -> Condensed:
+    """Rows that stand for the samples of any trace at these times."""
+    nuisance = nuisance_basis(time_s, offset=offset, drift=drift)
+    return Condensed(torque, time_s, nuisance, nonlinear=nonlinear, ringing_s=ringing_s)
+
+
+def problem_alone(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    rotation_rad: Array,
+    *,
+    noise_rad: float | None = None,
+    **assumed: Any,
+) -> Problem:
+    """The problem of a trace that shares its rows with no other; assumed is as `condensed_of`'s."""
+    condensed = condensed_of(torque, time_s, **assumed)
+    return problem_of(
+        gripper, model, torque, time_s, rotation_rad, STUDY.ranges, condensed, noise_rad=noise_rad
+    )
+
+
+def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
+    """Rows that stand for the residuals at log-parameters (n_parameters,), and their slopes."""
+    rows = residuals.condensed_responses(x[None])[0]
+    return rows[0] - residuals.condensed_trace, rows[1:]
 
 
 SETTINGS: Any = STUDY.config.of_methods.of("least_squares")
@@ -55,14 +94,7 @@ RANGES = STUDY.ranges
 
 def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
     """The default study's problem for any model and trace."""
-    return problem_of(
-        STUDY.gripper,
-        model,
-        study_torque(),
-        times,
-        trace,
-        STUDY.ranges,
-    )
+    return problem_alone(STUDY.gripper, model, study_torque(), times, trace)
 
 
 def posed(
@@ -75,15 +107,10 @@ def posed(
     nonlinear: bool = False,
 ) -> list[Problem]:
     """Problems that share everything but the noise."""
-    condensed = condensed_of(TORQUE, times, offset=False, drift=False)
+    condensed = condensed_of(TORQUE, times, nonlinear=nonlinear)
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return [
-        problem_of(
-            GRIPPER, model, TORQUE, times, trace, RANGES, condensed=condensed, nonlinear=nonlinear
-        )
-        for trace in traces
-    ]
+    return [problem_of(GRIPPER, model, TORQUE, times, trace, RANGES, condensed) for trace in traces]
 
 
 def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:

@@ -8,9 +8,8 @@ import pytest
 from biogrip.arrays import Array, IntArray
 from biogrip.identifiability.confidence_set import gaps_of
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.many_limits import limits_and_deeper
-from biogrip.identifiability.many_profiles import many_profiles
-from biogrip.identifiability.profile import Profile, profile
+from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.profiles import Profile, profiles_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.smooth import Points, smoothed
 from biogrip.identifiability.verdicts import Finding
@@ -61,19 +60,17 @@ def test_points_are_added_until_a_curve_can_be_drawn() -> None:
     assert np.max(np.abs(np.diff(shown))) <= 0.3
 
 
-@pytest.mark.parametrize("alone", [True, False])
-def test_a_profile_crosses_the_threshold_at_its_limits(alone: bool) -> None:
+def test_a_profile_crosses_the_threshold_at_its_limits() -> None:
     likelihood = likelihood_for("liquid_drop_2", 0)
     k = QUANTITIES[0]
-    found = profile(likelihood, k) if alone else many_profiles([likelihood], [k])[0][0]
+    ((found,),) = profiles_of([likelihood], [k])
     for limit in (found.low, found.high):
         assert limit is not None
         at = np.interp(limit, found.log_values, found.rises)
         assert at == pytest.approx(likelihood.threshold, rel=0.01)
-    if not alone:
-        coarse = many_profiles([likelihood], [k], smooth=False)[0][0]
-        assert len(coarse.log_values) < len(found.log_values)
-        assert (coarse.low, coarse.high) == (found.low, found.high)
+    ((coarse,),) = profiles_of([likelihood], [k], smooth=False)
+    assert len(coarse.log_values) < len(found.log_values)
+    assert (coarse.low, coarse.high) == (found.low, found.high)
 
 
 def test_limits_tell_of_an_optimum_that_was_missed() -> None:

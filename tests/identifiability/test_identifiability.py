@@ -11,7 +11,9 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, model_named
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
-from biogrip.identifiability.profile import Likelihood, likelihood_of, limits_near, profile
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import (
     Hinge,
     Quantity,
@@ -135,7 +137,7 @@ def test_a_profile_is_the_lowest_misfit_with_one_parameter_held() -> None:
     found = run("least_squares", posed)
     likelihood = likelihood_of(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
     k = parameters_and_sum(maxwell)[0]
-    followed = profile(likelihood, k)
+    ((followed,),) = profiles_of([likelihood], [k])
     for index in range(0, len(followed.log_values), 7):
         held = math.exp(followed.log_values[index])
         c = np.geomspace(5.0, 20.0, 4001)
@@ -148,9 +150,8 @@ def test_a_profile_is_the_lowest_misfit_with_one_parameter_held() -> None:
         c = np.geomspace(8.0, 12.0, 8001)
         misfit = posed.misfit(np.stack((np.full_like(c, math.exp(limit)), c), axis=1)).min()
         assert likelihood.rise(misfit) == pytest.approx(likelihood.threshold, abs=0.01)
-    near = limits_near(likelihood, k)
-    assert near[0] == pytest.approx(low, abs=1e-4)
-    assert near[1] == pytest.approx(high, abs=1e-4)
+    ((near,),) = near_limits([likelihood], [k])
+    assert near == pytest.approx((low, high), abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -202,10 +203,8 @@ def test_known_noise_scales_the_limits() -> None:
     widths = []
     for noise in (None, 2 * found.misfit_rad):
         likelihood = likelihood_of(posed, best, found.misfit_rad, confidence=0.95, noise_rad=noise)
-        low, high = limits_near(likelihood, k_p)
-        assert low is not None
-        assert high is not None
-        widths.append(high - low)
+        ((limits,),) = near_limits([likelihood], [k_p])
+        widths.append(np.ptp(limits))
     assert widths[1] / widths[0] == pytest.approx(2.0, rel=0.02)
 
 
@@ -282,10 +281,8 @@ def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:
         found = run("least_squares", posed, seed)
         best = np.log(found.parameters)
         likelihood = likelihood_of(posed, best, found.misfit_rad, confidence=0.95)
-        for row, q in enumerate(quantities):
-            low, high = limits_near(likelihood, q)
-            assert low is not None
-            assert high is not None
+        (limits,) = near_limits([likelihood], quantities)
+        for row, (q, (low, high)) in enumerate(zip(quantities, limits, strict=True)):
             inside[row] += low <= q.log(truth) <= high
             errors[row, seed] = q.log(best) - q.log(truth)
     _, sensitivity = problem(case, 0, level=0.0).residuals(truth)

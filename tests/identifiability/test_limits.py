@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS, model_named
+from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.held_fit import brought_to, held_fit
-from biogrip.identifiability.many_limits import limits_of as limits_near
-from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
+from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identifiability.limits import limits_of as limits_near
+from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
-from biogrip.identify.local_fit import FINE, Objective, local_fit, settled
+from biogrip.identify.local_fits import FINE
+from biogrip.identify.multi_start import fit_from
 from tests.helpers.definition import Held
 from tests.helpers.limits_campaign import (
     ALIKE,
@@ -62,7 +62,7 @@ def test_an_optimum_is_the_same_from_wherever_it_is_reached(case: str) -> None:
     best = np.log(run("least_squares", posed).parameters)
     rng = np.random.default_rng(0)
     starts = best + 0.3 * rng.standard_normal((5, len(best)))
-    found = [settled(posed, local_fit(posed, start)).log_parameters for start in starts]
+    found = fit_from([posed] * len(starts), starts).x
     assert np.ptp([best, *found], axis=0).max() < 1e-7
 
 
@@ -83,39 +83,14 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
         assert other.profile.high == pytest.approx(one.profile.high, abs=1e-6)
 
 
-BURGERS = model_named("burgers")
-FORMS: dict[str, Quantity] = {
-    "parameter": parameters_and_sum(BURGERS)[1],
-    "sum": combinations_of(BURGERS, [0, 2])[0],
-    "series": combinations_of(BURGERS, [0, 2])[1],
-    "time": combinations_of(BURGERS, [0, 3])[0],
-    "sum of three": parameters_and_sum(model_named("generalized_maxwell", 2))[-1],
-}
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_a_quantity_is_brought_to_a_value_within_bounds(form: str) -> None:
-    quantity = FORMS[form]
-    rng = np.random.default_rng(0)
-    count = max(quantity.members) + 1
-    low, high = np.full(count, -3.0), np.linspace(2.0, 5.0, count)
-    first, last = quantity.range(low, high)
-    for target in np.linspace(first, last, 9):
-        x: Array = brought_to(quantity, float(target), rng.uniform(-4, 6, count), low, high)
-        assert np.all((x >= low) & (x <= high))
-        assert quantity.log(x) == pytest.approx(target, abs=1e-9)
-
-
 @pytest.mark.parametrize("label", ["k", "c", "c_p", "c + c_p"])
 def test_a_held_fit_is_scipys(label: str) -> None:
     likelihood = likelihood_for("endothelial_cell", 1)
-    objective = Objective(likelihood.problem)
     (quantity,) = (q for q in QUANTITIES if q.label == label)
+    fits, one = HeldFits([likelihood], [quantity]), np.zeros(1, dtype=np.int64)
     for away in (-0.3, 0.1):
         target = quantity.log(likelihood.best) + away
-        none = np.zeros((len(MODEL.parameters),) * 2)
-        found = held_fit(objective, quantity, target, likelihood.best, none, FINE)
-        assert quantity.log(found.log_parameters) == pytest.approx(target, abs=1e-11)
-        rise = likelihood.rise(objective.misfit_rad(found.log_parameters))
+        (rise,), (x,) = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
+        assert quantity.log(x) == pytest.approx(target, abs=1e-11)
         scipys, _ = Held(likelihood, quantity, target).fitted(likelihood.best)
         assert rise == pytest.approx(scipys, abs=0.02)

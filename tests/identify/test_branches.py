@@ -7,11 +7,12 @@ import pytest
 
 from biogrip.experiment.sample import SampleModel, model_named, with_fixed
 from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.many_profiles import profiles_of, profiles_of_many
-from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
-from biogrip.identify.local_fit import FINE
+from biogrip.identify.local_fits import FINE
 from biogrip.identify.methods import METHODS, identifier
 from biogrip.identify.problem import Problem
 from biogrip.response.linear import rotation, step_response
@@ -104,7 +105,7 @@ def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
 
 def test_intervals_are_those_of_one_branch() -> None:
     quantities = parameters_and_sum(TWO)
-    for profiles in profiles_of_many(likelihoods(), quantities, smooth=False):
+    for profiles in profiles_of(likelihoods(), quantities, smooth=False):
         for quantity, found in zip(quantities, profiles, strict=True):
             if quantity.label in ("k_1", "k_2", "c_1", "c_2"):
                 assert found.low is not None
@@ -113,13 +114,12 @@ def test_intervals_are_those_of_one_branch() -> None:
                 assert truth / 2 < np.exp(found.low) < truth < np.exp(found.high) < 2 * truth
 
 
-def test_one_by_one_profiles_end_where_those_at_once_do() -> None:
-    likelihood = likelihoods()[0]
+def test_profiles_end_where_limits_are_near_the_optimum() -> None:
     quantities = parameters_and_sum(TWO)[:2]
-    for quantity, together in zip(quantities, profiles_of(likelihood, quantities), strict=True):
-        alone = profile(likelihood, quantity)
-        assert alone.low == pytest.approx(together.low, abs=2e-3)
-        assert alone.high == pytest.approx(together.high, abs=2e-3)
+    near = near_limits(likelihoods(), quantities)
+    for limits, profiles in zip(near, profiles_of(likelihoods(), quantities), strict=True):
+        ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
+        np.testing.assert_allclose(ends, limits, rtol=0, atol=2e-3)
 
 
 def test_the_truth_is_counted_in_the_same_order() -> None:

@@ -1,6 +1,5 @@
 """All identifiers on the same problems."""
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,13 +7,24 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import rms
-from biogrip.identify import many_starts, multi_start
-from biogrip.identify.local_fit import PRIOR_WIDTH, local_fit, settled
+from biogrip.identify import multi_start
 from biogrip.identify.methods import METHODS, identifier
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem
+from biogrip.identify.settling import settled
 from biogrip.response.residuals import Residuals
 from tests.helpers.default import STUDY
-from tests.helpers.problems import MODEL, SAMPLES, clean, problem, run, study_torque
+from tests.helpers.problems import (
+    GRIPPER,
+    MODEL,
+    SAMPLES,
+    TORQUE,
+    clean,
+    posed_for,
+    problem,
+    problem_alone,
+    run,
+)
+from tests.helpers.scipy_fits import scipy_fit
 
 CONTINUOUS = ("genetic_refined", "least_squares")
 
@@ -41,26 +51,19 @@ def test_an_answer_is_what_it_says(method: str) -> None:
     np.testing.assert_array_equal(again.parameters, answer.parameters)
 
 
-@pytest.mark.parametrize("together", [True, False], ids=["many at once", "one by one"])
 @pytest.mark.parametrize("method", METHODS)
-def test_evaluations_are_counted(
-    method: str, together: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_evaluations_are_counted(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but those that settle an optimum: their number depends on the processor."""
     posed = problem("liquid_drop_2", 1)
     counted = [0]
 
-    def uncounted(settle: Callable[..., Any]) -> Callable[..., Any]:
-        def settled_silently(*given: Any) -> Any:
-            before = counted[0]
-            found = settle(*given)
-            counted[0] = before
-            return found
+    def settled_silently(*given: Any) -> Any:
+        before = counted[0]
+        found = settled(*given)
+        counted[0] = before
+        return found
 
-        return settled_silently
-
-    for module in (many_starts, multi_start):
-        monkeypatch.setattr(module, "settled", uncounted(module.settled))
+    monkeypatch.setattr(multi_start, "settled", settled_silently)
 
     def misfit(parameters: Array) -> Array:
         counted[0] += len(parameters)
@@ -70,17 +73,9 @@ def test_evaluations_are_counted(
         def __init__(self) -> None:
             self.__dict__.update(posed.residuals.__dict__)
 
-        @property
-        def condensable(self) -> bool:
-            return together
-
         def __call__(self, x: Array) -> tuple[Array, Array]:
             counted[0] += 1
             return super().__call__(x)
-
-        def condensed(self, x: Array) -> tuple[Array, Array]:
-            counted[0] += self.condensable
-            return super().condensed(x)
 
         def condensed_linear(self, x: Array, *, slopes: bool = True) -> Array:
             counted[0] += len(x)
@@ -92,7 +87,7 @@ def test_evaluations_are_counted(
 
 @pytest.mark.parametrize("case", SAMPLES)
 def test_local_fits_reach_the_global_optimum(case: str) -> None:
-    """Against the best of both and a fit from the truth, at the study's sampling.
+    """Against the best of both and SciPy's fit from the truth, at the study's sampling.
 
     In 100 seeds of each case neither missed once, so a rate of misses above 3 % is
     excluded at 95 %, and two misses in 8 seeds would be one in 300.
@@ -102,7 +97,7 @@ def test_local_fits_reach_the_global_optimum(case: str) -> None:
         posed = problem(case, seed, rate_Hz=10.0)
         truth = np.log([SAMPLES[case][name] for name in MODEL.names])
         found = [run(method, posed, seed).misfit_rad for method in CONTINUOUS]
-        best = min(*found, settled(posed, local_fit(posed, truth)).misfit_rad)
+        best = min(*found, scipy_fit(posed, truth).misfit_rad)
         rises = posed.residuals.samples * ((np.array(found) / best) ** 2 - 1)
         misses += int(np.sum(rises > 1))
     assert misses <= 1
@@ -120,22 +115,6 @@ def test_a_trace_without_noise_gives_the_truth_back(method: str) -> None:
     assert answer.misfit_rad < 1e-7 * np.abs(clean("endothelial_cell")[1]).max()
 
 
-def test_the_optimum_is_settled_to_the_last_digits() -> None:
-    """Where the gradient vanishes, from wherever one comes."""
-    posed = problem("endothelial_cell", 3)
-    best = np.log(run("least_squares", posed).parameters)
-    rng = np.random.default_rng(0)
-    ends = [
-        settled(posed, local_fit(posed, best + 0.01 * rng.standard_normal(4))).log_parameters
-        for _ in range(4)
-    ]
-    assert np.max(np.ptp(ends, axis=0)) < 1e-9
-    residual, sensitivity = posed.residuals(ends[0])
-    prior = (ends[0] - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
-    gradient = sensitivity @ residual / posed.residuals.noise_scale_rad**2 + prior
-    assert np.max(np.abs(gradient)) < 1e-6
-
-
 def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
     """A liquid's damper dominates: the range of k_p that fits is flat, and the prior decides."""
     posed = problem("endothelial_cell", 2)
@@ -146,11 +125,9 @@ def test_what_a_trace_says_nothing_of_ends_in_the_middle_of_its_range() -> None:
 
 def test_offset_and_drift_are_fitted_along() -> None:
     times, response = clean("liquid_drop_2")
-    gripper, torque = STUDY.gripper, study_torque()
-    ranges = STUDY.ranges
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     trace = response + 2e-3 - 4e-6 * times + noise
-    posed = problem_of(gripper, MODEL, torque, times, trace, ranges, offset=True, drift=True)
+    posed = problem_alone(GRIPPER, MODEL, TORQUE, times, trace, offset=True, drift=True)
     for method in METHODS:
         answer = run(method, posed)
         # The genetic algorithm has two digits a parameter, and misses the noise floor by more.
@@ -158,5 +135,5 @@ def test_offset_and_drift_are_fitted_along() -> None:
         k, _, c, c_p = answer.parameters
         assert k == pytest.approx(1.0, rel=0.15 if method == "genetic" else 0.05)
         assert c + c_p == pytest.approx(10.0, rel=0.03)
-    plain = problem_of(gripper, MODEL, torque, times, trace, ranges)
+    plain = posed_for(MODEL, times, trace)
     assert run("least_squares", plain).misfit_rad > 10 * rms(noise)

@@ -7,8 +7,8 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
-from biogrip.identifiability.many_limits import limits_of
-from biogrip.identifiability.profile import likelihood_of
+from biogrip.identifiability.likelihood import likelihood_of
+from biogrip.identifiability.limits import limits_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.model_choice import ranked
 from biogrip.response.linear import rotation, step_response

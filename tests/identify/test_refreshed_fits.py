@@ -7,15 +7,16 @@ from scipy.optimize import least_squares
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.identifiability.many_limits import many_limits
-from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import near_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.many_fits import ManyFits
-from biogrip.identify.many_starts import fitted_from
+from biogrip.identify.local_fits import LocalFits
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.nonlinear import nonlinear_rotation
+from tests.helpers.problems import condensed_of, problem_alone
 
 MODEL, TRUTH = MODELS["liquid_drop"], np.array([1.0, 0.05, 10.0])
 RANGES = {
@@ -32,12 +33,9 @@ def posed(gripper: Gripper, torque_Nm: float, traces: int) -> list[Problem]:
     time_s = np.linspace(0.0, 400.0, 801)
     clean = nonlinear_rotation(gripper, MODEL.network(TRUTH), torque, time_s)[0]
     noise = np.random.default_rng(5).standard_normal((traces, len(time_s)))
-    first = problem_of(gripper, MODEL, torque, time_s, clean, RANGES, nonlinear=True)
-    condensed = first.residuals._condensed
+    condensed = condensed_of(torque, time_s, nonlinear=True)
     return [
-        problem_of(
-            gripper, MODEL, torque, time_s, trace, RANGES, nonlinear=True, condensed=condensed
-        )
+        problem_of(gripper, MODEL, torque, time_s, trace, RANGES, condensed)
         for trace in clean + 0.01 * clean.max() * noise
     ]
 
@@ -62,13 +60,13 @@ def lowest(likelihood: Likelihood, held_index: int, value: float) -> float:
 def test_limits_are_those_of_the_nonlinear_model(gripper: Gripper, torque: str) -> None:
     """To a percent of the threshold, by their definition."""
     (problem,) = posed(gripper, TORQUES[torque], 1)
-    (best,) = fitted_from([problem], np.log(TRUTH))
+    (best,) = fit_from([problem], np.log(TRUTH)).x
     residual, slopes = problem.residuals(best)
     size = np.linalg.norm(slopes, axis=1) * np.linalg.norm(residual)
     assert np.all(np.abs(slopes @ residual) < 1e-5 * size)
     misfit = float(np.sqrt(np.mean(residual**2)))
     likelihood = likelihood_of(problem, best, misfit, confidence=0.95)
-    (limits,) = many_limits([likelihood], parameters_and_sum(MODEL))
+    (limits,) = near_limits([likelihood], parameters_and_sum(MODEL))
     assert np.all(np.isfinite(limits))
     for index, ends in enumerate(limits):
         for end in ends:
@@ -80,9 +78,9 @@ def test_fits_do_not_depend_on_the_batch(gripper: Gripper) -> None:
     problems = posed(gripper, TORQUES["ten times"], 3)
     starts = np.log(TRUTH) + np.random.default_rng(0).uniform(-2, 2, (6, 3))
     trace = np.arange(6) % 3
-    together = ManyFits(problems).fitted(starts, trace)
+    together = LocalFits(problems).fitted(starts, trace)
     for fit in range(6):
-        own = ManyFits([problems[trace[fit]]]).fitted(starts[fit : fit + 1], np.zeros(1, int))
+        own = LocalFits([problems[trace[fit]]]).fitted(starts[fit : fit + 1], np.zeros(1, int))
         assert own.x.tobytes() == together.x[fit : fit + 1].tobytes()
         assert own.misfit_rad[0] == together.misfit_rad[fit]
         assert own.evaluations[0] == together.evaluations[fit]
@@ -93,8 +91,8 @@ def test_where_the_model_has_no_answer_no_fit_ends(gripper: Gripper) -> None:
     torque = torque_history((held(200.0, 1e-6), held(200.0, 1e-7)))
     time_s = np.linspace(0.0, 400.0, 801)
     trace = 0.3 * np.ones(len(time_s))
-    beyond = problem_of(gripper, MODEL, torque, time_s, trace, RANGES, nonlinear=True)
+    beyond = problem_alone(gripper, MODEL, torque, time_s, trace, nonlinear=True)
     start = np.log(np.array([[1e-2, 1e-2, 1e-2]]))
-    found = ManyFits([beyond]).fitted(start, np.zeros(1, int))
+    found = LocalFits([beyond]).fitted(start, np.zeros(1, int))
     assert np.isinf(found.misfit_rad[0])
     np.testing.assert_array_equal(found.x, start)

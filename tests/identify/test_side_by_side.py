@@ -13,13 +13,14 @@ from biogrip.identify import genetic, genetic_refined
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import WORD_BITS, GeneRange, Genome
-from biogrip.identify.problem import Problem, condensed_of, problem_of
+from biogrip.identify.problem import Problem, problem_of
 from biogrip.identify.redraws import redraws
 from biogrip.identify.selection import best
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import together
 from tests.helpers.plain_genetic import chromosomes_of, identified
+from tests.helpers.problems import condensed_of
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
 READINGS = {
@@ -51,14 +52,15 @@ def posed(
     model: SampleModel = MAXWELL,
     **how: Any,
 ) -> list[Problem]:
-    """As many noisy traces of Table 5's sample."""
+    """As many noisy traces of Table 5's sample, which share what is the same for all."""
     time_s = np.arange(401.0)
     network = MAXWELL.network(np.array([35.0, 12.3, 299.9, 1e-3]))
     response = step_response(gripper, network, symmetric=steps.symmetric)
     clean = rotation(response, steps, time_s)[0]
     noise = np.random.default_rng(3).standard_normal((count, len(time_s)))
     traces = clean + 0.1 * clean.max() * noise
-    return [problem_of(gripper, model, steps, time_s, trace, RANGES, **how) for trace in traces]
+    shared = condensed_of(steps, time_s, **how)
+    return [problem_of(gripper, model, steps, time_s, trace, RANGES, shared) for trace in traces]
 
 
 def rng(seed: int) -> np.random.Generator:
@@ -133,9 +135,7 @@ def test_polished_populations(gripper: Gripper, steps: TorqueHistory) -> None:
     settings = genetic_refined.RefinedSettings(
         replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
     )
-    # As in a case of the study, whose traces share what is the same for all.
-    shared = condensed_of(steps, np.arange(401.0), offset=False, drift=False)
-    problems = posed(gripper, steps, 2, condensed=shared)
+    problems = posed(gripper, steps, 2)
     alone = [genetic_refined.identify(p, settings, rng(s)) for s, p in enumerate(problems)]
     found = genetic_refined.identify_many(problems, settings, [rng(0), rng(1)])
     assert [content(answer) for answer in found] == [content(answer) for answer in alone]

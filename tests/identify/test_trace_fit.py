@@ -12,7 +12,7 @@ from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Drift, Outliers, Relaxing
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.multi_start import identify_from
 from biogrip.identify.outliers import FAR, outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
@@ -36,7 +36,7 @@ CLEAN = simulated(POSED.gripper, TRUTH)
 
 
 def find(problem: Problem) -> Identification:
-    return fitted_from(problem, TRUTH)
+    return identify_from(problem, TRUTH)
 
 
 def noisy(noise: Noise, seed: int = 0) -> Array:

@@ -8,10 +8,22 @@ from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS, model_named
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
+from biogrip.response.inertia import ringing_s
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
+from biogrip.response.whitening import Colour, Whitening
+from tests.helpers.problems import condensed_of, condensed_rows
 from tests.helpers.responses import PROTOCOLS, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
+
+MAXWELL = MODELS["generalized_maxwell"]
+CELL = np.log([35.0, 12.3, 299.9, 1e-3])
+_RNG = np.random.default_rng(5)
+DENSE = {
+    "uniform": np.linspace(0.0, 400.0, 200_000),
+    "random": np.sort(_RNG.uniform(0.0, 400.0, 200_000)),
+    "from late on": np.linspace(150.0, 400.0, 100_000),
+}
 
 
 def products(rows: Array, slopes: Array) -> Array:
@@ -19,6 +31,18 @@ def products(rows: Array, slopes: Array) -> Array:
     together = np.vstack((rows, slopes))
     found: Array = together @ together.T
     return found
+
+
+def assert_alike(residuals: Residuals, x: Array) -> int:
+    """All samples and the rows give the same, to 1e-10 of the trace; so many rows there are."""
+    every, few = residuals(x), condensed_rows(residuals, x)
+    scale = np.linalg.norm(every[0]) + np.linalg.norm(every[1])
+    assert np.max(np.abs(products(*every) - products(*few))) < 1e-10 * scale**2
+    return len(few[0])
+
+
+def noise(count: int) -> Array:
+    return 1e-3 * np.random.default_rng(1).standard_normal(count)
 
 
 @pytest.mark.parametrize("nuisance", [False, True])
@@ -31,27 +55,21 @@ def test_least_squares_sees_no_difference(
     """To 1e-10 of the trace, over the whole search range; noise is at least 1e-3 of it."""
     gripper: Gripper = request.getfixturevalue(arms)
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
-    condensed = Condensed(torque, time_s, nuisance_basis(time_s, offset=nuisance, drift=nuisance))
-    trace = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
-    model = MODELS["generalized_maxwell"]
-    residuals = Residuals(gripper, model, torque, time_s, trace, condensed, nonlinear=False)
+    condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
+    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
     for sample in random_samples(20, seed=8):
-        every, few = residuals(np.log(sample)), residuals.condensed(np.log(sample))
-        scale = np.linalg.norm(every[0]) + np.linalg.norm(every[1])
-        assert np.max(np.abs(products(*every) - products(*few))) < 1e-10 * scale**2
-        assert len(few[0]) <= min(80 if torque.symmetric else 160, len(time_s) + 1)
+        rows = assert_alike(residuals, np.log(sample))
+        assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
 
 
 def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:
     torque, time_s = torque_history(PROTOCOLS["steps"]), TIMES["uniform"]
-    condensed = Condensed(torque, time_s, nuisance_basis(time_s, offset=False, drift=False))
+    condensed = condensed_of(torque, time_s)
     model, x = model_named("generalized_maxwell", 2), np.log([5.0, 0.2, 1.0, 9.0, 99.0, 0.5])
-    empty = Residuals(
-        gripper, model, torque, time_s, np.zeros(len(time_s)), condensed, nonlinear=False
-    )
+    empty = Residuals(gripper, model, torque, time_s, np.zeros(len(time_s)), condensed)
     clean, _ = empty(x)
-    exact = Residuals(gripper, model, torque, time_s, clean, condensed, nonlinear=False)
-    assert np.linalg.norm(exact.condensed(x)[0]) < 1e-10 * np.linalg.norm(clean)
+    exact = Residuals(gripper, model, torque, time_s, clean, condensed)
+    assert np.linalg.norm(condensed_rows(exact, x)[0]) < 1e-10 * np.linalg.norm(clean)
 
 
 @pytest.mark.parametrize("times", TIMES)
@@ -60,11 +78,45 @@ def test_the_nonlinear_model_is_condensed_along(
     gripper: Gripper, protocol: str, times: str
 ) -> None:
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
-    nuisance = nuisance_basis(time_s, offset=True, drift=True)
-    condensed = Condensed(torque, time_s, nuisance, nonlinear=True)
-    trace = 1e-3 * np.random.default_rng(1).standard_normal(len(time_s))
+    condensed = condensed_of(torque, time_s, offset=True, drift=True, nonlinear=True)
     model, x = MODELS["liquid_drop"], np.log([9.5, 0.3, 10.0])
-    residuals = Residuals(gripper, model, torque, time_s, trace, condensed, nonlinear=True)
-    every, few = residuals(x), residuals.condensed(x)
-    scale = np.linalg.norm(every[0]) + np.linalg.norm(every[1])
-    assert np.max(np.abs(products(*every) - products(*few))) < 1e-10 * scale**2
+    assert_alike(Residuals(gripper, model, torque, time_s, noise(len(time_s)), condensed), x)
+
+
+@pytest.mark.parametrize("nuisance", [False, True])
+@pytest.mark.parametrize("times", DENSE)
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_of_arms_that_ring_few_nodes_stand_for_what_comes_later(
+    gripper: Gripper, protocol: str, times: str, nuisance: bool
+) -> None:
+    """Some thousand rows at most, of which those of the first tenths of a second are samples."""
+    torque, time_s = torque_history(PROTOCOLS[protocol]), DENSE[times]
+    rings_s = ringing_s(gripper)
+    condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance, ringing_s=rings_s)
+    assert not condensed.reduced
+    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    assert residuals.inertia
+    for x in (CELL, *np.log(random_samples(2, seed=9))):
+        assert assert_alike(residuals, x) < 4000
+    starts = np.array([start for start, *_ in (*torque.jumps, *torque.swings)])
+    ringing = np.any((time_s >= starts[:, None]) & (time_s < starts[:, None] + rings_s), axis=0)
+    assert set(time_s[ringing]) <= set(condensed.time_s)
+
+
+@pytest.mark.parametrize("times", DENSE)
+def test_the_nonlinear_model_of_arms_that_ring(gripper: Gripper, times: str) -> None:
+    torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE[times][::4]
+    condensed = condensed_of(torque, time_s, nonlinear=True, ringing_s=ringing_s(gripper))
+    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    assert assert_alike(residuals, CELL) < 8000
+
+
+def test_in_coloured_noise_every_sample_of_arms_that_ring_has_a_row(gripper: Gripper) -> None:
+    torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE["uniform"][::100]
+    nuisance = nuisance_basis(time_s, offset=True, drift=True)
+    whitening = Whitening(time_s, Colour(0.3, 5.0, 0.2), nuisance)
+    condensed = Condensed(
+        torque, time_s, nuisance, ringing_s=ringing_s(gripper), whitening=whitening
+    )
+    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    assert assert_alike(residuals, CELL) == len(time_s) + 1

@@ -10,6 +10,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
+from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
@@ -22,7 +23,7 @@ def posed(
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
     condensed = Condensed(torque, time_s, nuisance_basis(time_s, offset=nuisance, drift=nuisance))
     silence = np.zeros(len(time_s))
-    return Residuals(gripper, model, torque, time_s, silence, condensed, nonlinear=False)
+    return Residuals(gripper, model, torque, time_s, silence, condensed)
 
 
 def samples(model: SampleModel, count: int) -> Array:
@@ -38,8 +39,19 @@ def assert_alike(residuals: Residuals, x: Array) -> None:
     alone = residuals.condensed_responses(x, slopes=False)
     peaks = np.abs(found[:, :1]).max(axis=2, keepdims=True)
     assert np.all(np.abs(alone - found[:, :1]) <= 1e-12 * peaks)
+    condensed = residuals._condensed
     for rows, point in zip(found, x, strict=True):
-        rotation, slopes = residuals.condensed(point)
+        # From what the response is at few times.
+        rotation, slopes = (
+            condensed.rows(values)
+            for values in rotation_and_sensitivity(
+                residuals._gripper,
+                residuals.model,
+                residuals._torque,
+                condensed.time_s,
+                np.exp(point),
+            )
+        )
         peak = np.abs(rotation).max()
         np.testing.assert_allclose(rows[0], rotation, rtol=0, atol=1e-10 * peak)
         np.testing.assert_allclose(rows[1:], slopes, rtol=0, atol=1e-9 * peak)

@@ -2,21 +2,30 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
-from biogrip.experiment.protocol import Harmonic, Load, Phase, torque_at, torque_history
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import (
+    Harmonic,
+    Load,
+    Phase,
+    TorqueHistory,
+    torque_at,
+    torque_history,
+)
 from biogrip.experiment.sample import MODELS, generalized_maxwell
 from biogrip.instrument.actuator import torque as torque_of_voltage
 from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import phi_function, rotation, rotation_rate, step_response
-from biogrip.response.misfit import misfit_of
-from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.study.protocol_block import PhaseBlock, ProtocolBlock
+from tests.helpers.problems import problem_alone
 from tests.helpers.responses import random_samples
 from tests.instrument.test_actuator import TABLE_2
 
@@ -115,7 +124,7 @@ def test_phi_functions_against_50_digits() -> None:
 
 @pytest.mark.parametrize("nonlinear", [False, True])
 def test_misfits_agree_where_both_ways_apply(gripper: Gripper, nonlinear: bool) -> None:
-    """Formed responses are the slower way for any protocol, sampling and model."""
+    """Rows that stand for all samples are the slower way, for any protocol, sampling and model."""
     model, torque = (
         MODELS["generalized_maxwell"],
         torque_history((Phase(40.0, Load(1e-9), Load(1e-9)),)),
@@ -123,20 +132,13 @@ def test_misfits_agree_where_both_ways_apply(gripper: Gripper, nonlinear: bool) 
     time_s = np.linspace(0, 40, 201)
     trace = 1e-5 * np.random.default_rng(0).standard_normal(201)
     samples = random_samples(64, 21)
-    formed = FormedMisfit(
-        gripper,
-        model,
-        torque,
-        time_s,
-        trace,
-        nonlinear=nonlinear,
-        nuisance=np.zeros((0, len(time_s))),
-    )(samples)
+    posed = problem_alone(gripper, model, torque, time_s, trace, nonlinear=nonlinear)
+    by_rows = posed.residuals.condensed_misfit(samples)
     series = SeriesMisfit(gripper, model, torque, 0.2, trace)(samples)
     # The nonlinear model differs by 1e-3 of the rotation at the very most here.
-    np.testing.assert_allclose(formed, series, rtol=5e-3 if nonlinear else 1e-9)
+    np.testing.assert_allclose(by_rows, series, rtol=5e-3 if nonlinear else 1e-9)
     if nonlinear:
-        assert np.max(np.abs(formed / series - 1)) > 1e-8
+        assert np.max(np.abs(by_rows / series - 1)) > 1e-8
 
 
 def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
@@ -147,11 +149,15 @@ def test_the_fastest_way_is_chosen(gripper: Gripper) -> None:
     swings = torque_history((Phase(40.0, swing, swing),))
     trace = np.zeros_like(uniform)
 
-    def kind(torque: object, time_s: np.ndarray, nonlinear: bool = False) -> type:
-        return type(misfit_of(gripper, model, torque, time_s, trace, nonlinear=nonlinear))  # type: ignore[arg-type]
+    def needs_no_response(torque: TorqueHistory, time_s: Array, **assumed: Any) -> bool:
+        problem = problem_alone(gripper, model, torque, time_s, trace, **assumed)
+        by_series = isinstance(problem.misfit, SeriesMisfit)
+        assert by_series or problem.misfit == problem.residuals.condensed_misfit
+        return by_series
 
-    assert kind(steps, uniform) is SeriesMisfit
-    assert kind(steps, np.sqrt(uniform)) is FormedMisfit
-    assert kind(ramp, uniform) is FormedMisfit
-    assert kind(swings, uniform) is FormedMisfit
-    assert kind(steps, uniform, nonlinear=True) is FormedMisfit
+    assert needs_no_response(steps, uniform)
+    assert not needs_no_response(steps, np.sqrt(uniform))
+    assert not needs_no_response(ramp, uniform)
+    assert not needs_no_response(swings, uniform)
+    for assumed in ({"nonlinear": True}, {"offset": True}, {"ringing_s": ringing_s(gripper)}):
+        assert not needs_no_response(steps, uniform, **assumed)

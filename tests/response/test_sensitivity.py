@@ -156,7 +156,7 @@ def test_residuals_do_not_see_what_the_instrument_added(
     basis = nuisance_basis(times, offset=True, drift=True)
     condensed = Condensed(steps, times, basis)
     plain, shifted = (
-        Residuals(gripper, model, steps, times, trace + added, condensed, nonlinear=False)
+        Residuals(gripper, model, steps, times, trace + added, condensed)
         for added in (0.0, 5e-3 + 1e-5 * times)
     )
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
@@ -175,7 +175,7 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
         nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
     )
     condensed = Condensed(steps, times, basis)
-    residuals = Residuals(gripper, model, steps, times, trace, condensed, nonlinear=False)
+    residuals = Residuals(gripper, model, steps, times, trace, condensed)
     residual, slopes = residuals(x)
     np.testing.assert_array_equal(residuals.left(x), residual)
     for at_once in (1000, 90):

@@ -52,15 +52,6 @@ LONG = "protocol: {phases: [{duration_s: 2e5, torque_Nm: 1e-9}]}, measurement: {
             "fractional_kelvin_voigt.",
         ),
         (
-            f"models: {{inertia: true}}\ncases: {{cell: {{sample: {{{SOLID}, alpha: 0.3}}}}}}",
-            "models.inertia: does not go with fractional_kelvin_voigt; allowed are samples",
-        ),
-        (
-            "models: {inertia: true}\nmodel_selection: {models: [damper, fractional_maxwell]}",
-            "model_selection.models[1]: found fractional_maxwell, which does not go with "
-            "models.inertia.",
-        ),
-        (
             "search_range: {k: {digit: [0, 0]}}",
             "search_range.k.digit: found [0, 0], allowed is a highest digit of at least 1.",
         ),

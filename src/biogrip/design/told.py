@@ -19,9 +19,8 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray
 from biogrip.design.experiment import information_of
 from biogrip.identify.answer import Identification, silent
-from biogrip.identify.local_fit import FAIR
-from biogrip.identify.many_fits import ManyFits
-from biogrip.identify.many_starts import best_of_many_starts
+from biogrip.identify.local_fits import FAIR, LocalFits
+from biogrip.identify.multi_start import best_of_starts
 from biogrip.identify.problem import Problem
 
 # Standard deviation of a logarithm from which on a Gaussian is not trusted.
@@ -87,7 +86,7 @@ def told_by(
     if before is not None:
         starts = np.log(np.concatenate((found.parameters[None], before.parameters)))
         row = found.parameters, found.misfit_rad, found.misfit_rad, found.evaluations
-        (found,) = best_of_many_starts([problem], [starts], [row], silent)
+        (found,) = best_of_starts([problem], [starts], [row], silent)
     best = np.log(found.parameters)
     around = _drawn(problem, noise_rad, found, within, drawn - 1, rng)
     logs = np.concatenate((best[None], around))
@@ -110,7 +109,7 @@ def information_at(problem: Problem, noise_rad: float, log_parameters: Array) ->
     -------
     (n, n_parameters, n_parameters)
     """
-    slopes = np.array([problem.residuals.condensed(x)[1] for x in log_parameters]) / noise_rad
+    slopes = problem.residuals.condensed_responses(log_parameters)[:, 1:] / noise_rad
     return information_of(slopes)
 
 
@@ -130,7 +129,7 @@ def _drawn(
     if held.any():
         low, high = within
         x[:, held] = rng.uniform(low[held], high[held], (tried, int(held.sum())))
-        fits = ManyFits([problem])
+        fits = LocalFits([problem])
         bounds = np.where(held, x, problem.low), np.where(held, x, problem.high)
         trace = np.zeros(tried, dtype=np.intp)
         fitted = fits.fitted(x, trace, FAIR, low=bounds[0], high=bounds[1])

@@ -8,7 +8,7 @@ follows from a `Network` holds for them.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from biogrip.experiment.network import Network
+from biogrip.experiment.network import Network, columns_of
 from biogrip.experiment.springpot import BRANCH_RATES_PER_S, ladder
 from biogrip.interlacing import interlaced_zeros
 
@@ -27,7 +27,7 @@ def fractional_kelvin_voigt(parameters: ArrayLike) -> Network:
               +-------<  >-------+
                  k_alpha, alpha
     """
-    k_p, modulus, exponent = np.atleast_2d(np.asarray(parameters) * 1.0).T
+    k_p, modulus, exponent = columns_of(parameters)
     springpot = ladder(modulus, exponent)
     return Network(
         k_p=k_p + springpot.spring,
@@ -60,7 +60,7 @@ def fractional_maxwell(parameters: ArrayLike) -> Network:
        rheological model for cells and cellularised materials, Royal Society Open Science 7
        (2020), 190920: a springpot and a damper in series, with a spring beside both.
     """
-    modulus, exponent, c = np.atleast_2d(np.asarray(parameters) * 1.0).T
+    modulus, exponent, c = columns_of(parameters)
     springpot = ladder(modulus, exponent)
     weights = np.concatenate((springpot.spring[None], springpot.springs))
     poles = np.append(0.0, BRANCH_RATES_PER_S)[:, None] * np.ones(len(c))

@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from biogrip.arrays import Array
 
 
@@ -21,6 +24,16 @@ class Network:
     c_p: Array
     k: Array
     c: Array
+
+
+# Of an element that is rigid, in N/m or N s/m: no response shows that it gives way.
+_RIGID = 1e18
+
+
+def columns_of(parameters: ArrayLike) -> Array:
+    """Columns of parameters, (n, n_parameters), those that are infinite as good as rigid."""
+    columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
+    return np.where(np.isinf(columns), _RIGID, columns)
 
 
 MOST_BRANCHES = 8

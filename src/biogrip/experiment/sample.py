@@ -22,6 +22,7 @@ from biogrip.arrays import Array, IntArray
 from biogrip.experiment.fractional import fractional_kelvin_voigt, fractional_maxwell
 from biogrip.experiment.network import MOST_BRANCHES as MOST_BRANCHES
 from biogrip.experiment.network import Network as Network
+from biogrip.experiment.network import columns_of
 
 _UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
 _SUFFIXES = {
@@ -173,8 +174,17 @@ SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
 """The paper's parameters, which every file of identifications has columns for."""
 
 
-def _columns(parameters: ArrayLike) -> Array:
-    return np.atleast_2d(np.asarray(parameters) * 1.0).T
+# A spring or damper of a branch that is gone, in N/m or N s/m: no response shows it.
+_GONE = 1e-18
+
+
+def _branches(springs: Array, dampers: Array) -> tuple[Array, Array]:
+    """Springs and dampers of branches, columns in rows; of one that is gone, next to nothing.
+
+    Of several that are gone none relaxes with another: equal rates cost digits.
+    """
+    weak = _GONE * 10.0 ** np.arange(len(dampers))[:, None]
+    return np.where(springs == 0, _GONE, springs).T, np.where(dampers == 0, weak, dampers).T
 
 
 def generalized_maxwell(parameters: ArrayLike) -> Network:
@@ -194,9 +204,10 @@ def generalized_maxwell(parameters: ArrayLike) -> Network:
               +-------[==]-------+
                       c_p
     """
-    columns = _columns(parameters)
+    columns = columns_of(parameters)
     n = len(columns) // 2 - 1
-    return Network(k_p=columns[n], c_p=columns[-1], k=columns[:n].T, c=columns[n + 1 : 2 * n + 1].T)
+    k, c = _branches(columns[:n], columns[n + 1 : 2 * n + 1])
+    return Network(k_p=columns[n], c_p=columns[-1], k=k, c=c)
 
 
 def liquid_drop(parameters: ArrayLike) -> Network:
@@ -209,7 +220,7 @@ def liquid_drop(parameters: ArrayLike) -> Network:
         B o---+------/\/\/-------+---o C
                       k_p
     """
-    k, k_p, c = _columns(parameters)
+    k, k_p, c = columns_of(parameters)
     return Network(k_p=k_p, c_p=np.zeros_like(k_p), k=k[:, None], c=c[:, None])
 
 
@@ -223,7 +234,7 @@ def kelvin_voigt(parameters: ArrayLike) -> Network:
               +-------[==]-------+
                       c_p
     """
-    k_p, c_p = _columns(parameters)
+    k_p, c_p = columns_of(parameters)
     none = np.zeros((len(k_p), 0))
     return Network(k_p=k_p, c_p=c_p, k=none, c=none)
 
@@ -236,7 +247,7 @@ def damper(parameters: ArrayLike) -> Network:
         B o---[==]---o C
                c_p
     """
-    (c_p,) = _columns(parameters)
+    (c_p,) = columns_of(parameters)
     none = np.zeros((len(c_p), 0))
     return Network(k_p=np.zeros_like(c_p), c_p=c_p, k=none, c=none)
 
@@ -249,7 +260,7 @@ def maxwell(parameters: ArrayLike) -> Network:
         B o---/\/\/---[==]---o C
                 k       c
     """
-    k, c = _columns(parameters)
+    k, c = columns_of(parameters)
     none = np.zeros_like(k)
     return Network(k_p=none, c_p=none, k=k[:, None], c=c[:, None])
 
@@ -267,8 +278,8 @@ def zener_kelvin(parameters: ArrayLike) -> Network:
                k_s       +---[==]----+
                               c_v
     """
-    k_s, k_v, c_v = _columns(parameters)
-    share = k_s / (k_s + k_v)
+    k_s, k_v, c_v = columns_of(parameters)
+    share = 1 / (1 + k_v / k_s)
     return Network(
         k_p=share * k_v,
         c_p=np.zeros_like(k_s),
@@ -292,7 +303,7 @@ def burgers(parameters: ArrayLike) -> Network:
                k_s    c_s       +---[==]----+
                                      c_v
     """
-    k_s, c_s, k_v, c_v = _columns(parameters)
+    k_s, c_s, k_v, c_v = columns_of(parameters)
     e = c_s * k_v / k_s
     d = c_s + c_v - e
     root = np.sqrt(d * d + 4 * c_s * e)

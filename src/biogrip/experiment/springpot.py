@@ -60,6 +60,9 @@ def _interpolation(places: Array) -> Array:
 _TO_WEIGHTS = _interpolation(_PLACES)
 
 
+_ROUNDING = 2.0**-44
+
+
 @dataclass(frozen=True)
 class Ladder:
     """What n springpots are made of, side by side.
@@ -87,9 +90,11 @@ def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
     modulus_N_per_m : (n,)
         V, the modulus at 1 rad/s.
     exponent : (n,)
-        alpha, between 0 and 1, neither included. Both may be complex: what is done to them is
-        analytic.
+        alpha, between 0 and 1. Both may be complex: what is done to them is analytic.
     """
+    # At its ends, where tails would be infinite, the next exponent gives the same response.
+    exponent = np.where(exponent == 0, _ROUNDING, exponent)
+    exponent = np.where(exponent == 1, 1 - _ROUNDING, exponent)
     # sin(pi alpha), with all digits near one, too.
     near = np.where(np.real(exponent) > 0.5, 1 - exponent, exponent)
     density = modulus_N_per_m * _STEP * np.sin(np.pi * near) / np.pi

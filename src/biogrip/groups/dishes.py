@@ -11,7 +11,7 @@ from biogrip.groups.joint_fit import JointFit
 from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, population_of
 from biogrip.groups.power import ratio_seen
 from biogrip.groups.shift import Shift, shift
-from biogrip.identifiability.profile import Likelihood
+from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import DETERMINED, Finding
 

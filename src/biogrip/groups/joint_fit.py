@@ -25,7 +25,7 @@ from biogrip.groups.replicates import joint_problem
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.whiteness import one_in
 from biogrip.identify.answer import Identification
-from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 
 # Noise is known to a share of one over the root of twice the samples; this is far below.
@@ -116,11 +116,11 @@ def _reweighted(
         sums = [_square_sum(problem, x) for problem in problems]
         before, levels = levels, [sqrt(s / own) for s, own in zip(sums, left, strict=True)]
         joint = joint_problem(problems, levels)
-        fit = settled(joint, local_fit(joint, x))
-        x = fit.log_parameters
+        found = found.at(fit := fit_from([joint], x))
+        x = fit.x[0]
         if max(abs(log(now / then)) for now, then in zip(levels, before, strict=True)) < _SETTLED:
             break
-    return joint, replace(found, parameters=np.exp(x), misfit_rad=fit.misfit_rad), levels
+    return joint, found, levels
 
 
 def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None) -> float:
@@ -129,7 +129,7 @@ def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None
 
     gained = 0.0
     for problem in problems:
-        alone = settled(problem, local_fit(problem, best)).log_parameters
+        alone = fit_from([problem], best).x[0]
         joint, own = _square_sum(problem, best), _square_sum(problem, alone)
         if noise_rad is not None:
             gained += (joint - own) / noise_rad**2

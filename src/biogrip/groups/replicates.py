@@ -41,6 +41,8 @@ class JointResiduals(Residuals):
         counted = zip(parts, noise_rad, strict=True)
         whole = sqrt(self.samples / fsum(part.samples / own**2 for part, own in counted))
         self.weights = np.array([whole / own for own in noise_rad])
+        peaks = (w * part.peak_rad for w, part in zip(self.weights, parts, strict=True))
+        self.peak_rad = float(max(peaks))
         scales = (w * part.noise_scale_rad for w, part in zip(self.weights, parts, strict=True))
         squares = (part.samples * s**2 for part, s in zip(parts, scales, strict=True))
         self.noise_scale_rad = sqrt(fsum(squares) / self.samples)
@@ -75,10 +77,6 @@ class JointResiduals(Residuals):
         """Residuals alone, trace after trace, (n_samples,) in rad."""
         return self._side_by_side([part.left(log_parameters) for part in self._parts])
 
-    def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Rows with the residuals' sum of squares and its derivatives, trace after trace."""
-        return self._stacked([part.condensed(log_parameters) for part in self._parts])
-
     @property
     def freedom(self) -> float:
         """Degrees of freedom with which the colour of the noise of the least known is known."""
@@ -90,9 +88,9 @@ class JointResiduals(Residuals):
         return all(part.coloured for part in self._parts)
 
     @property
-    def condensable(self) -> bool:
-        """Whether few rows may stand for all samples of every trace."""
-        return all(part.condensable for part in self._parts)
+    def inertia(self) -> bool:
+        """Whether the arms ring in any of the traces."""
+        return any(part.inertia for part in self._parts)
 
     @cached_property
     def condensed_trace(self) -> Array:
@@ -110,6 +108,11 @@ class JointResiduals(Residuals):
         return self._side_by_side(
             [part.condensed_corrections(log_parameters, slopes=slopes) for part in self._parts]
         )
+
+    def without_inertia(self) -> "JointResiduals":
+        """Return the same traces for arms that do not ring."""
+        parts = [part.without_inertia() for part in self._parts]
+        return JointResiduals(parts, (1 / self.weights).tolist())
 
     def shares_responses(self, other: Residuals) -> bool:
         """Whether only the traces tell this from others; weights are in the responses."""
@@ -136,17 +139,4 @@ def joint_problem(problems: Sequence[Problem], noise_rad: Sequence[float]) -> Pr
         Standard deviation of the noise of each.
     """
     residuals = JointResiduals([problem.residuals for problem in problems], noise_rad)
-    shares = [
-        weight**2 * problem.residuals.samples / residuals.samples
-        for weight, problem in zip(residuals.weights, problems, strict=True)
-    ]
-
-    def misfit(parameters: Array) -> Array:
-        squares = [
-            share * problem.misfit(parameters) ** 2
-            for share, problem in zip(shares, problems, strict=True)
-        ]
-        root: Array = np.sqrt(np.sum(squares, axis=0))
-        return root
-
-    return replace(problems[0], misfit=misfit, residuals=residuals)
+    return replace(problems[0], misfit=residuals.condensed_misfit, residuals=residuals)

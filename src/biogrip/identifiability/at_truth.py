@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.noise import Noise, rms, standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.case_problem import CaseProblem
@@ -45,16 +45,15 @@ def bounds_percent(
     if noise.absent:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
-    rotation, sensitivity = rotation_and_sensitivity(
-        problem.gripper,
-        model,
-        problem.torque,
-        time_s,
-        values,
-        nonlinear=problem.nonlinear,
-        inertia=problem.inertia,
-    )
-    sigma = standard_deviation(rotation, noise)
+    torque, nonlinear, inertia = problem.torque, problem.nonlinear, False
+    for _ in range(2):
+        rotation, sensitivity = rotation_and_sensitivity(
+            problem.gripper, model, torque, time_s, values, nonlinear=nonlinear, inertia=inertia
+        )
+        sigma = standard_deviation(rotation, noise)
+        inertia = problem.shows_inertia(time_s, rotation, rms(sigma))
+        if not inertia:
+            break
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
     return [(q, 100 * bound(sensitivity, sigma, logarithms, q)) for q in quantities]

@@ -15,7 +15,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identify.local_fit import FAIR
+from biogrip.identify.local_fits import FAIR
 
 _MOST_FITS = 40
 _CLOSEST = 1e-7
@@ -80,7 +80,7 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
     brackets
         Where to look.
     tolerance
-        Of the fits, see `local_fit`.
+        Of the fits, see `biogrip.identify.local_fits`.
     accuracy
         Of the square root of the rise.
     """

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
-from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
-from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.response.grip import Grip
 
@@ -70,10 +70,13 @@ def diagnose(
     noise_rad
         Standard deviation of the noise, if it is known; else that of the residual.
     """
-    best, misfit_rad = np.log(found.parameters), found.misfit_rad
     while True:
         likelihood = likelihood_of(
-            problem, best, misfit_rad, confidence=confidence, noise_rad=noise_rad
+            problem,
+            np.log(found.parameters),
+            found.misfit_rad,
+            confidence=confidence,
+            noise_rad=noise_rad,
         )
         findings = findings_of(likelihood, model)
         trades = trades_of(likelihood, model, findings)
@@ -81,13 +84,18 @@ def diagnose(
         lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.rises.min()))
         if lowest.rises.min() > -MISSED:
             break
-        fit = settled(problem, local_fit(problem, lowest.lowest))
-        if likelihood.rise(fit.misfit_rad) > -MISSED:
+        deeper = found.at(fit_from([problem], lowest.lowest))
+        if likelihood.rise(deeper.misfit_rad) > -MISSED:
             break
-        best, misfit_rad = fit.log_parameters, fit.misfit_rad
+        found = deeper
     grip = problem.residuals.grip(likelihood.best)
     pulling = _pulling(grip, problem.residuals.duration_s)
     notes = [*_in_parts(findings), *_notes(likelihood), *pulling]
+    if not found.converged:
+        notes.append(
+            "The fit could not be brought to its last digits: steps that should lead on fit worse. "
+            "Rely on its verdicts, not on its digits."
+        )
     return Diagnosis(likelihood, findings, trades, grip, notes)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.held import HeldQuantities
-from biogrip.identifiability.profile import MISSED, Likelihood
+from biogrip.identifiability.likelihood import MISSED, Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.levenberg_marquardt import Minima
-from biogrip.identify.many_fits import ManyFits
+from biogrip.identify.local_fits import LocalFits
 
 CLOSE = 1e-7
 """Tolerance of fits whose chi^2, of some thousand samples, is to be known to 0.001.
@@ -24,7 +24,7 @@ class HeldFits:
     Parameters
     ----------
     likelihoods
-        One a trace; with their problems `fit_together` has to agree.
+        One a trace; their problems have to be `alike`.
     quantities
         What may be held.
 
@@ -41,7 +41,7 @@ class HeldFits:
         self.best = np.stack([likelihood.best for likelihood in likelihoods])
         self.threshold = np.array([likelihood.threshold for likelihood in likelihoods])
         self.deeper: dict[int, tuple[float, Array]] = {}
-        self._fits = ManyFits(problems)
+        self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
         self._misfit_rad = np.array([likelihood.misfit_rad for likelihood in likelihoods])
         self._noise_rad = np.array([likelihood.noise_rad for likelihood in likelihoods])
@@ -61,7 +61,7 @@ class HeldFits:
         near : (n, n_parameters)
             Log-parameters to start from; moved to where the quantities have their values.
         tolerance
-            Of the fits, see `local_fit`.
+            Of the fits, see `biogrip.identify.local_fits`.
 
         Returns
         -------
@@ -97,7 +97,7 @@ class HeldFits:
         fixed : (n, n_parameters)
             Which of them stay, be they within the search range or not.
         tolerance
-            Of the fits, see `local_fit`.
+            Of the fits, see `biogrip.identify.local_fits`.
         """
         low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
         found = self._fits.fitted(x, trace, tolerance, low=low, high=high)

@@ -79,5 +79,4 @@ class Posterior:
         """RMS misfit in rad of parameters of shape (n, n_parameters)."""
         # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
         # loses, the rarer it is that two processors disagree about one.
-        residuals = self.problem.residuals
-        return residuals.condensed_misfit if residuals.condensable else self.problem.misfit
+        return self.problem.residuals.condensed_misfit

@@ -29,8 +29,7 @@ from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identifiability.straightened import Straightened, straightened
 from biogrip.identify.answer import Progress
-from biogrip.identify.local_fit import FAIR, local_fit
-from biogrip.identify.many_fits import ManyFits, fit_together
+from biogrip.identify.local_fits import FAIR, LocalFits
 
 # Points of the prior, the best of which are fitted from, and points about each optimum.
 _DRAWN, _FITTED, _ABOUT = 2000, 32, 200
@@ -142,10 +141,7 @@ def starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
     drawn = prior.draw(_DRAWN, rng)
     order = np.argsort(-posterior.log_density(drawn).astype(np.float32), kind="stable")
     best = drawn[order[:_FITTED]]
-    if fit_together([problem]):
-        optima = ManyFits([problem]).fitted(best, np.zeros(len(best), dtype=np.int64), FAIR).x
-    else:
-        optima = np.array([local_fit(problem, start, FAIR).log_parameters for start in best])
+    optima = LocalFits([problem]).fitted(best, np.zeros(len(best), dtype=np.int64), FAIR).x
     centres = np.repeat(optima, _ABOUT, axis=0)
     scales = np.exp(rng.uniform(np.log(_NEAREST), np.log(_FURTHEST), (len(centres), 1)))
     about = centres + scales * rng.standard_normal(centres.shape)

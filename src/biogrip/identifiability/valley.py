@@ -1,17 +1,16 @@
 """The valley in which a damper of a branch and the parallel damper trade against each other."""
 
-from dataclasses import replace
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.digits import rounded
-from biogrip.experiment.sample import SampleModel, with_fixed
+from biogrip.digits import rounded, rounded_rise
+from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood
-from biogrip.identify.local_fit import FAIR, local_fit
-from biogrip.identify.many_fits import fit_together
+from biogrip.identifiability.likelihood import Likelihood
+from biogrip.identify.local_fits import FAIR
 
 # Shares of the first in the sum, fine where either is next to nothing, and sums over the best sum,
 # fine where the valley is.
@@ -51,7 +50,7 @@ def valley_and_deeper(
         None unless exactly two exchangeable parameters were searched, among others.
     (n_parameters,) or None
         Log-parameters whose chi^2 is clearly below that of the optimum, so that this
-        was missed; fitted one by one, nothing is known of that.
+        was missed.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
@@ -61,9 +60,9 @@ def valley_and_deeper(
     arm = np.meshgrid(best.sum() * _FIRSTS, best.sum() * _SECONDS)
     grids, deeper = [], None
     for x_values, y_values in ((sums * _SHARES, sums * (1 - _SHARES)), arm):
-        rises, lower = _rises(likelihood, model, pair, x_values, y_values)
-        values = {"x_values": x_values, "y_values": y_values, "rises": rises}
-        grids.append({name: _listed(each) for name, each in values.items()})
+        rises, lower = _rises(likelihood, pair, x_values, y_values)
+        grid = {"x_values": _listed(x_values, rounded), "y_values": _listed(y_values, rounded)}
+        grids.append({**grid, "rises": _listed(rises, rounded_rise)})
         deeper = deeper if lower is None else lower
     x, y = (model.parameters[index] for index in pair)
     data = {
@@ -75,30 +74,17 @@ def valley_and_deeper(
     return data, deeper
 
 
-def _listed(values: Array) -> list[list[float | None]]:
-    return [[rounded(float(value)) for value in row] for row in values]
+def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
+    return [[rounding(float(value)) for value in row] for row in values]
 
 
 def _rises(
-    likelihood: Likelihood, model: SampleModel, pair: list[int], x_values: Array, y_values: Array
-) -> tuple[Array, Array | None]:
-    """Rise of chi^2 at every point of a grid, and what is deeper."""
-    if fit_together([likelihood.problem]):
-        return _rises_at_once(likelihood, pair, x_values, y_values)
-    rises = np.empty_like(x_values)
-    start = np.delete(likelihood.best, pair)
-    for i in range(len(rises)):
-        # Back and forth, so that each point starts from a neighbour's fit.
-        for j in range(rises.shape[1])[:: 1 if i % 2 else -1]:
-            here = (float(x_values[i, j]), float(y_values[i, j]))
-            rises[i, j], start = _rest_fitted(likelihood, model, pair, here, start)
-    return rises, None
-
-
-def _rises_at_once(
     likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
 ) -> tuple[Array, Array | None]:
-    """Fit all points from the optimum, then from neighbours as long as these are news."""
+    """Rise of chi^2 at every point of a grid, and what is deeper.
+
+    All points are fitted from the optimum, then from neighbours as long as these are news.
+    """
     fits = HeldFits([likelihood], [])
     rows, columns = x_values.shape
     x = np.tile(likelihood.best, (rows * columns, 1))
@@ -129,23 +115,3 @@ def _rises_at_once(
         tolerance = CLOSE
     deeper = fits.deeper.get(0)
     return rises.reshape(rows, columns), None if deeper is None else deeper[1]
-
-
-def _rest_fitted(
-    likelihood: Likelihood,
-    model: SampleModel,
-    pair: list[int],
-    values: tuple[float, float],
-    start: Array,
-) -> tuple[float, Array]:
-    problem = likelihood.problem
-    fixed = {model.parameters[i].name: value for i, value in zip(pair, values, strict=True)}
-    rest = replace(
-        problem,
-        residuals=problem.residuals.of_model(with_fixed(model, fixed)),
-        low=np.delete(problem.low, pair),
-        high=np.delete(problem.high, pair),
-    )
-    starts = (start, np.delete(likelihood.best, pair))
-    found = min((local_fit(rest, x, FAIR) for x in starts), key=lambda fit: fit.misfit_rad)
-    return likelihood.rise(found.misfit_rad), found.log_parameters

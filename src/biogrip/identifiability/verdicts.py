@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
-from biogrip.identifiability.many_profiles import profiles_of
-from biogrip.identifiability.profile import Likelihood, Profile
+from biogrip.identifiability.likelihood import Likelihood
+from biogrip.identifiability.profiles import Profile, profiles_of
 from biogrip.identifiability.quantities import (
     Quantity,
     combinations_of,
@@ -156,7 +156,7 @@ def _trade(model: SampleModel, members: list[int], finding: Finding) -> Trade:
 
 
 def _findings(likelihood: Likelihood, quantities: list[Quantity]) -> list[Finding]:
-    profiles = profiles_of(likelihood, quantities)
+    (profiles,) = profiles_of([likelihood], quantities)
     return [
         Finding(quantity, profile, likelihood.deviation(quantity))
         for quantity, profile in zip(quantities, profiles, strict=True)

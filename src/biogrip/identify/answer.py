@@ -7,6 +7,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import SampleModel
+from biogrip.identify.levenberg_marquardt import Minima
 
 Progress = Callable[[int, float], None]
 """Is told, now and then, how many responses were simulated and the lowest misfit in rad."""
@@ -55,6 +56,8 @@ class Identification:
         Why it stopped there.
     history
         The way there.
+    converged
+        Whether an optimum that was to be settled to its last digits could be.
     """
 
     parameters: Array
@@ -63,6 +66,28 @@ class Identification:
     evaluations: int
     stop_reason: str
     history: History
+    converged: bool = True
+
+    def at(self, fit: Minima) -> "Identification":
+        """Return the answer, with a fit of this trace alone in place of the optimum."""
+        return self.replaced(
+            np.exp(fit.x[0]), float(fit.misfit_rad[0]), converged=bool(fit.converged[0])
+        )
+
+    def replaced(
+        self, parameters: Array, misfit_rad: float, *, converged: bool
+    ) -> "Identification":
+        """Return the answer, with other parameters and their misfit, in its history as well."""
+        history = self.history
+        best_misfit, best_parameters = history.best_misfit.copy(), history.best_parameters.copy()
+        best_misfit[-1], best_parameters[-1] = misfit_rad, parameters
+        return replace(
+            self,
+            parameters=parameters,
+            misfit_rad=misfit_rad,
+            converged=converged,
+            history=replace(history, best_misfit=best_misfit, best_parameters=best_parameters),
+        )
 
     def in_order(self, model: SampleModel) -> "Identification":
         """Name branches, all the way, in the order in which they relax."""

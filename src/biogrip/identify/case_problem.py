@@ -11,12 +11,13 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, for_model, problem_of, rows_of
+from biogrip.identify.problem import Problem, for_model, problem_of
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
-from biogrip.response.every_sample import EverySample
+from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
+from biogrip.response.residuals import noise_of
 from biogrip.response.whitening import Colour, Whitening
 
 
@@ -26,8 +27,12 @@ class CaseProblem:
 
     Parameters
     ----------
-    gripper, ranges, nonlinear, inertia, offset, drift, noise_rad
+    gripper, ranges, noise_rad
         As of `problem_of`.
+    nonlinear
+        Whether to simulate the nonlinear model.
+    offset, drift
+        Whether the instrument may have added a constant, and a drift linear in time.
     coloured
         Whether the noise of a trace may be other than white, see `trace_fit`.
     uncertainty
@@ -46,15 +51,15 @@ class CaseProblem:
     sample: Sample
     fixed: Mapping[str, float]
     nonlinear: bool = False
-    inertia: bool = False
     offset: bool = False
     drift: bool = False
     noise_rad: float | None = None
     coloured: bool = False
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    _condensed: dict[bytes, Condensed | EverySample] = field(
+    _condensed: dict[tuple[bytes, bool], Condensed] = field(
         default_factory=dict, init=False, compare=False
     )
+    _changes: dict[bytes, float] = field(default_factory=dict, init=False, compare=False)
 
     @cached_property
     def torque(self) -> TorqueHistory:
@@ -105,38 +110,48 @@ class CaseProblem:
         rotation_rad: Array,
         model: SampleModel | None = None,
         noise_rad: float | None = None,
-        condensed: Condensed | EverySample | None = None,
+        condensed: Condensed | None = None,
     ) -> Problem:
         """Pose the problem for a trace.
 
         A model, a level of noise and what `in_noise` gives replace the case's.
         """
+        noise_rad = noise_rad or self.noise_rad
+        if condensed is None:
+            shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
+            condensed = self._condensed_at(time_s, inertia=shown)
         return problem_of(
             self.gripper,
             model or self.searched,
             self.torque,
             time_s,
             rotation_rad,
-            dict(self.ranges),
-            nonlinear=self.nonlinear,
-            inertia=self.inertia,
-            offset=self.offset,
-            drift=self.drift,
-            noise_rad=noise_rad or self.noise_rad,
-            condensed=condensed or self._condensed_at(time_s),
+            self.ranges,
+            condensed,
+            noise_rad=noise_rad,
         )
+
+    def shows_inertia(
+        self, time_s: Array, rotation_rad: Array, noise_rad: float | None = None
+    ) -> bool:
+        """Whether a trace shows the arms ringing, so that it is fitted with their inertia."""
+        sampled = time_s.tobytes()
+        if sampled not in self._changes:
+            self._changes[sampled] = change_by_inertia(self.gripper, self.torque, time_s)
+        noise_rad = noise_rad or self.noise_rad or noise_of(rotation_rad)
+        return inertia_shows(self._changes[sampled], rotation_rad, noise_rad)
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
         """Pose one of its problems for another model, at less than the price of a new one."""
-        return for_model(problem, model, dict(self.ranges))
+        return for_model(problem, model, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
         """What the instrument may have added, (n_functions, n_samples)."""
         return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
 
     def in_noise(
-        self, time_s: Array, colour: Colour | None, uncertain: Array
-    ) -> Condensed | EverySample:
+        self, time_s: Array, colour: Colour | None, uncertain: Array, *, inertia: bool
+    ) -> Condensed:
         """Condense for noise that is not just white.
 
         Parameters
@@ -147,34 +162,36 @@ class CaseProblem:
             Of the noise, unless that is white.
         uncertain : (n_functions, n_samples)
             What is added with an amplitude that is known about, see `with_uncertain`.
+        inertia
+            Whether the arms ring.
         """
         nuisance, whitening = self.nuisance(time_s), None
         if colour is not None:
             whitening = Whitening(time_s, colour, nuisance, uncertain)
-        nuisance = with_uncertain(nuisance, uncertain) if whitening is None else whitening.nuisance
-        if self.inertia:
-            return EverySample(time_s, nuisance, whitening)
+        return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)
+
+    def _condensed_at(self, time_s: Array, *, inertia: bool) -> Condensed:
+        # Once for all traces of a case: it takes as long as some fifty responses.
+        sampled = time_s.tobytes(), inertia
+        if sampled not in self._condensed:
+            self._condensed[sampled] = self._condense(time_s, self.nuisance(time_s), inertia)
+        return self._condensed[sampled]
+
+    def _condense(
+        self,
+        time_s: Array,
+        nuisance: Array,
+        inertia: bool,
+        whitening: Whitening | None = None,
+    ) -> Condensed:
         return Condensed(
             self.torque,
             time_s,
             nuisance,
             nonlinear=self.nonlinear,
+            ringing_s=ringing_s(self.gripper) if inertia else 0.0,
             whitening=whitening,
         )
-
-    def _condensed_at(self, time_s: Array) -> Condensed | EverySample:
-        # Once for all traces of a case: it takes as long as some fifty responses.
-        sampled = time_s.tobytes()
-        if sampled not in self._condensed:
-            self._condensed[sampled] = rows_of(
-                self.torque,
-                time_s,
-                offset=self.offset,
-                drift=self.drift,
-                nonlinear=self.nonlinear,
-                inertia=self.inertia,
-            )
-        return self._condensed[sampled]
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
         """Logarithms of the searched parameters' values, zeros lifted into the search range."""

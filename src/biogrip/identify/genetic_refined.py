@@ -14,8 +14,7 @@ from biogrip.arrays import Array
 from biogrip.identify import genetic
 from biogrip.identify.answer import History, Identification, Progress, silent
 from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.many_starts import best_of_many_starts
-from biogrip.identify.multi_start import Row
+from biogrip.identify.multi_start import Row, best_of_starts
 from biogrip.identify.problem import Problem
 from biogrip.keys import Key
 
@@ -96,7 +95,7 @@ def identify_many(
     """
     evolutions = genetic.evolve_problems(problems, settings.genetic, rngs, progress)
     starts, before = zip(*(_survivors(each, settings) for each in evolutions), strict=True)
-    fine = best_of_many_starts(problems, starts, before, progress)
+    fine = best_of_starts(problems, starts, before, progress)
     coarse = [evolution.identification for evolution in evolutions]
     return [_polished(*both) for both in zip(coarse, fine, strict=True)]
 
@@ -123,6 +122,7 @@ def _polished(coarse: Identification, fine: Identification) -> Identification:
         fine.evaluations,
         f"{coarse.stop_reason}, polished",
         _joined(coarse.history, fine.history),
+        fine.converged,
     )
 
 

@@ -1,6 +1,6 @@
 """The chromosome: an exponent and some digits a parameter, each a gene (eq. 10, Tables 3, 4)."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
@@ -300,7 +300,7 @@ _MULTIPLIER = np.array([10.0 ** max(power, 0) for power in _POWERS])
 _DIVISOR = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
-def genome_of(model: SampleModel, ranges: dict[str, GeneRange]) -> Genome:
+def genome_of(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
     """Genome of a sample model.
 
     Parameters

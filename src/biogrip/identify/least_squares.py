@@ -9,8 +9,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification, Progress, silent
-from biogrip.identify.many_starts import best_of_many_starts
-from biogrip.identify.multi_start import Row, screened
+from biogrip.identify.multi_start import Row, best_of_starts, screened
 from biogrip.identify.problem import Problem
 from biogrip.keys import Key
 
@@ -58,6 +57,7 @@ def identify_many(
     settings: LeastSquaresSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
+    further: Sequence[Array] | None = None,
 ) -> list[Identification]:
     """Identify many traces at once, each as if it were alone; a step is a fit.
 
@@ -71,6 +71,8 @@ def identify_many(
         A source of randomness for each.
     progress
         Is told after every trace.
+    further
+        More starting points of each, log-parameters (n_further, n_parameters).
 
     Raises
     ------
@@ -81,7 +83,9 @@ def identify_many(
         _screened(problem, settings, rng) for problem, rng in zip(problems, rngs, strict=True)
     ]
     starts, before = zip(*screened_points, strict=True)
-    return best_of_many_starts(problems, starts, before, progress)
+    if further is not None:
+        starts = tuple(map(np.concatenate, zip(starts, further, strict=True)))
+    return best_of_starts(problems, starts, before, progress)
 
 
 def _screened(
@@ -89,11 +93,14 @@ def _screened(
 ) -> tuple[Array, Row]:
     """Starting points, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
-    points, misfit = screened(problem.misfit, rng.uniform(problem.low, problem.high, shape))
+    # Where arms ring chi^2 has many basins; which points are good shows better without.
+    quiet = problem.without_inertia()
+    points, misfit = screened(quiet.misfit, rng.uniform(problem.low, problem.high, shape))
     if not len(points):
         raise BiogripError(
             "least_squares: the model has no answer anywhere in the search range; "
             "allowed are smaller torques, or the linear model."
         )
-    before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), settings.candidates
+    lowest = float(problem.misfit(np.exp(points[:1]))[0]) if quiet is not problem else misfit[0]
+    before = np.exp(points[0]), float(lowest), float(np.median(misfit)), settings.candidates
     return points[: settings.starts], before

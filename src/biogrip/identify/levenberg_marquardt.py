@@ -7,6 +7,10 @@ solved for again. No sum runs over problems, nor in an order that depends on how
 many there are: to the last bit, what a problem comes out with does not depend on
 which others are solved with it.
 
+Points are rounded to a grid far finer than what the data tell. Processors differ in the
+last bits of a step, and a descent along a valley would blow that up until decisions
+differ: on the grid, every step begins with the same bits on all of them.
+
 References
 ----------
 .. [1] K. Levenberg, A method for the solution of certain non-linear problems in least squares,
@@ -19,7 +23,7 @@ References
    University of Denmark, 1999.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -33,6 +37,10 @@ _LONGEST_STEP = 3.0
 _MOST_STEPS = 300
 _STANDSTILL = 1e-8
 _SMALLEST = 1e-300
+# Ratios of gains are told apart to one in so many.
+_RATIOS = 256
+# Spacing of the grid, in standard deviations of a parameter with all others known, and at most.
+_SPACING, _WIDEST = 1e-3, 2.0**-10
 
 
 @dataclass
@@ -66,6 +74,11 @@ class Normal:
         return Normal(*(part[which] for part in self.parts))
 
 
+def together(normals: Sequence[Normal]) -> Normal:
+    """Put normal equations behind one another."""
+    return Normal(*(np.concatenate(p) for p in zip(*(n.parts for n in normals), strict=True)))
+
+
 Objective = Callable[[Array, IntArray], Normal]
 """Normal equations at points (n, n_parameters) of the problems with given indices, (n,)."""
 
@@ -92,15 +105,29 @@ class Minima:
         RMS misfits there.
     evaluations : (n,)
         How often each problem was linearised.
+    converged : (n,)
+        Whether the descent came to an end by itself.
     """
 
     x: Array
     misfit_rad: Array
     evaluations: IntArray
+    converged: BoolArray
 
     def of(self, which: IntArray) -> "Minima":
         """Return those of some problems."""
-        return Minima(self.x[which], self.misfit_rad[which], self.evaluations[which])
+        x, misfit_rad, evaluations = self.x, self.misfit_rad, self.evaluations
+        return Minima(x[which], misfit_rad[which], evaluations[which], self.converged[which])
+
+
+def joined(minima: Sequence[Minima]) -> Minima:
+    """Put minima of one model behind one another."""
+    return Minima(
+        np.concatenate([each.x for each in minima]),
+        np.concatenate([each.misfit_rad for each in minima]),
+        np.concatenate([each.evaluations for each in minima]),
+        np.concatenate([each.converged for each in minima]),
+    )
 
 
 @dataclass
@@ -122,6 +149,7 @@ def minimized(
     tolerance: float,
     constraint: Constraint | None = None,
     damping: float = 1e-2,
+    most_steps: int = _MOST_STEPS,
 ) -> Minima:
     """Descend from a starting point in every problem.
 
@@ -139,10 +167,17 @@ def minimized(
         What is to hold on the way.
     damping
         Of the first steps, relative to the diagonal of the information.
+    most_steps
+        Stop after so many.
     """
     count = len(starts)
     everyone = np.arange(count)
-    minima = Minima(starts.copy(), np.zeros(count), np.ones(count, dtype=np.int64))
+    minima = Minima(
+        starts.copy(),
+        np.zeros(count),
+        np.ones(count, dtype=np.int64),
+        np.zeros(count, dtype=bool),
+    )
     state = _State(
         everyone,
         starts,
@@ -152,10 +187,11 @@ def minimized(
         np.full(count, damping),
         np.full(count, 2.0),
     )
-    for _ in range(_MOST_STEPS):
+    for _ in range(most_steps):
         minima.evaluations[state.problem] += 1
         done = _advance(state, objective, constraint, tolerance)
         if np.any(done):
+            minima.converged[state.problem[done]] = True
             _leave(state, done, minima)
             state = _chosen(state, ~done)
         if not len(state.problem):
@@ -177,7 +213,7 @@ def _advance(
     step = bounded_step(reduced, state.damping, below, above)
     # Valleys are straight in the logarithms or, of sums, in the parameters themselves.
     straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
-    tried, possible = x + straight, np.ones(len(x), dtype=bool)
+    tried, possible = _on_grid(x + straight, state), np.ones(len(x), dtype=bool)
     if constraint is not None:
         tried = constraint.restored(tried, problem, basic)
         possible = np.isfinite(tried[:, 0])
@@ -188,12 +224,25 @@ def _advance(
     gained = np.where(possible, normal.square_sum - found.square_sum, -np.inf)
     small = tolerance * normal.square_sum
     done = (np.abs(gained) <= small) & (predicted <= small)
-    done |= np.max(np.abs(step), axis=1) <= _STANDSTILL
+    done |= (np.max(np.abs(step), axis=1) <= _STANDSTILL) | np.all(tried == x, axis=1)
     _damp(state, gained, predicted)
     better = gained > 0
     state.x = np.where(better[:, None], tried, x)
     state.normal = _either(better, found, normal)
     return done
+
+
+def _on_grid(x: Array, state: _State) -> Array:
+    """Round points to the grid of each problem, but for what is at a bound."""
+    diagonal = np.arange(x.shape[1])
+    size = np.abs(state.normal.information[:, diagonal, diagonal]) + _SMALLEST
+    # A power of two, so that points of a finer grid stay where they are.
+    spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(size))[1])
+    spacing = np.minimum(spacing, _WIDEST)
+    inside = np.clip(x, state.low, state.high)
+    at_bound = (inside == state.low) | (inside == state.high)
+    rounded = np.clip(np.rint(x / spacing) * spacing, state.low, state.high)
+    return np.where(at_bound, inside, rounded)
 
 
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
@@ -262,6 +311,8 @@ def _damp(state: _State, gained: Array, predicted: Array) -> None:
     """Adapt the damping to how much of what was predicted was gained (Nielsen 1999)."""
     hopeful = predicted > 0
     ratio = np.where(hopeful, gained / np.where(hopeful, predicted, 1.0), -1.0)
+    # Of a gain that is next to nothing, last bits are a large share.
+    ratio = np.rint(np.clip(ratio, -1.0, 2.0) * _RATIOS) / _RATIOS
     better = ratio > 0
     less = np.maximum(1 / 3, 1 - (2 * np.where(better, ratio, 0.5) - 1) ** 3)
     state.damping = np.where(

@@ -1,4 +1,6 @@
-"""Local fits from several starting points, and the best of them.
+"""Local fits from several starting points, and the best of them, for many traces at once.
+
+To the last bit, the answer for a trace does not depend on which others there are.
 
 References
 ----------
@@ -6,14 +8,17 @@ References
    PLoS ONE 8 (2013), e74335: local fits from many starts.
 """
 
-from collections.abc import Callable, Iterable
+from bisect import insort
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identify.answer import History, Identification, Progress, silent
-from biogrip.identify.local_fit import ROUGH, LocalFit, local_fit, settled
+from biogrip.identify.levenberg_marquardt import Minima, joined
+from biogrip.identify.local_fits import ROUGH, LocalFits, alike
 from biogrip.identify.problem import Problem
+from biogrip.identify.settling import settled
 
 FINISHED = 4
 """Of the rough fits, so many of the best are finished."""
@@ -23,79 +28,127 @@ Row = tuple[Array, float, float, int]
 
 
 def best_of_starts(
-    problem: Problem,
-    starts: Iterable[Array],
-    before: Row,
+    problems: Sequence[Problem],
+    starts: Sequence[Array],
+    before: Sequence[Row],
     progress: Progress,
-) -> Identification:
-    """Fit from every start; the answer is the optimum of lowest misfit, settled.
+) -> list[Identification]:
+    """Fit every trace from each of its starts; the answers are the optima of lowest misfit.
 
     Misfits are compared in single precision and the first of equals wins, so
     that the last bits of a processor decide nothing.
 
     Parameters
     ----------
-    problem
-        What is fitted.
+    problems
+        What is fitted, one a trace.
     starts
-        Log-parameters, (n_parameters,) each.
+        Log-parameters for each trace, (n_starts, n_parameters).
     before
-        First row of the history: parameters, lowest and median misfit, and
+        First row of the history of each trace: parameters, lowest and median misfit, and
         evaluations before the first fit.
     progress
-        Is told after every fit.
+        Is told after every trace.
     """
-    rows, evaluations = [before], before[3]
-    found: list[LocalFit] = []
-    for start in starts:
-        found.append(local_fit(problem, start, ROUGH))
-        evaluations += found[-1].evaluations
-        rows.append(_row(found, evaluations))
-        progress(evaluations, rows[-1][1])
+    answers: dict[int, Identification] = {}
+    for group in alike(problems):
+        found = _best_of_alike(
+            [problems[index] for index in group],
+            [starts[index] for index in group],
+            [before[index] for index in group],
+            progress,
+        )
+        answers.update(zip(group.tolist(), found, strict=True))
+    return [answers[index] for index in range(len(problems))]
+
+
+def _best_of_alike(
+    problems: Sequence[Problem],
+    starts: Sequence[Array],
+    before: Sequence[Row],
+    progress: Progress,
+) -> list[Identification]:
+    if problems[0].residuals.inertia:
+        starts, before = _started_quietly(problems, starts, before)
+    fits, traces = LocalFits(problems), np.arange(len(problems))
+    trace = np.repeat(traces, [len(own_starts) for own_starts in starts])
+    rough, fine, finalists = _finished(fits, starts)
+    winners = np.concatenate([_best(fine, trace[finalists] == own, 1) for own in traces])
+    best = settled(fits, fine.of(winners), traces)
+    answers = []
+    for own, first_row in enumerate(before):
+        rows = _descents(rough.of(np.flatnonzero(trace == own)), first_row)
+        # Not the steps that settle it: how many it takes, the last bits of a processor decide.
+        finished = fine.evaluations[trace[finalists] == own].sum()
+        misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
+        rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
+        progress(evaluations, misfit_rad)
+        answers.append(_answer_of(rows, converged=bool(best.converged[own])))
+    return answers
+
+
+def _finished(fits: LocalFits, starts: Sequence[Array]) -> tuple[Minima, Minima, IntArray]:
+    """Fit roughly from all starts, and the best of each trace finely: both, and which these are."""
+    counts = [len(own_starts) for own_starts in starts]
+    trace = np.repeat(np.arange(len(starts)), counts)
+    rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Which basin is deepest shows before its bottom is reached; only the best are worth that.
-    found = [
-        local_fit(problem, rough.log_parameters) for rough in sorted(found, key=_rank)[:FINISHED]
-    ]
-    best = settled(problem, min(found, key=_rank))
-    # Not the steps that settle it: how many it takes, the last bits of a processor decide.
-    evaluations += sum(fine.evaluations for fine in found)
-    rows[-1] = _row([best], evaluations)
-    return answer_of(rows)
+    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
+    finalists = np.concatenate(best)
+    return rough, fits.fitted(rough.x[finalists], trace[finalists]), finalists
 
 
-def answer_of(rows: list[Row]) -> Identification:
-    """Return the last row of a history as the answer."""
-    parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
-    history = History(
-        np.array(best_misfit),
-        np.array(median_misfit),
-        np.array(parameters),
-        np.array(counts, dtype=np.int64),
+def _started_quietly(
+    problems: Sequence[Problem], starts: Sequence[Array], before: Sequence[Row]
+) -> tuple[list[Array], list[Row]]:
+    """Add the best fits of arms that do not ring to the starts.
+
+    Rings of different frequencies look alike at the instants of the samples: chi^2 has many
+    basins. Without inertia it has few, of which the deepest lies by the right one.
+    """
+    rough, fine, finalists = _finished(
+        LocalFits([problem.without_inertia() for problem in problems]), starts
     )
-    return Identification(
-        history.best_parameters[-1],
-        best_misfit[-1],
-        len(rows) - 1,
-        counts[-1],
-        "all starts fitted",
-        history,
-    )
+    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
+    # Rings beside a power law take a hundred times as long.
+    most = FINISHED if problems[0].residuals.model.power_law else None
+    more, rows = [], []
+    for own, (own_starts, row) in enumerate(zip(starts, before, strict=True)):
+        here = trace[finalists] == own
+        more.append(np.concatenate((fine.x[here], own_starts[:most])))
+        spent = rough.evaluations[trace == own].sum() + fine.evaluations[here].sum()
+        rows.append((*row[:3], row[3] + int(spent)))
+    return more, rows
 
 
-def _rank(found: LocalFit) -> np.float32:
-    return np.float32(found.misfit_rad)
-
-
-def _row(found: list[LocalFit], evaluations: int) -> Row:
-    best = min(found, key=_rank)
-    median = float(np.median([fit.misfit_rad for fit in found]))
-    return np.exp(best.log_parameters), best.misfit_rad, median, evaluations
-
-
-def fitted_from(problem: Problem, start: Array) -> Identification:
-    """Fit from a single point, (n_parameters,) log-parameters."""
+def identify_from(problem: Problem, start: Array) -> Identification:
+    """Fit a trace from a single point, (n_parameters,) log-parameters."""
     misfit = float(problem.misfit(np.exp(start)[None])[0])
-    return best_of_starts(problem, [start], (np.exp(start), misfit, misfit, 1), silent)
+    row = np.exp(start), misfit, misfit, 1
+    return best_of_starts([problem], [start[None]], [row], silent)[0]
+
+
+def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
+    """Fit every trace from one starting point, and settle the optima.
+
+    Parameters
+    ----------
+    problems
+        What is fitted, one a trace.
+    starts : (n_parameters,) or (n_traces, n_parameters)
+        Log-parameters.
+
+    Returns
+    -------
+    Minima
+        The optimum of every trace.
+    """
+    starts = np.broadcast_to(starts, (len(problems), len(problems[0].low)))
+    groups, found = alike(problems), list[Minima]()
+    for group in groups:
+        fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
+        found.append(settled(fits, fits.fitted(starts[group], traces), traces))
+    return joined(found).of(np.argsort(np.concatenate(groups)))
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:
@@ -111,3 +164,44 @@ def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array
     order = np.argsort(values.astype(np.float32), kind="stable")
     order = order[np.isfinite(values[order])]
     return candidates[order], values[order]
+
+
+def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
+    """Indices of the best fits."""
+    chosen = np.flatnonzero(which)
+    order = np.argsort(found.misfit_rad[chosen].astype(np.float32), kind="stable")
+    best: IntArray = chosen[order[:count]]
+    return best
+
+
+def _descents(found: Minima, before: Row) -> list[Row]:
+    """Rows of a history: the first, and one for each fit."""
+    rows, evaluations, best, sorted_rad = [before], before[3], 0, list[float]()
+    ranks = found.misfit_rad.astype(np.float32)
+    for fit, misfit_rad in enumerate(found.misfit_rad.tolist()):
+        evaluations += int(found.evaluations[fit])
+        best = fit if ranks[fit] < ranks[best] else best
+        insort(sorted_rad, misfit_rad)
+        median = 0.5 * (sorted_rad[fit // 2] + sorted_rad[(fit + 1) // 2])
+        rows.append((np.exp(found.x[best]), float(found.misfit_rad[best]), median, evaluations))
+    return rows
+
+
+def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
+    """Return the last row of a history as the answer."""
+    parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
+    history = History(
+        np.array(best_misfit),
+        np.array(median_misfit),
+        np.array(parameters),
+        np.array(counts, dtype=np.int64),
+    )
+    return Identification(
+        history.best_parameters[-1],
+        best_misfit[-1],
+        len(rows) - 1,
+        counts[-1],
+        "all starts fitted",
+        history,
+        converged,
+    )

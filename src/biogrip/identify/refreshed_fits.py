@@ -92,7 +92,12 @@ def minimized_with_refreshes(
         What is to hold on the way.
     """
     count = len(starts)
-    best = Minima(starts.copy(), np.full(count, np.inf), np.zeros(count, dtype=np.int64))
+    best = Minima(
+        starts.copy(),
+        np.full(count, np.inf),
+        np.zeros(count, dtype=np.int64),
+        np.zeros(count, dtype=bool),
+    )
     lowest, foreseen = np.full(count, np.inf), np.full(count, np.nan)
     x, left = starts.copy(), np.arange(count)
     for _ in range(_MOST_ROUNDS):
@@ -107,6 +112,7 @@ def minimized_with_refreshes(
         missed = np.abs(found.square_sum - foreseen[left])
         possible = np.isfinite(found.square_sum)
         on = possible & ~(missed <= tolerance * found.square_sum)
+        best.converged[left[~on]] = possible[~on]
         left, expansion = left[on], Expansion(here[on], expansion.rows[on])
         if not len(left):
             break

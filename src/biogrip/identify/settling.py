@@ -1,10 +1,11 @@
-"""From near an optimum to its last digits, for many fits at once.
+"""From near an optimum to its last digits.
 
 Descents compare sums of squares, and so find an optimum to half the digits; where
 the gradient vanishes can be found to all of them. Gauss-Newton steps need not lead
 there: of an element too weak to be seen, only second derivatives of the residuals
-tell how the gradient changes. So the steps are Newton's, with second derivatives
-from differences of exact gradients; the last ones, with gradients from all samples.
+tell how the gradient changes. So the steps are Newton's. The first are damped, and
+compared on the rows that stand for all samples; each of the last ones is compared on
+all samples with the point before it, and kept only if it fits no worse.
 
 References
 ----------
@@ -12,29 +13,34 @@ References
    3.4: Newton's method with the moduli of the curvatures.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimized
-from biogrip.identify.local_fit import on_all_samples
-from biogrip.identify.many_fits import ManyFits
+from biogrip.identify.local_fits import LocalFits
 
-# Differences leave second derivatives an error of some 1e-6: of a step, so much is left to the
-# next. Whether a step is below 1e-7 every machine sees alike, and what is left is rounding.
-_DIFFERENCE = 1e-3
-_NEARLY_SETTLED = 1e-7
-_MOST_STEPS, _MOST_STEPS_ON_ALL_SAMPLES = 6, 3
 # Along a curved valley a minimum must first be approached, with steps damped if need be.
-_CLOSE, _DAMPING = 1e-12, 1e-6
+_CLOSE, _DAMPING = 1e-10, 1e-6
+_MOST_STEPS = 60
+# After a step that was not kept the next is damped, at least and at most so much more.
+_LITTLE, _MORE = 1e-9, 10.0
+# E-folds: whether a step is shorter every machine sees alike, and what is left is rounding.
+_STILL = 1e-9
+# Longer steps lead to points of a grid.
+_FAR, _SPACING = 1e-5, 2.0**-24
+# A step that is to lower chi^2 by less than this changes no digit that is told.
+_NOTHING = 1e-8
 # E-folds; what has converged has no further to go.
 _LONGEST_STEP = 1.0
 # Of a direction's curvature, over those of single parameters; and of the latter.
-_FLAT, _SMALLEST = 1e-10, 1e-150
-# Share of a sum of squares that may be rounding.
-_ROUNDING = 1e-11
+_FLAT, _SMALLEST = 1e-12, 1e-150
+# Of the largest rotation, to which a misfit is known.
+_ROUNDING = 1e-15
 
 
-def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
+def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     """Take Newton's steps until optima stand still to the last digits.
 
     Parameters
@@ -49,67 +55,114 @@ def settled(fits: ManyFits, found: Minima, trace: IntArray) -> Minima:
     Returns
     -------
     Minima
-        Optima with the misfits of all samples, and evaluations since they were found;
-        branches named in the order in which they relax.
+        Optima with their misfits on all samples, none above that of the optimum found, and
+        evaluations since then; branches named in the order in which they relax. Converged are
+        those whose next step would change nothing.
     """
     low, high = (np.broadcast_to(bound, found.x.shape) for bound in (fits.low, fits.high))
     closer = minimized(
-        lambda x, fit: _curved(fits, x, trace[fit]), found.x, low, high, _CLOSE, damping=_DAMPING
+        lambda x, fit: _convex(fits, x, trace[fit]),
+        found.x,
+        low,
+        high,
+        _CLOSE,
+        damping=_DAMPING,
+        most_steps=_MOST_STEPS,
     )
-    by_differences = 1 + 2 * found.x.shape[1]
-    x, evaluations = closer.x.copy(), closer.evaluations * by_differences
-    moving = np.arange(len(x))
+    evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
+    state = _State(found.x.copy(), fits.on_all_samples(found.x, trace))
+    everyone = np.arange(len(found.x))
+    rounding = _rounding(fits, state.here.misfit_rad, trace)
+    _keep(fits, state, everyone, closer.x, trace, rounding)
+    converged, damping = np.zeros(len(everyone), dtype=bool), np.zeros(len(everyone))
+    moving = everyone
     for _ in range(_MOST_STEPS):
-        here = x[moving]
-        step = _newton_step(fits, _curved(fits, here, trace[moving]), here)
-        x[moving] = np.clip(here + step, fits.low, fits.high)
-        evaluations[moving] += by_differences
-        moving = moving[np.max(np.abs(step), axis=1) >= _NEARLY_SETTLED]
         if not len(moving):
             break
-    before, after = fits.normal(closer.x, trace), fits.normal(x, trace)
-    lost = ~(after.square_sum <= before.square_sum * (1 + _ROUNDING))
-    x[lost] = closer.x[lost]
-    curved = _curved(fits, x, trace)
-    evaluations += 2 + by_differences
-    misfit_rad = np.empty(len(x))
-    for fit in range(len(x)):
-        own = curved.of(np.array([fit]))
-        for _ in range(_MOST_STEPS_ON_ALL_SAMPLES):
-            own.gradient[0], misfit_rad[fit] = on_all_samples(fits.problems[trace[fit]], x[fit])
-            evaluations[fit] += 1
-            step = _newton_step(fits, own, x[fit : fit + 1])[0]
-            if lost[fit]:
-                break
-            x[fit] = np.clip(x[fit] + step, fits.low, fits.high)
-            if np.max(np.abs(step)) < _NEARLY_SETTLED:
-                break
-    order = fits.problems[0].residuals.model.in_order(np.exp(x))
-    return Minima(np.take_along_axis(x, order, axis=1), misfit_rad, evaluations)
+        x = state.x[moving]
+        normal = _convex(fits, x, trace[moving])
+        normal.gradient = state.here.gradient[moving]
+        plain = _newton_step(fits, normal, x, np.zeros(len(x)))
+        gain = -np.sum(plain * normal.gradient, axis=1)
+        converged[moving] = gain <= np.maximum(_NOTHING, rounding[moving])
+        step = _newton_step(fits, normal, x, damping[moving])
+        step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
+        on = np.max(np.abs(plain), axis=1) >= _STILL
+        moving, step = moving[on], step[on]
+        if not len(moving):
+            break
+        evaluations[moving] += 2 + 2 * x.shape[1]
+        ahead = np.clip(_on_grid(state.x[moving] + step, step), fits.low, fits.high)
+        kept = _keep(fits, state, moving, ahead, trace, rounding)
+        more, less = _MORE * damping[moving], damping[moving] / _MORE
+        less[less < _LITTLE] = 0.0
+        damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
+        # Where steps only go to and fro within rounding, there is nothing more to be had.
+        moving = moving[kept | ~converged[moving]]
+    order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
+    x = np.take_along_axis(state.x, order, axis=1)
+    return Minima(x, state.here.misfit_rad, evaluations, converged)
 
 
-def _newton_step(fits: ManyFits, curved: Normal, x: Array) -> Array:
+def _on_grid(x: Array, step: Array) -> Array:
+    """Round points, after steps that are not the last, as `minimized` does and for its reasons."""
+    far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
+    return np.where(far, np.rint(x / _SPACING) * _SPACING, x)
+
+
+@dataclass
+class _State:
+    """Where fits are, and what is minimized there, on all samples."""
+
+    x: Array
+    here: Normal
+
+
+def _keep(
+    fits: LocalFits,
+    state: _State,
+    which: IntArray,
+    x: Array,
+    trace: IntArray,
+    rounding: Array,
+) -> BoolArray:
+    """Move some fits, in place, to points that are no worse on all samples; tell which."""
+    there = fits.on_all_samples(x, trace[which])
+    kept = there.square_sum <= state.here.square_sum[which] + rounding[which]
+    moved = which[kept]
+    state.x[moved] = x[kept]
+    for part, new in zip(state.here.parts, there.parts, strict=True):
+        part[moved] = new[kept]
+    return kept
+
+
+def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:
+    """What of sums of squares may be rounding, (n,)."""
+    residuals = [fits.problems[own].residuals for own in trace.tolist()]
+    samples = np.array([each.samples for each in residuals])
+    noise_rad = np.array([each.noise_scale_rad for each in residuals])
+    more_rad = _ROUNDING * np.array([each.peak_rad for each in residuals])
+    found: Array = samples * more_rad * (2 * misfit_rad + more_rad) / noise_rad**2
+    return found
+
+
+def _newton_step(fits: LocalFits, normal: Normal, x: Array, damping: Array) -> Array:
     below = np.maximum(fits.low - x, -_LONGEST_STEP)
     above = np.minimum(fits.high - x, _LONGEST_STEP)
-    return bounded_step(curved, np.zeros(len(x)), below, above)
+    return bounded_step(normal, damping, below, above)
 
 
-def _curved(fits: ManyFits, x: Array, trace: IntArray) -> Normal:
+def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:
     """Normal equations with the moduli of all curvatures, which are themselves at a minimum."""
-    count, parameters = x.shape
-    both_ways = _DIFFERENCE * np.concatenate((np.eye(parameters), -np.eye(parameters)))
-    around = (x[:, None] + both_ways).reshape(-1, parameters)
-    normal = fits.normal(x, trace)
-    gradients = fits.normal(around, np.repeat(trace, len(both_ways))).gradient
-    ahead, behind = gradients.reshape(count, 2, parameters, parameters).swapaxes(0, 1)
-    slopes = (ahead - behind) / (2 * _DIFFERENCE)
+    normal = fits.curved(x, trace)
     # What is pushed against a bound does not move, however the sum of squares is curved there.
     fixed = (x <= fits.low) & (normal.gradient > 0) | (x >= fits.high) & (normal.gradient < 0)
     free = (~fixed[:, :, None]) & (~fixed[:, None, :])
-    second = np.where(free, 0.5 * (slopes + slopes.swapaxes(1, 2)), np.eye(parameters))
+    second = np.where(free, normal.information, np.eye(x.shape[1]))
     scale = np.sqrt(np.abs(np.diagonal(second, axis1=1, axis2=2))) + _SMALLEST
     both = scale[:, :, None] * scale[:, None, :]
     curvatures, directions = np.linalg.eigh(second / both)
-    convex = directions * np.maximum(np.abs(curvatures), _FLAT)[:, None] @ directions.swapaxes(1, 2)
+    moduli = np.maximum(np.abs(curvatures), _FLAT)
+    convex = directions * moduli[:, None] @ directions.swapaxes(1, 2)
     normal.information = np.where(curvatures[:, :1, None] > _FLAT, second, convex * both)
     return normal

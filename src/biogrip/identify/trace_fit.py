@@ -15,7 +15,7 @@ from biogrip.digits import rounded
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.noise_colour import ColourLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
@@ -159,13 +159,13 @@ def _in_turn(
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = ColourLikelihood(time_s, residual, directions)
             colour = likelihood.best(near=before)
-        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad)
+        inertia = problem.residuals.inertia
+        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, inertia=inertia)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
         start = np.log(found.parameters)
-        fit = settled(problem, local_fit(problem, start))
-        _, slopes = problem.residuals.condensed(fit.log_parameters)
-        moved = np.linalg.norm((fit.log_parameters - start) @ slopes) / noise_rad
-        found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
+        found = found.at(fit := fit_from([problem], start))
+        slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
+        moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_rad
         if moved < _STAYED and _alike(before, colour):
             break
     if colour is not None:

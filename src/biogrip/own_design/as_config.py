@@ -21,7 +21,6 @@ def as_config(designs: Iterable[Designed]) -> str:
 
 def _case(found: Designed) -> Iterator[str]:
     yield f"  {found.case.name}:"
-    yield "    models: { inertia: true }"
     yield "    protocol:"
     yield "      phases:"
     for phase in found.plan.phases:

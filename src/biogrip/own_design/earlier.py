@@ -80,7 +80,7 @@ def _posed(recorded: Recorded, noise_rad: float) -> Problem:
     if wrong := trace_file_problem(recorded.file):
         raise BiogripError(f"--after: {wrong}")
     case = recorded.case
-    posed = replace(case.problem, inertia=True, noise_rad=noise_rad)
+    posed = replace(case.problem, noise_rad=noise_rad)
     columns = Columns("time_s", "rotation_rad")
     settings = recording.Settings(case.gripper, posed, columns)
     trace = recording.read_checked(settings, recorded.file)

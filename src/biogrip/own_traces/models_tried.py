@@ -1,52 +1,151 @@
 """Other sample models fitted to a trace: whether the chosen one is what it asks for."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
+
+import numpy as np
 
 from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.experiment.springpot import LONGEST_S
-from biogrip.identify.answer import Progress
-from biogrip.identify.methods import best_fit
-from biogrip.identify.model_choice import advice, ranked
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.likelihood import MISSED
+from biogrip.identify.answer import Identification
+from biogrip.identify.least_squares import LeastSquaresSettings
+from biogrip.identify.model_choice import Tried, advice, ranked
+from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
 
 _MOST_SAMPLES = 50_000
 
 
-def models_tried(study: Study, case: Case, fit: TraceFit, progress: Progress) -> dict[str, Any]:
-    """Fit the other sample models in the same noise, and say which the trace asks for.
+@dataclass(frozen=True)
+class ModelsTried:
+    """Best fits of sample models to a trace.
 
-    With parameters that are known, or where a fit takes minutes, there is nothing to say.
+    Parameters
+    ----------
+    tried, answers
+        How they compare, and the fits themselves, in the same order.
+    chosen
+        Candidate that the trace was identified with.
     """
-    posed = case.problem
-    # Beside arms that ring there is no springpot yet, and beside so many samples its modes, of
-    # which it has dozens, would take gigabytes.
-    few = fit.problem.residuals.samples <= _MOST_SAMPLES
-    power_laws = _power_laws(posed.torque.end_s) if few and not posed.inertia else []
-    candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
-    if posed.nonlinear or posed.fixed:
-        return {"models": [], "advice": None}
-    least_squares = case.method("least_squares")
-    misfits = []
-    for name in candidates:
-        problem = posed.for_model(fit.problem, CANDIDATES[name].model)
-        rng = stream(study.study_seed, case.name, 0, f"model {name}")
-        misfits.append(best_fit(problem, least_squares, rng, progress).misfit_rad)
-    tried = ranked(candidates, misfits, fit.problem.residuals.samples)
-    rows = [
-        {
-            "model": each.candidate,
-            "title": each.model.title,
-            "parameters": len(each.model.names),
-            "misfit_rad": rounded(each.misfit_rad),
-            "delta_aic": rounded(each.delta_aic),
-            "delta_bic": rounded(each.delta_bic),
-        }
-        for each in tried
+
+    chosen: str
+    tried: list[Tried] = field(default_factory=list)
+    answers: list[Identification] = field(default_factory=list)
+
+    @property
+    def own(self) -> Identification | None:
+        """Best fit of the model that the trace was identified with."""
+        pairs = zip(self.tried, self.answers, strict=True)
+        return next((answer for each, answer in pairs if each.candidate == self.chosen), None)
+
+    def data(self) -> dict[str, Any]:
+        """Return a row per model, and a sentence, as plain data."""
+        if not self.tried:
+            return {"models": [], "advice": None}
+        rows = [
+            {
+                "model": each.candidate,
+                "title": each.model.title,
+                "parameters": len(each.model.names),
+                "misfit_rad": rounded(each.misfit_rad),
+                "vanished": vanished(each.candidate, answer),
+                "delta_aic": rounded(each.delta_aic),
+                "delta_bic": rounded(each.delta_bic),
+            }
+            for each, answer in zip(self.tried, self.answers, strict=True)
+        ]
+        return {"models": rows, "advice": advice(self.tried, self.chosen)}
+
+
+def vanished(candidate: str, answer: Identification) -> list[str]:
+    """Name the elements without which a model fits best."""
+    elements = CANDIDATES[candidate].model.parameters
+    gone = (answer.parameters == 0) | np.isinf(answer.parameters)
+    return [
+        element.name
+        for element, is_gone in zip(elements, gone, strict=True)
+        if is_gone and element.kind != "exponent"
     ]
-    return {"models": rows, "advice": advice(tried, case.sample.candidate)}
+
+
+def models_tried(
+    study: Study, case: Case, fit: TraceFit, told: Diagnosis, done: Callable[[], None]
+) -> ModelsTried:
+    """Fit sample models in the noise of a trace.
+
+    With parameters that are known, or where a fit takes minutes, none are tried.
+
+    Parameters
+    ----------
+    study, case
+        Which models, and with which budget.
+    fit
+        The trace.
+    told
+        What it tells; its best fit is one of the points that fits start from.
+    done
+        Is called after every model.
+    """
+    posed, chosen = case.problem, case.sample.candidate
+    if posed.nonlinear or posed.fixed:
+        return ModelsTried(chosen)
+    # Beside so many samples the modes of a springpot, which has dozens, would take gigabytes.
+    few = fit.problem.residuals.samples <= _MOST_SAMPLES
+    power_laws = _power_laws(posed.torque.end_s) if few else []
+    candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
+    settings = case.method("least_squares")
+    assert isinstance(settings, LeastSquaresSettings)
+    found = fit_models(
+        {name: [posed.for_model(fit.problem, CANDIDATES[name].model)] for name in candidates},
+        settings,
+        {name: [stream(study.study_seed, case.name, 0, f"model {name}")] for name in candidates},
+        done,
+        near={chosen: told.likelihood.best[None]},
+    )
+    answers = [found[name][0] for name in candidates]
+    misfits = [answer.misfit_rad for answer in answers]
+    return ModelsTried(chosen, ranked(candidates, misfits, fit.problem.residuals.samples), answers)
+
+
+def judged_again(
+    fit: TraceFit, told: Diagnosis, models: ModelsTried, confidence: float, noise_rad: float | None
+) -> tuple[Diagnosis, list[str]]:
+    """Judge a trace again if the fits of several models led deeper; doubt what lies out of reach.
+
+    Parameters
+    ----------
+    fit, told
+        The trace, and what it tells.
+    models
+        All fits.
+    confidence, noise_rad
+        As of `diagnose`.
+
+    Returns
+    -------
+    told
+        What the trace tells then.
+    notes
+        In sentences.
+    """
+    own = models.own
+    if own is None or (rise := told.likelihood.rise(own.misfit_rad)) > -MISSED:
+        return told, []
+    if is_within(own.parameters, fit.problem):
+        model = fit.problem.residuals.model
+        return diagnose(fit.problem, model, own, confidence=confidence, noise_rad=noise_rad), []
+    gone = vanished(models.chosen, own)
+    where = f", without {' and '.join(gone)}" if gone else ""
+    return told, [
+        f"Beyond the search range{where}, the model fits better: χ² is lower by {-rise:.3g}. The "
+        "limits are those of samples within the range."
+    ]
 
 
 def _power_laws(duration_s: float) -> list[str]:

@@ -18,7 +18,7 @@ from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import assumed, by_default, versions
-from biogrip.own_traces.models_tried import models_tried
+from biogrip.own_traces.models_tried import judged_again, models_tried
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.second_opinion import second_opinion
@@ -113,10 +113,12 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             fit.problem, posed.searched, fit.found, confidence=confidence, noise_rad=posed.noise_rad
         )
         progress.done()
-        progress.doing("trying an offset and a drift")
-        doubts = second_opinion(study, case, recorded, told, progress.within)
-        progress.done()
         progress.doing("trying other sample models")
+        models = models_tried(study, case, fit, told, lambda: None)
+        told, doubts = judged_again(fit, told, models, confidence, posed.noise_rad)
+        progress.done()
+        progress.doing("trying an offset and a drift")
+        doubts += second_opinion(study, case, recorded, told, progress.within)
         said = diagnosis_data(told)
         data = {
             WRITTEN_BY: __version__,
@@ -128,7 +130,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             **said,
             "notes": [*recording.notes_on_gaps(recorded), *fit.notes(), *said["notes"], *doubts],
             "noise_model": fit.noise_data(),
-            **models_tried(study, case, fit, progress.within),
+            **models.data(),
             "assumed": assumed(case),
             "by_default": by_default(wanted.config),
             "versions": versions(),

@@ -11,6 +11,7 @@ from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Progress
 from biogrip.identify.methods import best_fit
+from biogrip.identify.multi_start import fit_from
 from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study
 
@@ -47,13 +48,16 @@ def second_opinion(
     rng = stream(study.study_seed, case.name, 0, "instrument")
     found = best_fit(problem, case.method("least_squares"), rng, progress)
     likelihood = told.likelihood
+    # Without offset and drift it is a fit as well: with them, none may be worse.
+    from_there = found.at(fit_from([problem], likelihood.best))
+    found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))
     fall = fall_of(
         problem.residuals.samples,
         likelihood.misfit_rad,
         found.misfit_rad,
         likelihood.noise_rad if posed.noise_rad is not None else None,
     )
-    chance = float(chdtrc(added, fall))
+    chance = float(chdtrc(added, max(fall, 0.0)))
     if chance >= FALSE_ALARM:
         return []
     other = diagnose(

@@ -72,11 +72,11 @@ def settings(study: Study) -> dict[str, CaseSettings]:
 
 
 def designed_cases(study: Study) -> list[str]:
-    """Name the simulated cases that ask for a design, and are identified with inertia."""
+    """Name the simulated cases that ask for a design, and are sampled as one has it, in bursts."""
     return [
         name
         for name in study.simulated
-        if study.cases[name].block.design and study.cases[name].problem.inertia
+        if study.cases[name].block.design and study.cases[name].block.measurement.bursts
     ]
 
 

@@ -6,7 +6,9 @@ space of some fifty dimensions only. In it a function is known from its values
 at as many well-chosen times. So a response is simulated at those, and a square
 matrix turns what it is there into rows whose sum of squares, gradients and all,
 is that of the residuals at every sample. Where samples are dense, that space is
-found on nodes that stand for them (`biogrip.response.dense_samples`).
+found on nodes that stand for them (`biogrip.response.dense_samples`). Arms that
+ring do so at any frequency, and no small space holds what they do: then, and
+where nodes are too many, every node has a row of its own.
 
 References
 ----------
@@ -24,7 +26,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.dense_samples import DenseSamples
-from biogrip.response.mode_growth import responses_of_modes
+from biogrip.response.mode_growth import growth_of_modes
 from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
@@ -44,7 +46,7 @@ _RANK = 1e-14
 
 
 class Condensed:
-    """Rows that stand for the samples of any trace of a protocol, on the linear model.
+    """Rows that stand for the samples of any trace of a protocol.
 
     Parameters
     ----------
@@ -56,6 +58,8 @@ class Condensed:
         What is taken out of trace and responses, see `nuisance_basis` and `with_uncertain`.
     nonlinear
         Whether rows must also do for what the nonlinear model has over the linear one.
+    ringing_s
+        How long after a change of the torque arms may be seen ringing; 0 without inertia.
     whitening
         What makes the noise white, and takes the nuisance out, if noise is not white as it is.
     """
@@ -67,13 +71,26 @@ class Condensed:
         nuisance: Array,
         *,
         nonlinear: bool = False,
+        ringing_s: float = 0.0,
         whitening: Whitening | None = None,
     ) -> None:
         self.nuisance = nuisance if whitening is None else whitening.nuisance
         self.nonlinear = nonlinear
+        self.ringing_s = ringing_s
         self._whitening = whitening
         self._torque = torque
         self._all_s = time_s
+
+    @cached_property
+    def without_ringing(self) -> "Condensed":
+        """Rows for the same samples, of arms that do not ring."""
+        return Condensed(
+            self._torque,
+            self._all_s,
+            self.nuisance,
+            nonlinear=self.nonlinear,
+            whitening=self._whitening,
+        )
 
     def cleared(self, rows: Array) -> Array:
         """Take the nuisance out of functions of time, (..., n_samples), and make noise white."""
@@ -86,11 +103,12 @@ class Condensed:
         """Whether noise is not white as it is."""
         return self._whitening is not None
 
-    @property
-    def possible(self) -> bool:
-        """Whether few enough nodes stand for the samples."""
+    @cached_property
+    def reduced(self) -> bool:
+        """Whether rows are fewer than nodes."""
         functions = len(self._edges_s) * (STAGES + 1)
-        return len(self._dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
+        few = len(self._dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
+        return few and not self.ringing_s
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Rows of a trace less nuisance.
@@ -104,18 +122,40 @@ class Condensed:
         (n_rows,)
             The last is what no response can reach.
         """
-        seen, rest = self._dense.rows_of_samples(rotation_rad)
+        seen, rest = self.nodes_of_trace(rotation_rad)
+        if not self.reduced:
+            return np.append(seen, rest)
         rows = seen @ self._basis
         return np.append(rows, np.hypot(np.linalg.norm(seen - self._basis @ rows), rest))
 
     @cached_property
     def time_s(self) -> Array:
-        """Times that stand for all, (n_times,)."""
-        return self._dense.time_s[self._chosen]
+        """Times at which a response has to be known, (n_times,)."""
+        return self.node_time_s[self._chosen] if self.reduced else self.node_time_s
+
+    @property
+    def node_time_s(self) -> Array:
+        """Times of the nodes, (n_nodes,)."""
+        return self._dense.time_s
+
+    def nodes_of_trace(self, rotation_rad: Array) -> tuple[Array, float]:
+        """Rows of the nodes of a trace less nuisance, (n_nodes,), and the norm of the rest."""
+        return self._dense.rows_of_samples(rotation_rad)
+
+    def rows_of_nodes(self, values: Array) -> Array:
+        """Rows of responses less nuisance, from their values at the nodes, (..., n_nodes)."""
+        return self._cleared_rows(self._dense.rows_of_values(values))
+
+    def rows(self, values: Array) -> Array:
+        """Rows of responses, (..., n_rows), from their values at `time_s`, (..., n_times)."""
+        if self.reduced:
+            return values @ self.to_rows
+        rows = self.rows_of_nodes(values)
+        return np.pad(rows, ((0, 0),) * (rows.ndim - 1) + ((0, 1),))
 
     @cached_property
     def to_rows(self) -> Array:
-        """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
+        """Matrix that turns values at few times, from its left, into rows, (n_times, n_rows)."""
         values = self._dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
             values[:, self._chosen], self._cleared_rows(self._span.T) @ self._basis
@@ -134,7 +174,9 @@ class Condensed:
     def _dense(self) -> DenseSamples:
         # What is whitened is no longer smooth: each sample is a node.
         dense = self._whitening is None
-        return DenseSamples(self._torque, self._all_s, self._edges_s, dense=dense)
+        return DenseSamples(
+            self._torque, self._all_s, self._edges_s, ringing_s=self.ringing_s, dense=dense
+        )
 
     @cached_property
     def _edges_s(self) -> Array:
@@ -168,8 +210,9 @@ class Condensed:
         shortest_s = np.diff(self._all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
-        growth, slope = map(
-            self._dense.rows_of_values, responses_of_modes(rates, self._torque, time_s)
+        growth, slope = (
+            self._dense.rows_of_values(of[0])
+            for of in growth_of_modes(rates[None], self._torque, time_s)
         )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0

@@ -67,6 +67,8 @@ class DenseSamples:
         Ascending sampling times.
     further_edges_s : (n_edges,)
         Where else they may be less smooth.
+    ringing_s
+        How long after a change of the torque functions are not smooth.
     dense
         Whether nodes may stand for samples; else each sample is one.
     """
@@ -77,9 +79,11 @@ class DenseSamples:
         time_s: Array,
         further_edges_s: Array | None = None,
         *,
+        ringing_s: float = 0.0,
         dense: bool = True,
     ) -> None:
         self._all_s = time_s
+        self._ringing_s = ringing_s
         self._kept: dict[tuple[int, int], list[tuple[slice, Array]]] = {}
         starts = [start for start, *_ in (*torque.jumps, *torque.swings)]
         self._starts_s = np.unique([-np.inf, *starts])
@@ -167,7 +171,7 @@ class DenseSamples:
             return
         start, end = self._all_s[first], self._all_s[stop - 1]
         elapsed = start - self._starts_s[self._starts_s.searchsorted(start, side="right") - 1]
-        if end - start <= min(elapsed, self._longest_s):
+        if elapsed >= self._ringing_s and end - start <= min(elapsed, self._longest_s):
             gram = np.zeros((_NODES, _NODES))
             for _, series in self._blocks(first, stop):
                 gram += series.T @ series

@@ -1,4 +1,4 @@
-"""The misfit of populations against traces, in whichever way is fastest."""
+"""The misfit of populations against traces: the paper's search has a fast way of its own."""
 
 from collections.abc import Callable, Sequence
 
@@ -6,10 +6,9 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.misfit_formed import FormedMisfit
 from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.response.residuals import Residuals
 
 Misfit = Callable[[Array], Array]
 """Of parameters of shape (n, n_parameters), the RMS misfit in rad, (n,)."""
@@ -19,47 +18,28 @@ Misfits = Callable[[Array, IntArray], Array]
 
 
 def misfit_of(
+    residuals: Residuals,
     gripper: Gripper,
-    model: SampleModel,
     torque: TorqueHistory,
     time_s: Array,
     rotation_rad: Array,
-    *,
-    nonlinear: bool = False,
-    inertia: bool = False,
-    nuisance: Array | None = None,
 ) -> Misfit:
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
 
     Parameters
     ----------
-    gripper, model, torque
-        What is simulated.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending.
-    nonlinear
-        Whether to simulate the nonlinear model.
-    inertia
-        Whether the arms have any.
-    nuisance : (n_functions, n_samples)
-        Functions that the instrument may have added, see `nuisance_basis`; none by default.
+    residuals
+        Of the trace; their misfit serves any protocol, sampling and noise.
+    gripper, torque, time_s, rotation_rad
+        What they were made of. Torque steps, sampled uniformly from the start on, of the linear
+        model without inertia, in white noise alone, need no response at all.
     """
-    plain = not (nonlinear or inertia) and (nuisance is None or len(nuisance) == 0)
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
-    if is_uniform and torque.only_steps and plain:
+    if is_uniform and torque.only_steps and residuals.plain:
         interval_s = float(time_s[-1]) / (len(time_s) - 1)
-        return SeriesMisfit(gripper, model, torque, interval_s, rotation_rad)
-    return FormedMisfit(
-        gripper,
-        model,
-        torque,
-        time_s,
-        rotation_rad,
-        nonlinear=nonlinear,
-        inertia=inertia,
-        nuisance=np.zeros((0, len(time_s))) if nuisance is None else nuisance,
-    )
+        return SeriesMisfit(gripper, residuals.model, torque, interval_s, rotation_rad)
+    return residuals.condensed_misfit
 
 
 def together(misfits: Sequence[Misfit]) -> Misfits:

@@ -13,47 +13,10 @@ from biogrip.response.linear import phi_function
 _DECAYED = 40.0
 
 
-def responses_of_modes(
-    rates: NDArray[Any], torque: TorqueHistory, time_s: Array
-) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Superpose what every jump and sinusoid of the torque sets off in modes of unit weight.
-
-    Parameters
-    ----------
-    rates : (n_modes,)
-        In 1/s, real or complex.
-    torque
-        The protocol; decides the drives, see `drives`.
-    time_s : (n_times,)
-        Ascending times.
-
-    Returns
-    -------
-    growth, slope : (n_drives, n_modes, n_times)
-        The responses in N m, and their derivatives by the rate.
-    """
-    rate = rates[:, None]
-    shape = 2, 1 if torque.symmetric else 2, len(rates), len(time_s)
-    growth, slope = np.zeros(shape, dtype=rates.dtype)
-    for start, order, heights in torque.jumps:
-        first = time_s.searchsorted(start)
-        grown, slanted = _growth(order, rate, time_s[first:] - start)
-        height = heights[:, None, None]
-        growth[..., first:] += height * grown
-        slope[..., first:] += height * slanted
-    for start, omega, amplitudes in torque.swings:
-        first = time_s.searchsorted(start)
-        phasor = amplitudes[:, None, None]
-        swung = _swing(omega, rate, time_s[first:] - start, phasor)
-        growth[..., first:] += swung[0]
-        slope[..., first:] += swung[1]
-    return growth, slope
-
-
 def growth_of_modes(
     rates: NDArray[Any], torque: TorqueHistory, time_s: Array
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """As `responses_of_modes`, of the modes of n samples, at a cost that steps hardly add to.
+    """Responses of modes of unit weight to a protocol, and their derivatives by the rate.
 
     From step to step a mode is carried on: with G what it has done at the last step, T the
     torque since, and e the time since,
@@ -76,6 +39,7 @@ def growth_of_modes(
     Returns
     -------
     growth, slope : (n, n_drives, n_modes, n_times)
+        In N m, and N m s; of each of the `drives`.
     """
     n, m = rates.shape
     if not torque.only_steps:

@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.decay_table import DEGREE, WIDTH
-from biogrip.response.mode_growth import responses_of_modes
+from biogrip.response.mode_growth import growth_of_modes
 from biogrip.response.modes import Modes
 
 # As in `decay_table`, wide pieces of high degree need the fewest rates, short ones of low degree
@@ -67,8 +67,8 @@ class ModeRows:
         self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
         for piece in range(wide):
             u = WIDTH * (piece + _WIDE_NODES)
-            growth, _ = responses_of_modes(-np.expm1(u) / self._end_s, torque, time_s)
-            values = (growth / np.expm1(u)[:, None]) @ to_rows
+            growth, _ = growth_of_modes(-np.expm1(u)[None] / self._end_s, torque, time_s)
+            values = (growth[0] / np.expm1(u)[:, None]) @ to_rows
             short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
             here = slice(piece * _SHORTER, (piece + 1) * _SHORTER)
             self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)

@@ -10,21 +10,20 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
-from biogrip.response.every_sample import EverySample
 from biogrip.response.grip import Grip, grip_of
 from biogrip.response.linear import LEFT
 from biogrip.response.modes import modes_of
 from biogrip.response.nuisance import taken_out
-from biogrip.response.ringing import ringing_responses
 from biogrip.response.sensitivity import (
     corrections,
     differences,
+    linear_responses,
     rotation_and_sensitivity,
 )
 
-# Samples whose rows are formed at once, of the linear model and of what the nonlinear adds.
-_AT_ONCE, _FEW_AT_ONCE = 1000, 50
-# Samples of a trace whose derivatives are formed at once: more would be as much memory as all else.
+# Numbers in the rows that are formed at once, and samples whose corrections are.
+_AT_ONCE, _FEW_AT_ONCE = 100_000, 50
+# Samples of a trace whose derivatives are formed: more would be as much memory as all else.
 _SAMPLES_AT_ONCE = 100_000
 
 
@@ -38,11 +37,8 @@ class Residuals:
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
-        Of the protocol and the sampling times; knows what the instrument may have added, and
-        the colour of the noise. Residuals are white. Where every sample is a row, the arms'
-        inertia is simulated, too.
-    nonlinear
-        Whether to simulate the nonlinear model.
+        Of the protocol and the sampling times; knows whether the model is nonlinear, whether arms
+        ring, what the instrument may have added and the colour of the noise. Residuals are white.
     noise_rad
         Standard deviation of the noise; by default what neighbouring samples suggest.
     """
@@ -54,20 +50,19 @@ class Residuals:
         torque: TorqueHistory,
         time_s: Array,
         rotation_rad: Array,
-        condensed: Condensed | EverySample,
+        condensed: Condensed,
         *,
-        nonlinear: bool,
         noise_rad: float | None = None,
     ) -> None:
         self._gripper = gripper
         self.model = model
         self._torque = torque
         self._time_s = time_s
-        self.nonlinear = nonlinear
-        self._inertia = isinstance(condensed, EverySample)
+        self.nonlinear = condensed.nonlinear
         self._condensed = condensed
         self._rotation_rad = condensed.cleared(rotation_rad)
         self.samples = len(time_s)
+        self.peak_rad = float(np.max(np.abs(self._rotation_rad)))
         self.duration_s = float(time_s[-1])
         if noise_rad is None:
             noise_rad = noise_of(self._rotation_rad)
@@ -88,6 +83,13 @@ class Residuals:
         """Return the same trace for another model."""
         other = copy(self)
         other.model = model
+        return other
+
+    def without_inertia(self) -> "Residuals":
+        """Return the same trace for arms that do not ring."""
+        other = copy(self)
+        other._condensed = self._condensed.without_ringing
+        other.__dict__.pop("condensed_trace", None)
         return other
 
     def with_freedom(self, freedom: float) -> "Residuals":
@@ -116,7 +118,7 @@ class Residuals:
         return residual, self._condensed.cleared(sensitivity)
 
     def gradient(self, log_parameters: Array) -> tuple[Array, float]:
-        """Sum the residuals' squares, and find where they grow, a part of the samples at a time.
+        """Sum the squares of the residuals, and find where they grow, to all digits.
 
         Parameters
         ----------
@@ -133,14 +135,16 @@ class Residuals:
         if self.samples <= _SAMPLES_AT_ONCE:
             residual, sensitivity = self(log_parameters)
             return sensitivity @ residual, self._rms(residual)
-        residual = self.left(log_parameters)
-        # Of so many samples noise is white, and what clears them symmetric.
-        weights = self._condensed.cleared(residual)
-        gradient = sum(
-            self._simulated(log_parameters, self._time_s[some])[1] @ weights[some]
-            for some in parts(self.samples, _SAMPLES_AT_ONCE)
-        )
-        return np.asarray(gradient), self._rms(residual)
+        # So many are dense: their sums are those of nodes, to rounding.
+        condensed, (seen, rest) = self._condensed, self._trace_at_nodes
+        rotation, sensitivity = self._simulated(log_parameters, condensed.node_time_s)
+        rows = condensed.rows_of_nodes(np.vstack((rotation, sensitivity)))
+        residual = np.append(rows[0] - seen, rest)
+        return rows[1:] @ residual[:-1], self._rms(residual)
+
+    @cached_property
+    def _trace_at_nodes(self) -> tuple[Array, float]:
+        return self._condensed.nodes_of_trace(self._rotation_rad)
 
     def left(self, log_parameters: Array) -> Array:
         """Residuals alone, (n_samples,) in rad."""
@@ -154,32 +158,6 @@ class Residuals:
     def _rms(self, residual: Array) -> float:
         return float(np.linalg.norm(residual)) / np.sqrt(self.samples)
 
-    def condensed(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Rows with the residuals' sum of squares and its derivatives, some fifty of them.
-
-        Where samples are many and not dense, these are the residuals themselves.
-
-        Parameters
-        ----------
-        log_parameters : (n_parameters,)
-            Natural logarithms of the parameters in SI units.
-
-        Returns
-        -------
-        rows : (n_rows,)
-            In rad.
-        slopes : (n_parameters, n_rows)
-            In rad.
-        """
-        if isinstance(self._condensed, EverySample) or not self.condensable:
-            return self(log_parameters)
-        if self.nonlinear:
-            found = self.condensed_responses(log_parameters[None])[0]
-            return found[0] - self.condensed_trace, found[1:]
-        rotation, sensitivity = self._simulated(log_parameters, self._condensed.time_s)
-        to_rows = self._condensed.to_rows
-        return rotation @ to_rows - self.condensed_trace, sensitivity @ to_rows
-
     @property
     def freedom(self) -> float:
         """Degrees of freedom with which the colour of the noise is known."""
@@ -190,21 +168,13 @@ class Residuals:
         """Whether noise was not white, and has been made so."""
         return self._condensed.coloured
 
-    @property
-    def condensable(self) -> bool:
-        """Whether few rows may stand for all samples, or every sample has one."""
-        condensed = self._condensed
-        if isinstance(condensed, EverySample):
-            return True
-        return condensed.possible and (condensed.nonlinear or not self.nonlinear)
-
     @cached_property
     def condensed_trace(self) -> Array:
         """Rows of the trace, (n_rows,) in rad."""
         return self._condensed.of_trace(self._rotation_rad)
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Rows of the responses of many samples, the same as of `condensed` before the trace's.
+        """Rows of the responses of many samples.
 
         Parameters
         ----------
@@ -227,11 +197,17 @@ class Residuals:
     def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
         parameters, condensed, torque = np.exp(log_parameters), self._condensed, self._torque
-        if isinstance(condensed, EverySample):
-            rows = ringing_responses(
-                self._gripper, self.model, torque, self._time_s, parameters, slopes=slopes
+        if not condensed.reduced:
+            rotations = linear_responses(
+                self._gripper,
+                self.model,
+                torque,
+                condensed.time_s,
+                parameters,
+                inertia=self.inertia,
+                slopes=slopes,
             )
-            return condensed.cleared(rows)
+            return condensed.rows(rotations)
         modes = modes_of(
             self._gripper, self.model, parameters, symmetric=torque.symmetric, slopes=slopes
         )
@@ -253,10 +229,10 @@ class Residuals:
             self._gripper, self.model, self._torque, np.exp(log_parameters), slopes=slopes
         )
         condensed = self._condensed
-        if isinstance(condensed, EverySample):
-            values = np.where(found.converged[:, None], found.at(self._time_s), np.nan)
-            values = values.reshape(len(log_parameters), -1, self.samples)
-            return condensed.cleared(differences(values))
+        if not condensed.reduced:
+            values = np.where(found.converged[:, None], found.at(condensed.time_s), np.nan)
+            values = values.reshape(len(log_parameters), -1, len(condensed.time_s))
+            return condensed.rows(differences(values))
         values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
         # One product a sample: the order of its sums does not depend on how many there are.
         shape = len(log_parameters), -1, len(condensed.of_corrections)
@@ -277,14 +253,29 @@ class Residuals:
             In rad.
         """
         misfit = np.empty(len(parameters))
-        for some in parts(len(parameters), _AT_ONCE):
+        at_once = max(1, _AT_ONCE // len(self.condensed_trace))
+        for some in parts(len(parameters), at_once):
             responses = self.condensed_responses(np.log(parameters[some]), slopes=False)[:, 0]
             rows = responses - self.condensed_trace
             misfit[some] = np.sqrt(np.einsum("nr,nr->n", rows, rows) / self.samples)
-        return misfit
+        return np.where(np.isnan(misfit), np.inf, misfit)
+
+    @property
+    def inertia(self) -> bool:
+        """Whether the arms ring."""
+        return self._condensed.ringing_s > 0
+
+    @property
+    def plain(self) -> bool:
+        """Whether the model is linear, arms do not ring, and white noise alone is added."""
+        condensed = self._condensed
+        bare = not (condensed.coloured or len(condensed.nuisance))
+        return bare and not (self.nonlinear or self.inertia)
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Whether only the trace, and its noise, tell this from others."""
+        if type(self) is not type(other):
+            return False
         return self._assumed() == other._assumed() and self._condensed is other._condensed
 
     def _assumed(self) -> tuple[object, ...]:
@@ -298,7 +289,7 @@ class Residuals:
             time_s,
             np.exp(log_parameters),
             nonlinear=self.nonlinear,
-            inertia=self._inertia,
+            inertia=self.inertia,
         )
 
 

@@ -2,6 +2,8 @@
 
 Modes with their derivatives (`biogrip.response.modes`, with inertia
 `biogrip.response.ringing`) are superposed in time, and differentiated by hand there, too.
+Derivatives of what is small beside them are differences: of what the nonlinear model adds,
+and of the ring of arms on a springpot.
 """
 
 import numpy as np
@@ -10,15 +12,83 @@ from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.mode_growth import responses_of_modes
-from biogrip.response.modes import Modes, modes_of
+from biogrip.response.inertia import while_ringing
+from biogrip.response.linear import rotation, step_response
+from biogrip.response.modes import modes_of
 from biogrip.response.nonlinear import COARSE, Correction, correction
-from biogrip.response.ringing import ringing_responses
+from biogrip.response.ringing import responses_of, ringing_responses
 
 # The correction is of second order itself; its derivative by differences is good to 1e-6 of that.
 _STEP = 1e-3
+# A ring has hundreds of radians behind it when it ends: its differences have to be closer.
+_RINGING_STEP = 1e-5
 # Samples at a time: of a million, what the modes do would take more memory than all else.
 _AT_ONCE = 100_000
+
+
+def linear_responses(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    parameters: Array,
+    *,
+    inertia: bool,
+    slopes: bool = True,
+) -> Array:
+    """Rotations of the left arm on the linear model, and their derivatives d phi / d log p.
+
+    Parameters
+    ----------
+    gripper, model, torque
+        What is simulated.
+    time_s : (n_times,)
+        Ascending times.
+    parameters : (n, n_parameters)
+        All positive.
+    inertia
+        Whether the arms ring, for milliseconds after every change of the torque.
+    slopes
+        Whether the derivatives are wanted.
+
+    Returns
+    -------
+    (n, 1 + n_parameters, n_times)
+        In rad; without `slopes`, (n, 1, n_times).
+    """
+    if inertia and not model.power_law:
+        return ringing_responses(gripper, model, torque, time_s, parameters, slopes=slopes)
+    modes = modes_of(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
+    rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
+    for some in parts(len(time_s), _AT_ONCE):
+        rows[:, :, some] = responses_of(modes, torque, time_s[some])
+    if inertia and np.any(seen := while_ringing(gripper, torque, time_s)):
+        rows[..., seen] += _ring(gripper, model, torque, time_s[seen], parameters, slopes=slopes)
+    return rows
+
+
+def _ring(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    parameters: Array,
+    *,
+    slopes: bool,
+) -> Array:
+    """What inertia adds, with derivatives by differences; as of `linear_responses`."""
+    network = model.network(_around(parameters, _RINGING_STEP, slopes=slopes))
+    with_it, without = (
+        rotation(
+            step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia),
+            torque,
+            time_s,
+        )
+        for inertia in (True, False)
+    )
+    return _differences(
+        (with_it - without).reshape(len(parameters), -1, len(time_s)), _RINGING_STEP
+    )
 
 
 def rotation_and_sensitivity(
@@ -53,17 +123,11 @@ def rotation_and_sensitivity(
     sensitivity : (n_parameters, n_times)
         In rad.
     """
-    if inertia:
-        rows = ringing_responses(gripper, model, torque, time_s, parameters[None])[0]
-        phi, slopes = rows[0], rows[1:]
-    else:
-        modes = modes_of(gripper, model, parameters[None], symmetric=torque.symmetric)
-        rows = np.empty((1 + len(parameters), len(time_s)))
-        for some in parts(len(time_s), _AT_ONCE):
-            rows[:, some] = _mixed(modes, *responses_of_modes(modes.rates[0], torque, time_s[some]))
-        phi, slopes = rows[0], rows[1:]
+    sample = parameters[None]
+    rows = linear_responses(gripper, model, torque, time_s, sample, inertia=inertia)[0]
+    phi, slopes = rows[0], rows[1:]
     if nonlinear:
-        found = corrections(gripper, model, torque, parameters[None])
+        found = corrections(gripper, model, torque, sample)
         values = np.where(found.converged[:, None], found.at(time_s), np.nan)
         phi = phi + values[0]
         slopes = slopes + np.nan_to_num(differences(values[None])[0, 1:])
@@ -94,11 +158,7 @@ def corrections(
     Correction
         Of n (1 + 2 n_parameters) samples, see `differences`; without `slopes`, of n.
     """
-    count = parameters.shape[1]
-    steps = np.zeros((1, count))
-    if slopes:
-        steps = _STEP * np.concatenate((steps, _both_ways(count)))
-    around = (parameters[:, None] * np.exp(steps)).reshape(-1, count)
+    around = _around(parameters, _STEP, slopes=slopes)
     return correction(gripper, model.network(around), torque, COARSE)
 
 
@@ -113,24 +173,21 @@ def differences(values: Array) -> Array:
     -------
     (n, 1 + n_parameters, ...)
     """
-    slopes = (values[:, 1::2] - values[:, 2::2]) / (2 * _STEP)
+    return _differences(values, _STEP)
+
+
+def _differences(values: Array, step: float) -> Array:
+    slopes = (values[:, 1::2] - values[:, 2::2]) / (2 * step)
     return np.concatenate((values[:, :1], slopes), axis=1)
 
 
-def _both_ways(count: int) -> Array:
-    """Unit steps of each parameter, forward and back in turn."""
-    unit = np.eye(count)
-    return np.stack((unit, -unit), axis=1).reshape(-1, count)
-
-
-def _mixed(modes: Modes, growth: Array, slope: Array) -> Array:
-    """Weigh what the modes do; d(w g) = dw g + w dr dg/dr."""
-    weights, times = modes.weights[0], growth.shape[-1]
-    slanted = weights * modes.rate_slopes[0][:, None]
-    by_growth = np.concatenate((weights[None], modes.weight_slopes[0]))
-    by_slope = np.concatenate((np.zeros_like(weights)[None], slanted))
-    both = np.concatenate(
-        (by_growth.reshape(len(by_growth), -1), by_slope.reshape(len(by_slope), -1)), axis=1
-    )
-    rows: Array = both @ np.concatenate((growth, slope)).reshape(-1, times)
-    return rows
+def _around(parameters: Array, step: float, *, slopes: bool) -> Array:
+    """Each sample, and for slopes those with a parameter a little larger and smaller in turn."""
+    count = parameters.shape[1]
+    steps = np.zeros((1, count))
+    if slopes:
+        unit = np.eye(count)
+        both_ways = np.stack((unit, -unit), axis=1).reshape(-1, count)
+        steps = step * np.concatenate((steps, both_ways))
+    around: Array = (parameters[:, None] * np.exp(steps)).reshape(-1, count)
+    return around

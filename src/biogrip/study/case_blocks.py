@@ -60,15 +60,6 @@ class Equations:
         ),
     ]
     identification: Annotated[str, Key("The same for the model that is fitted.", choices=EQUATIONS)]
-    inertia: Annotated[
-        bool,
-        Key(
-            "Whether the model that is fitted has the arms' inertia, too, as targets always have: "
-            "the arms then ring for milliseconds after every change of the torque. Needed where "
-            "samples come that soon, see docs/design.md; it takes several times as long. By "
-            "default no."
-        ),
-    ] = False
 
 
 @dataclass(frozen=True)
@@ -268,10 +259,7 @@ class CaseBlock(Shared):
             yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _band_problems(self) -> Iterator[Problem]:
-        """Find times at which a springpot is none, and arms that ring beside one."""
-        if self.models.inertia:
-            text = f"does not go with {self.sample.model}; allowed are samples without a springpot."
-            yield ("models", "inertia"), text
+        """Find times at which a springpot is none."""
         if self.protocol.end_s > LONGEST_S:
             text = f"found a protocol of {self.protocol.end_s:g} s, allowed are at most"
             yield ("sample", "model"), f"{text} {LONGEST_S:g} s with {self.sample.model}."

@@ -183,15 +183,11 @@ class StudyConfig(Shared):
                 yield ("only", index), text + nearest(name, self.cases)
 
     def _band_problems(self) -> Iterator[Problem]:
-        """Find sample models that are none for as long as a protocol lasts, or beside ringing."""
+        """Find sample models that are none for as long as a protocol lasts."""
         longest = max(case.protocol.end_s for case in self.cases.values())
-        rings = any(case.models.inertia for case in self.cases.values())
         for index, name in enumerate(self.model_selection.models):
             if not CANDIDATES[name].model.power_law:
                 continue
-            if rings:
-                text = f"found {name}, which does not go with models.inertia."
-                yield ("model_selection", "models", index), text
             if longest > LONGEST_S:
                 text = f"found {name} and a protocol of {longest:g} s, allowed are at most"
                 yield ("model_selection", "models", index), f"{text} {LONGEST_S:g} s with it."

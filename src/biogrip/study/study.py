@@ -186,7 +186,6 @@ class Case:
             self.sample,
             self.fixed,
             nonlinear=self.block.models.identification == "nonlinear",
-            inertia=self.block.models.inertia,
             offset=measurement.offset or measurement.coloured,
             drift=measurement.drift or measurement.coloured,
             noise_rad=measurement.noise_rad,

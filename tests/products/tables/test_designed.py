@@ -21,7 +21,6 @@ only: [endothelial_cell]
 identifiability: {coverage_seeds: SEEDS}
 cases:
   endothelial_cell:
-    models: {inertia: true}
     protocol:
       phases: [{duration_s: 100.0, torque_Nm: 1.6e-9}, {duration_s: 100.0, torque_Nm: 4.0e-10}]
     measurement:
@@ -81,5 +80,8 @@ def test_seeds_beside_it(tmp_path: Path) -> None:
     assert row[10:12] == (75.0, 4)
 
 
-def test_the_default_study_has_none() -> None:
+def test_only_cases_that_are_sampled_in_bursts_have_such_experiments() -> None:
     assert settings(study_of()).cases == {}
+    assert list(settings(study_of(OVERLAY.replace("SEEDS", "0"))).cases) == ["endothelial_cell"]
+    seldom = OVERLAY[: OVERLAY.index("      bursts:")].replace("SEEDS", "0")
+    assert settings(study_of(seldom)).cases == {}

@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
-from biogrip.identifiability.profile import CERTAIN
+from biogrip.identifiability.likelihood import CERTAIN
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels

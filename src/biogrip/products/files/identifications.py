@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import significant
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import SINGLE_BRANCH, Parameter, SampleModel
 from biogrip.identify.answer import Identification
@@ -16,6 +17,9 @@ from biogrip.products.files.rows import RowFile, read_frame, write_rows
 
 if TYPE_CHECKING:
     import pandas as pd
+
+# Fewer than those in which two processors' ways to an optimum differ.
+_DIGITS = 8
 
 PATH = "results/identifications/{case}.csv"
 BATCHES = "results/identifications/{case}/{method}/{batch}.csv"
@@ -92,7 +96,7 @@ def write_identifications(path: Path, records: list[Record]) -> None:
 
 
 def write_histories(path: Path, records: list[Record]) -> None:
-    """Write one row a seed and generation as Parquet."""
+    """Write one row a seed and generation as Parquet, its numbers to eight significant digits."""
     write_tables(path, [_history(record) for record in records])
 
 
@@ -150,10 +154,12 @@ def _history(record: Record) -> Table:
             "seed": np.full(generations, record.seed, dtype=np.int64),
             "generation": np.arange(generations, dtype=np.int64),
             "evaluations": history.evaluations,
-            "best_misfit_rad": history.best_misfit,
-            "median_misfit_rad": history.median_misfit,
+            "best_misfit_rad": significant(history.best_misfit, _DIGITS),
+            "median_misfit_rad": significant(history.median_misfit, _DIGITS),
             **{
-                p.column: np.broadcast_to(values.get(p.name, 0.0), generations)
+                p.column: significant(
+                    np.broadcast_to(values.get(p.name, 0.0), generations), _DIGITS
+                )
                 for p in parameters_in_file(record.model)
             },
         },

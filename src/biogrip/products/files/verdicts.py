@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biogrip.digits import rounded
+from biogrip.digits import rounded, rounded_rise
 from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
@@ -75,6 +75,6 @@ def _finding(finding: "Finding") -> dict[str, Any]:
         "in_words": finding.words(),
         "profile": {
             "values": [rounded(float(value)) for value in np.exp(profile.log_values)],
-            "rises": [rounded(float(rise)) for rise in profile.rises],
+            "rises": [rounded_rise(float(rise)) for rise in profile.rises],
         },
     }

@@ -55,11 +55,11 @@ class ExploredCase:
     noise: Noise | None
     nonlinear: bool
 
-    @property
-    def closed_form(self) -> bool:
+    def closed_form(self, time_s: Array, rotation_rad: Array, noise_rad: float) -> bool:
         """Whether the page can compute responses: arms and torques are alike, and do not ring."""
-        alike = is_symmetric(self.problem.gripper, self.problem.torque)
-        return alike and not self.problem.inertia
+        problem = self.problem
+        alike = is_symmetric(problem.gripper, problem.torque)
+        return alike and not problem.shows_inertia(time_s, rotation_rad, noise_rad)
 
 
 @dataclass(frozen=True)
@@ -113,11 +113,12 @@ def _case(
     if case.noise is not None and target is not None:
         sigma = float(np.sqrt(np.mean(standard_deviation(target, case.noise) ** 2)))
     torque, gripper = problem.torque, problem.gripper
+    shown = next(iter(traces.values())) if target is None else target
     return {
         "name": case.name,
         "title": case.title,
         "model": model.title,
-        "closed_form": case.closed_form,
+        "closed_form": case.closed_form(time_s, shown, sigma),
         "nonlinear": case.nonlinear,
         "truth": _network(model, case.parameters),
         "elements": _elements(problem),

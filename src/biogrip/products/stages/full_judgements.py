@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.identifiability.many_profiles import profiles_of_many
-from biogrip.identifiability.profile import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import Finding
-from biogrip.identify.local_fit import local_fit, settled
+from biogrip.identify.multi_start import fit_from
 
 EVERY = 10
 """A seed that is a multiple of this is judged in full: its whole profiles."""
@@ -39,12 +39,11 @@ def refitted(likelihood: Likelihood, deeper: np.ndarray, confidence: float) -> L
     Likelihood or None
         Of the deeper optimum; None if there is none.
     """
-    fit = settled(likelihood.problem, local_fit(likelihood.problem, deeper))
-    if likelihood.rise(fit.misfit_rad) > -MISSED:
+    fit = fit_from([likelihood.problem], deeper)
+    misfit_rad = float(fit.misfit_rad[0])
+    if likelihood.rise(misfit_rad) > -MISSED:
         return None
-    return likelihood_of(
-        likelihood.problem, fit.log_parameters, fit.misfit_rad, confidence=confidence
-    )
+    return likelihood_of(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
 
 
 def shown_of(
@@ -52,7 +51,7 @@ def shown_of(
 ) -> Iterator[list[Shown]]:
     """Judge traces as `diagnose` does, quantity by quantity; all at once where that is possible."""
     current = list(likelihoods)
-    profiles = profiles_of_many(current, quantities, smooth=False)
+    profiles = profiles_of(current, quantities, smooth=False)
     for _ in range(_MOST_RESTARTS):
         lowest = [min(own, key=lambda each: float(each.rises.min())) for own in profiles]
         again = {
@@ -63,7 +62,7 @@ def shown_of(
         }
         if not again:
             break
-        renewed = profiles_of_many(list(again.values()), quantities, smooth=False)
+        renewed = profiles_of(list(again.values()), quantities, smooth=False)
         for (index, likelihood), own in zip(again.items(), renewed, strict=True):
             current[index], profiles[index] = likelihood, own
     for own in profiles:

@@ -12,14 +12,14 @@ from biogrip.experiment.noise import Noise, add_noise, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.fisher import covariance
-from biogrip.identifiability.many_limits import limits_and_deeper, limits_of
-from biogrip.identifiability.profile import Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import limits_and_deeper, limits_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.many_starts import fitted_from
 from biogrip.identify.methods import METHODS, best_fit, identifier
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
 from biogrip.products.files.intervals import INTERVALS
@@ -147,7 +147,7 @@ def _rows(
             known = np.tile(truth, (len(group), 1))
             if len(told):
                 simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
-                known[:, told] = fitted_from(simpler, truth[told])
+                known[:, told] = fit_from(simpler, truth[told]).x
             for index, seed in enumerate(group):
                 best = likelihoods[index].best
                 lines[seed] = _lines(chosen, best, limits[index], known[index])

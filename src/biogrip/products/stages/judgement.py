@@ -6,20 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.profile import MISSED
+from biogrip.identifiability.likelihood import MISSED
 from biogrip.identifiability.valley import valley_and_deeper
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.local_fit import local_fit, settled
 from biogrip.identify.methods import METHODS, best_fit
-from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.multi_start import fit_from, identify_from
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import TraceFit, trace_fit
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
@@ -151,9 +148,9 @@ def _diagnosed(
     told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
     valley, deeper = valley_and_deeper(told.likelihood, model)
     if deeper is not None:
-        fit = settled(problem, local_fit(problem, deeper))
-        if told.likelihood.rise(fit.misfit_rad) < -MISSED:
-            found = replace(found, parameters=np.exp(fit.log_parameters), misfit_rad=fit.misfit_rad)
+        again = found.at(fit_from([problem], deeper))
+        if told.likelihood.rise(again.misfit_rad) < -MISSED:
+            found = again
             told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
             valley, _ = valley_and_deeper(told.likelihood, model)
     return told, valley
@@ -182,7 +179,7 @@ def expect(
     time_s, _, rotation = read_target(target)
     noise_rad = rms(standard_deviation(rotation, settings.noise)) or None
     problem = posed.of(time_s, rotation, noise_rad=noise_rad)
-    found = fitted_from(problem, posed.logs(settings.parameters))
+    found = identify_from(problem, posed.logs(settings.parameters))
     told = diagnose(
         problem, posed.searched, found, confidence=settings.confidence, noise_rad=noise_rad
     )

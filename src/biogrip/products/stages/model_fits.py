@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES
-from biogrip.identify.answer import silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.least_squares import LeastSquaresSettings
+from biogrip.identify.methods import METHODS
+from biogrip.identify.nested_fits import fit_models
 from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, read_measurements
 from biogrip.products.plan import Plan, Wildcards
@@ -36,7 +38,7 @@ class Settings:
     study_seed: int
     case: str
     problem: CaseProblem
-    least_squares: object
+    least_squares: LeastSquaresSettings
     models: tuple[str, ...]
 
 
@@ -44,6 +46,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     """Choose what the fits of a case depend on."""
     case = study.case(job["case"])
     fits, models = case.method("least_squares"), study.models_of(case)
+    assert isinstance(fits, LeastSquaresSettings)
     problem = case.problem.to_identify(*(CANDIDATES[name].model for name in models))
     return Settings(study.study_seed, case.name, problem, fits, models)
 
@@ -79,21 +82,28 @@ def _rows(
     settings: Settings, posed: CaseProblem, seeds: Sequence[int], recorded: Measurements
 ) -> Iterator[tuple[str | int, ...]]:
     case, samples = settings.case, len(recorded.time_s)
-    identify = identifier("least_squares", settings.least_squares)
     progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in settings.models}
     for group in groups(seeds):
         traces = [posed.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
-        for name in settings.models:
-            model = CANDIDATES[name].model
-            problems = [posed.for_model(trace, model) for trace in traces]
-            rngs = [stream(settings.study_seed, case, seed, f"model {name}") for seed in group]
-            found = identify(problems, rngs, silent)
+        models = {name: CANDIDATES[name].model for name in settings.models}
+        found = fit_models(
+            {
+                name: [posed.for_model(trace, model) for trace in traces]
+                for name, model in models.items()
+            },
+            settings.least_squares,
+            {
+                name: [stream(settings.study_seed, case, seed, f"model {name}") for seed in group]
+                for name in models
+            },
+            partial(progress.done, len(group)),
+        )
+        for name, answers in found.items():
             rows[name] += [
-                (case, name, seed, len(model.names), samples, f"{answer.misfit_rad:.8e}")
-                for seed, answer in zip(group, found, strict=True)
+                (case, name, seed, len(models[name].names), samples, f"{answer.misfit_rad:.8e}")
+                for seed, answer in zip(group, answers, strict=True)
             ]
-            progress.done(len(group))
     for of_model in rows.values():
         yield from of_model
 

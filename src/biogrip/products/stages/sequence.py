@@ -16,13 +16,13 @@ from biogrip.design.told import Earlier, told_by
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
-from biogrip.identifiability.many_limits import limits_of
-from biogrip.identifiability.profile import MISSED, likelihood_of
+from biogrip.identifiability.likelihood import MISSED, likelihood_of
+from biogrip.identifiability.limits import limits_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import METHODS, best_fit
-from biogrip.identify.multi_start import fitted_from
+from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.plan import Plan, Wildcards
@@ -46,7 +46,7 @@ class Settings:
     study_seed, case
         Whose random streams.
     problem
-        What is identified, with inertia and known noise; its protocol is the first one.
+        What is identified, with known noise; its protocol is the first one.
     sampling
         Of the first experiment.
     wanted
@@ -109,7 +109,7 @@ def settings(study: Study, job: Wildcards) -> Settings:
     return Settings(
         study.study_seed,
         case.name,
-        replace(case.problem, inertia=True, noise_rad=asked.noise_rad),
+        replace(case.problem, noise_rad=asked.noise_rad),
         case.sampling,
         wanted_of(case),
         np.where(spread, low, as_in_config),
@@ -244,8 +244,8 @@ class _Cell:
                 noise_rad=each.noise_rad,
             )
             limits = limits_of([likelihood], quantities)[0]
-            deeper = fitted_from(each.problem, self._truth)
-            missed = int(likelihood.rise(deeper.misfit_rad) < -MISSED)
+            deeper = fit_from([each.problem], self._truth)
+            missed = int(likelihood.rise(float(deeper.misfit_rad[0])) < -MISSED)
             pressed = int(all(self._pressed(experiment) for experiment in done))
             head = settings.case, self._number, way, count
             for quantity, ends in zip(quantities, limits, strict=True):

@@ -1,29 +1,71 @@
-"""Profiles of all quantities of many traces at once.
+"""Profile likelihood: how well a trace can still be fitted with one quantity held.
 
-`biogrip.identifiability.profile.profile` for a batch. All points are fitted from the
+Of all quantities of many traces at once. All points are fitted from the
 optimum at once, then from the fits of both neighbours, again and again where these
-have become better: what is a basin anywhere in a profile is followed both ways.
+have become better: what is a basin anywhere in a profile is followed both ways. The
+limits are the outermost: what is between them need not all be within confidence,
+and where it is not is told as gaps.
+
+References
+----------
+.. [1] D. J. Venzon and S. H. Moolgavkar, A method for computing profile-likelihood-based
+   confidence intervals, Applied Statistics 37 (1988), 87-94.
+.. [2] A. Raue et al., Structural and practical identifiability analysis of partially observed
+   dynamical models by exploiting the profile likelihood, Bioinformatics 25 (2009), 1923-1929.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identifiability.confidence_set import gaps_of
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood, Profile, grid_of, profile, profile_of
+from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.smooth import Points, smoothed
-from biogrip.identify.local_fit import FAIR, FINE
-from biogrip.identify.many_fits import fit_together
+from biogrip.identify.local_fits import FAIR, FINE, alike
 
+# Steps away from the best fit, in standard deviations, that every profile has.
+_NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
+_POINTS = 35
+# Points closer than this are one.
+_APART = 1e-9
 _ACCURACY = 1e-5
 # Share of one more than the rise by which a fit has to become better to be news to its neighbours.
 _NEWS = 1e-3
 
 
-def many_profiles(
+@dataclass(frozen=True)
+class Profile:
+    """A profile and its confidence limits, as logarithms of the quantity.
+
+    Parameters
+    ----------
+    log_values, rises : (n_points,)
+        Ascending values, and the rise of chi^2 at each.
+    best
+        Value at the optimum.
+    low, high
+        Confidence limits; None where the trace does not close the profile.
+    lowest : (n_parameters,)
+        Log-parameters at the lowest rise, which is below zero if the optimum was missed.
+    gaps
+        Where, between points within confidence, the profile is above the threshold.
+    """
+
+    log_values: Array
+    rises: Array
+    best: float
+    low: float | None
+    high: float | None
+    lowest: Array
+    gaps: tuple[tuple[float, float], ...] = ()
+
+
+def profiles_of(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Follow quantities over their whole ranges, and find their confidence limits.
@@ -42,6 +84,26 @@ def many_profiles(
     list of list of Profile
         By trace, then by quantity.
     """
+    found: dict[int, list[Profile]] = {}
+    for group in alike([likelihood.problem for likelihood in likelihoods]):
+        own = _profiles_of_alike([likelihoods[index] for index in group], quantities, smooth=smooth)
+        found.update(zip(group.tolist(), own, strict=True))
+    return [found[index] for index in range(len(likelihoods))]
+
+
+def grid_of(likelihood: Likelihood, quantity: Quantity) -> Array:
+    """Values over a quantity's whole range, ascending: its best, denser near by, and both ends."""
+    low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
+    start = quantity.log(likelihood.best)
+    near = start + likelihood.deviation(quantity) * _NEAR
+    others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _POINTS)))
+    # Last bits must not make two points of an optimum that lies at an end.
+    return np.unique(np.append(others[np.abs(others - start) > _APART], start))
+
+
+def _profiles_of_alike(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool
+) -> list[list[Profile]]:
     fits = HeldFits(likelihoods, quantities)
     shape = (len(likelihoods), len(quantities))
     trace, which = (index.ravel() for index in np.indices(shape))
@@ -71,7 +133,7 @@ def many_profiles(
         smoothed(points, [[at for at in ends if at is not None] for ends in limits], fit)
     return [
         [
-            profile_of(
+            _profile_of(
                 points[index],
                 float(starts[index]),
                 limits[index],
@@ -87,18 +149,20 @@ def _or_none(limit: float) -> float | None:
     return None if np.isnan(limit) else limit
 
 
-def profiles_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Profile]:
-    """Profiles of one trace, see `profiles_of_many`."""
-    return profiles_of_many([likelihood], quantities)[0]
+Limits = tuple[float | None, float | None]
 
 
-def profiles_of_many(
-    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
-) -> list[list[Profile]]:
-    """Profiles as of `many_profiles`, one by one where `fit_together` does not agree."""
-    if likelihoods and fit_together([likelihood.problem for likelihood in likelihoods]):
-        return many_profiles(likelihoods, quantities, smooth=smooth)
-    return [[profile(each, quantity) for quantity in quantities] for each in likelihoods]
+def _profile_of(points: Points, best: float, limits: Limits, threshold: float) -> Profile:
+    """Put a profile together from its points."""
+    return Profile(
+        points.values,
+        points.rises,
+        best,
+        limits[0],
+        limits[1],
+        points.x[int(np.argmin(points.rises))],
+        gaps_of(points.values, points.rises, threshold),
+    )
 
 
 class _Points:

@@ -1,4 +1,4 @@
-"""Quantities held exactly in many fits at once, against fits one by one with SciPy."""
+"""Quantities held exactly in many fits at once, against SciPy's fits of all samples."""
 
 from dataclasses import replace
 
@@ -11,14 +11,16 @@ from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.many_limits import many_limits
-from biogrip.identifiability.many_profiles import many_profiles, profiles_of
-from biogrip.identifiability.profile import Likelihood, likelihood_of, profile
+from biogrip.identifiability.likelihood import Likelihood, likelihood_of
+from biogrip.identifiability.limits import limits_and_deeper, limits_of, near_limits
+from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
-from biogrip.identify.local_fit import FINE, local_fit
+from biogrip.identify.local_fits import FINE
+from biogrip.identify.multi_start import fit_from
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.definition import Held
 from tests.helpers.problems import GRIPPER, MODEL, TORQUE, identified, of_case, posed_for, run
+from tests.helpers.scipy_fits import scipy_fit
 
 LOW = np.full(4, -3.0)
 HIGH = np.full(4, 4.0)
@@ -48,26 +50,40 @@ def rest_fitted(likelihood: Likelihood, known: list[int], logs: list[float], sta
         low=np.delete(problem.low, known),
         high=np.delete(problem.high, known),
     )
-    return likelihood.rise(local_fit(rest, np.delete(start, known)).misfit_rad)
+    return likelihood.rise(scipy_fit(rest, np.delete(start, known)).misfit_rad)
 
 
 def values(quantities: list[Quantity], which: IntArray, x: Array) -> Array:
     return np.array([quantities[q].log(point) for q, point in zip(which, x, strict=True)])
 
 
-@pytest.mark.parametrize("branches", [1, 3])
-def test_points_are_moved_to_where_quantities_are_held(branches: int) -> None:
+BRANCHED = {branches: model_named("generalized_maxwell", branches) for branches in (1, 2, 3)}
+BURGERS = MODELS["burgers"]
+FORMS = {
+    "one branch": (BRANCHED[1], combinations_of(BRANCHED[1], [0, 1, 2])),
+    "two branches": (BRANCHED[2], parameters_and_sum(BRANCHED[2])[-1:]),
+    "three branches": (BRANCHED[3], combinations_of(BRANCHED[3], [0, 1, 4])),
+    "springs of burgers": (BURGERS, combinations_of(BURGERS, [0, 2])),
+    "spring and damper of burgers": (BURGERS, combinations_of(BURGERS, [0, 3])),
+}
+
+
+@pytest.mark.parametrize("alike", [True, False])
+@pytest.mark.parametrize("form", FORMS)
+def test_points_are_moved_to_where_quantities_are_held(form: str, alike: bool) -> None:
     """Within bounds, from anywhere, for targets all over the ranges and at their very ends."""
-    model = model_named("generalized_maxwell", branches)
-    quantities = [*parameters_and_sum(model), *combinations_of(model, [0, 1, branches + 1])]
-    low, high = np.full(len(model.names), -3.0), np.full(len(model.names), 4.0)
+    model, combined = FORMS[form]
+    quantities = [*parameters_and_sum(model), *combined]
+    low = np.full(len(model.names), -3.0)
+    high = np.full(len(low), 4.0) if alike else np.linspace(2.0, 5.0, len(low))
     ends = np.array([quantity.range(low, high) for quantity in quantities])
     rng = np.random.default_rng(0)
     which = rng.integers(len(quantities), size=3000)
     share = rng.choice([0.0, 1.0, *rng.uniform(size=8)], size=3000)
     targets = ends[which, 0] + share * (ends[which, 1] - ends[which, 0])
     held = HeldQuantities(quantities, which, targets, low, high, 400.0)
-    x = held.started(rng.uniform(low, high, (3000, len(low))))
+    # Points out of bounds are moved into them first.
+    x = held.started(np.clip(rng.uniform(low - 1, high + 1, (3000, len(low))), low, high))
     assert np.all((x >= low) & (x <= high))
     assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-6
     with pytest.raises(ValueError, match="outside its range"):
@@ -110,17 +126,16 @@ def test_a_sum_is_held_as_by_leaving_it_out() -> None:
     for shift in (-0.05, 0.02):
         target = total.log(likelihood.best) + shift
         one = np.zeros(1, dtype=np.int64)
-        rises, _ = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
-        starts = [total.moved(likelihood.best, target)]
-        starts.append(fits.at(one, one, np.array([target]), starts[0][None], FINE)[1][0])
-        alone = min(Held(likelihood, plain, target).fitted(start)[0] for start in starts)
+        rises, points = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
+        held = Held(likelihood, plain, target)
+        alone = min(held.fitted(start)[0] for start in (likelihood.best, points[0]))
         assert rises[0] == pytest.approx(alone, rel=1e-3, abs=5e-3)
 
 
 def test_limits_are_where_the_rise_equals_the_threshold() -> None:
     each = likelihoods("liquid_drop_2", 3)
     quantities = labelled("k", "c_p", "c + c_p")
-    limits = many_limits(each, quantities)
+    limits = near_limits(each, quantities)
     fits = HeldFits(each, quantities)
     trace, which, side = np.nonzero(np.isfinite(limits))
     rises, _ = fits.at(trace, which, limits[trace, which, side], fits.best[trace], FINE)
@@ -135,10 +150,30 @@ def test_limits_are_where_the_rise_equals_the_threshold() -> None:
 
 def test_limits_do_not_depend_on_the_batch() -> None:
     each, quantities = likelihoods("endothelial_cell", 4), labelled("k", "c + c_p")
-    together = many_limits(each, quantities)
+    together = near_limits(each, quantities)
     for chosen in ([2], [3, 0], [1, 3, 2]):
-        apart = many_limits([each[index] for index in chosen], quantities)
+        apart = near_limits([each[index] for index in chosen], quantities)
         np.testing.assert_array_equal(apart, together[chosen])
+
+
+def test_traces_of_any_experiments_are_judged_as_each_alone() -> None:
+    """Byte for byte, in their order; and whose optimum was missed is told by its place."""
+    cell, drop = likelihoods("endothelial_cell", 2), likelihoods("liquid_drop_2", 2)
+    away = drop[1].best + np.array([0.3, 0.0, 0.06, 0.0])
+    misfit_rad = float(drop[1].problem.misfit(np.exp(away)[None])[0])
+    drop[1] = replace(drop[1], best=away, misfit_rad=misfit_rad)
+    mixed, quantities = [drop[0], cell[0], cell[1], drop[1]], labelled("k", "c + c_p")
+    limits, deeper = limits_and_deeper(mixed, quantities)
+    assert list(deeper) == [3]
+    for own, likelihood in zip(limits, mixed, strict=True):
+        np.testing.assert_array_equal(limits_of([likelihood], quantities)[0], own)
+    for own, likelihood in zip(profiles_of(mixed, quantities, smooth=False), mixed, strict=True):
+        (alone,) = profiles_of([likelihood], quantities, smooth=False)
+        for one, other in zip(own, alone, strict=True):
+            assert (one.low, one.high, one.best) == (other.low, other.high, other.best)
+            np.testing.assert_array_equal(one.rises, other.rises)
+            np.testing.assert_array_equal(one.log_values, other.log_values)
+    assert profiles_of([], quantities) == []
 
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1"])
@@ -146,7 +181,7 @@ def test_profiles_are_as_low_as_fits_with_the_parameter_known(case: str) -> None
     """Against SciPy's from the optimum and from the profile's own fits."""
     (likelihood,) = likelihoods(case, 1)
     quantities = labelled("k", "c_p")
-    (profiles,) = many_profiles([likelihood], quantities)
+    (profiles,) = profiles_of([likelihood], quantities)
     for quantity, found in zip(quantities, profiles, strict=True):
         (index,) = quantity.members
         ends = likelihood.problem.low[index], likelihood.problem.high[index]
@@ -161,8 +196,8 @@ def test_limits_of_a_profile_are_those_near_the_optimum() -> None:
     """Where there is but one basin."""
     each = likelihoods("liquid_drop_2", 2)
     quantities = labelled("k", "c + c_p")
-    limits = many_limits(each, quantities)
-    for near, profiles in zip(limits, many_profiles(each, quantities), strict=True):
+    limits = near_limits(each, quantities)
+    for near, profiles in zip(limits, profiles_of(each, quantities), strict=True):
         ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
         np.testing.assert_allclose(ends, near, rtol=0, atol=1e-3)
 
@@ -182,9 +217,9 @@ def test_the_search_range_determines_no_combination() -> None:
     series = next(q for q in k_and_k_p if q.form == "series")
     # To first order it is known well enough to be looked at.
     assert told.likelihood.deviation(series) < 0.5
-    for one in (profile(told.likelihood, series), profiles_of(told.likelihood, [series])[0]):
-        assert one.low is None
-        assert one.high is not None
+    ((one,),) = profiles_of([told.likelihood], [series])
+    assert one.low is None
+    assert one.high is not None
     assert told.trades == []
     # With one spring as soft as it may be, and the other any, it is lower than any limit.
     soft, best = posed.low[0], told.likelihood.best
@@ -216,11 +251,13 @@ def test_a_model_with_one_parameter_has_a_profile() -> None:
         low=problem.low[3:],
         high=problem.high[3:],
     )
-    best = local_fit(posed, np.array([2.0]))
-    likelihood = likelihood_of(posed, best.log_parameters, best.misfit_rad, confidence=0.95)
+    best = fit_from([posed], np.array([2.0]))
+    misfit_rad = float(best.misfit_rad[0])
+    assert misfit_rad == pytest.approx(scipy_fit(posed, np.array([2.0])).misfit_rad, rel=1e-9)
+    likelihood = likelihood_of(posed, best.x[0], misfit_rad, confidence=0.95)
     quantities = parameters_and_sum(damper)
-    (limits,) = many_limits([likelihood], quantities)
-    alone = profile(likelihood, quantities[0])
+    (limits,) = near_limits([likelihood], quantities)
+    ((alone,),) = profiles_of([likelihood], quantities)
     ends = np.array([alone.low, alone.high], dtype=float)
     np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
 

@@ -1,7 +1,8 @@
-"""Local fits of many traces at once: same protocol, sampling times and model.
+"""Local fits on log-parameters within bounds, any number of them at once.
 
-`biogrip.identify.local_fit` for any number of traces and starting points as one
-array. To the last bit, a fit does not depend on which others are made with it.
+Of any number of traces with the same protocol, sampling times and model, from any number of
+starting points, as one array. To the last bit, a fit does not depend on which others are made
+with it.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,13 +16,31 @@ from biogrip.identify.levenberg_marquardt import (
     Minima,
     Normal,
     minimized,
+    together,
 )
-from biogrip.identify.local_fit import FINE, PRIOR_WIDTH
 from biogrip.identify.problem import Problem
 from biogrip.identify.refreshed_fits import minimized_with_refreshes
 
+PRIOR_WIDTH = 100.0
+"""Width in e-folds of the prior that every parameter has, about the middle of its range.
+
+Wherever the trace says anything at all it is without effect: it changes an
+estimate by the square of (standard deviation / 100 e-folds). A parameter of which
+the trace says nothing comes out in the middle of the range left to it, not where
+rounding errors leave it, which differs from processor to processor.
+"""
+
+ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-8
+"""Stop when a step lowers the sum of squares by less than this share.
+
+To tell basins apart; to know chi^2 of some thousand samples to 0.01; to be there.
+All are far above rounding, so that every machine stops at the same step.
+"""
+
+# Second derivatives of residuals are differences of exact first ones, so far apart.
+_APART = 1e-4
 # Numbers in the rows that are formed at once, where every sample has one.
-_AT_ONCE = 2_000_000
+_AT_ONCE = 1_000_000
 
 
 class Held(Constraint, Protocol):
@@ -34,25 +53,31 @@ class Held(Constraint, Protocol):
         """Normal equations with its own residuals in them."""
 
 
-def fit_together(problems: Sequence[Problem]) -> bool:
-    """Whether `ManyFits` can serve problems: few rows stand for all samples, the same for all."""
-    first = problems[0]
-    return all(
-        problem.residuals.condensable
-        and problem.residuals.shares_responses(first.residuals)
-        and np.array_equal(problem.low, first.low)
-        and np.array_equal(problem.high, first.high)
-        for problem in problems
-    )
+def alike(problems: Sequence[Problem]) -> list[IntArray]:
+    """Divide problems, by index, into groups that `LocalFits` can take together."""
+    groups: list[list[int]] = []
+    for index, problem in enumerate(problems):
+        for group in groups:
+            first = problems[group[0]]
+            if (
+                problem.residuals.shares_responses(first.residuals)
+                and np.array_equal(problem.low, first.low)
+                and np.array_equal(problem.high, first.high)
+            ):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return [np.array(group) for group in groups]
 
 
-class ManyFits:
+class LocalFits:
     """Fits to any of a number of traces.
 
     Parameters
     ----------
     problems
-        One a trace, with which `fit_together` has to agree.
+        One a trace; all have to be `alike`.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
@@ -64,7 +89,7 @@ class ManyFits:
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:
-        """Normal equations of the `Objective` of each fit.
+        """Normal equations of the residuals, in units of the noise, and the prior.
 
         Parameters
         ----------
@@ -75,6 +100,51 @@ class ManyFits:
         """
         return self._in_parts(self._residuals.condensed_responses, x, trace)
 
+    def curved(self, x: Array, trace: IntArray) -> Normal:
+        """Normal equations with all of the second derivatives, not only those of Gauss and Newton.
+
+        They leave out residuals times their second derivatives. Of these only the latter are
+        differences, so that where residuals vanish, their error does, too.
+        """
+        normals = []
+        numbers = 2 * x.shape[1] * (1 + x.shape[1]) * self._traces.shape[1]
+        for some in parts(len(x), max(1, _AT_ONCE // numbers)):
+            here, own = x[some], trace[some]
+            rows = self._residuals.condensed_responses(here)
+            normals.append(self._normal_of(rows, here, own))
+            normals[-1].information += self._second(rows[:, 0], here, own)
+        return together(normals)
+
+    def _second(self, residual: Array, x: Array, trace: IntArray) -> Array:
+        """Residuals times their second derivatives, in units of the noise."""
+        count, parameters = x.shape
+        both_ways = _APART * np.concatenate((np.eye(parameters), -np.eye(parameters)))
+        around = (x[:, None] + both_ways).reshape(-1, parameters)
+        slopes = self._residuals.condensed_responses(around)[:, 1:]
+        ahead, behind = slopes.reshape(count, 2, parameters * parameters, -1).swapaxes(0, 1)
+        # One product a fit: the order of its sums does not depend on how many there are.
+        second = ((ahead - behind) @ residual[:, :, None])[:, :, 0] / (2 * _APART)
+        second = second.reshape(count, parameters, parameters)
+        second /= (self._noise_rad[trace] ** 2)[:, None, None]
+        return 0.5 * (second + second.swapaxes(1, 2))
+
+    def on_all_samples(self, x: Array, trace: IntArray) -> Normal:
+        """Sums of squares and gradients on all samples, to all digits; no information."""
+        found = [
+            self.problems[own].residuals.gradient(point)
+            for point, own in zip(x, trace.tolist(), strict=True)
+        ]
+        gradients, misfits = zip(*found, strict=True)
+        misfit_rad, noise_rad = np.array(misfits), self._noise_rad[trace]
+        away = (x - self._middle) / PRIOR_WIDTH
+        square_sum = self._residuals.samples * (misfit_rad / noise_rad) ** 2
+        return Normal(
+            np.where(np.isnan(misfit_rad), np.inf, square_sum + np.sum(away**2, axis=1)),
+            np.array(gradients) / noise_rad[:, None] ** 2 + away / PRIOR_WIDTH,
+            np.empty((*x.shape, 0)),
+            misfit_rad,
+        )
+
     def _in_parts(
         self, rows_of: Callable[..., Array], x: Array, trace: IntArray, *beside: Array
     ) -> Normal:
@@ -82,12 +152,14 @@ class ManyFits:
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
         if len(x) <= size:
             return self._normal_of(rows_of(x, *beside), x, trace)
-        normals = [
-            self._normal_of(rows_of(x[some], *(row[some] for row in beside)), x[some], trace[some])
-            for some in parts(len(x), size)
-        ]
-        found = zip(*(normal.parts for normal in normals), strict=True)
-        return Normal(*(np.concatenate(part) for part in found))
+        return together(
+            [
+                self._normal_of(
+                    rows_of(x[some], *(row[some] for row in beside)), x[some], trace[some]
+                )
+                for some in parts(len(x), size)
+            ]
+        )
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
         """Normal equations, given rows of the responses; infinitely bad where these are none."""

@@ -1,7 +1,7 @@
 """Confidence limits of the optimum's own basin, for all quantities of many traces at once.
 
-`biogrip.identifiability.profile.limits_near` for a batch. To the last bit, the
-limits for a trace do not depend on which others there are.
+To the last bit, the limits for a trace do not depend on which others there are. Where
+that basin leads over into a lower one, they are the limits of both.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
-from biogrip.identifiability.profile import Likelihood, limits_near
+from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.many_fits import fit_together
+from biogrip.identify.local_fits import alike
 
 # Limits to a thousandth of a standard deviation.
 _ACCURACY = 1e-3
@@ -21,7 +21,7 @@ _ACCURACY = 1e-3
 _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
 
 
-def many_limits(
+def near_limits(
     likelihoods: Sequence[Likelihood],
     quantities: Sequence[Quantity],
     tolerance: float = CLOSE,
@@ -33,11 +33,11 @@ def many_limits(
     Parameters
     ----------
     likelihoods
-        One a trace.
+        One a trace; their problems have to be `alike`.
     quantities
         Whose limits are wanted.
     tolerance
-        Of the fits, see `local_fit`.
+        Of the fits, see `biogrip.identify.local_fits`.
     accuracy
         Of the square root of the rise.
     fits
@@ -92,27 +92,37 @@ def many_limits(
 
 
 def limits_of(likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> Array:
-    """Limits as of `many_limits`, one by one where `fit_together` does not agree."""
+    """Limits as of `limits_and_deeper`."""
     return limits_and_deeper(likelihoods, quantities)[0]
 
 
 def limits_and_deeper(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> tuple[Array, dict[int, Array]]:
-    """Limits as of `limits_of`, and what is deeper than the optima that they are about.
+    """Find limits, and what is deeper than the optima that they are about.
+
+    Parameters
+    ----------
+    likelihoods
+        One a trace, of any number of experiments.
+    quantities
+        Whose limits are wanted.
 
     Returns
     -------
     limits : (n_traces, n_quantities, 2)
-        As of `many_limits`.
+        As of `near_limits`.
     deeper
         By trace, log-parameters whose chi^2 is clearly below that of its optimum, so that
-        this was missed; one by one, nothing is known of that.
+        this was missed.
     """
-    if quantities and fit_together([likelihood.problem for likelihood in likelihoods]):
-        fits = HeldFits(likelihoods, quantities)
-        limits = many_limits(likelihoods, quantities, fits=fits)
-        return limits, {trace: x for trace, (_, x) in fits.deeper.items()}
-    found = [[limits_near(each, quantity) for quantity in quantities] for each in likelihoods]
-    shape = (len(likelihoods), len(quantities), 2)
-    return np.array(found, dtype=float).reshape(shape), {}
+    limits = np.empty((len(likelihoods), len(quantities), 2))
+    deeper: dict[int, Array] = {}
+    if not quantities:
+        return limits, deeper
+    for group in alike([likelihood.problem for likelihood in likelihoods]):
+        own = [likelihoods[index] for index in group]
+        fits = HeldFits(own, quantities)
+        limits[group] = near_limits(own, quantities, fits=fits)
+        deeper.update({int(group[trace]): x for trace, (_, x) in fits.deeper.items()})
+    return limits, deeper
