@@ -7,7 +7,7 @@ from biogrip.arrays import Array
 # Far more than is determined, far fewer than those in which processors differ.
 _DIGITS = 5
 # Fits know chi^2 to 0.001; in what lies below, processors may differ.
-_RISE_DECIMALS = 4
+_RISE_DECIMALS = 2
 
 # Powers of ten as Python reads them: a processor may compute others.
 _LARGEST = 300

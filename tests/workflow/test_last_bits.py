@@ -80,6 +80,7 @@ def make(folder: Path, environment: dict[str, str]) -> None:
         batch = ["--case", case, "--batch", SEEDS]
         calls += [["make", "target", "--case", case], ["make", "measurement", *batch]]
         calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
+        calls += [["make", "judgement", "--case", case], ["make", "model_fits", *batch]]
         calls.append(["make", "identifications", "errors", "--case", case])
     python_path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     environment = {**environment, "PYTHONPATH": python_path}
@@ -103,11 +104,12 @@ def files_of(study: Path) -> dict[str, bytes]:
         *(results / "targets").glob("*.csv"),
         *(results / "measurements").glob("*/*.parquet"),
         *(results / "identifications").glob("**/*.csv"),
-        # The way to an optimum may differ in its last digits; its end may not.
-        *(results / "histories").glob("*/genetic/*.parquet"),
+        *(results / "histories").glob("*/*/*.parquet"),
+        *(results / "identifiability").glob("*.json"),
+        *(results / "selection").glob("*/*.csv"),
         *(results / "tables").glob("errors_*.*"),
     ]
-    assert len(found) == len(CASES) * (1 + 1 + 1 + len(METHODS) + 1 + 4)
+    assert len(found) == len(CASES) * (1 + 1 + 1 + 2 * len(METHODS) + 1 + 1 + 4)
     return {str(path.relative_to(results)): path.read_bytes() for path in found}
 
 
