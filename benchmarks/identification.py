@@ -10,10 +10,9 @@ from benchmarks.batch import BATCH, in_batch
 from benchmarks.genetic_peers import Task, by_deap, by_pygad, by_pymoo
 from benchmarks.misfit import by_lsim
 from benchmarks.section import Row, Section, number, times_ours
-from benchmarks.setup import NEAR_NOISE, problem
+from benchmarks.setup import NEAR_NOISE, evolved, problem
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, IntArray
-from biogrip.identify.genetic import evolve
 
 OURS, SIDE_BY_SIDE = "biogrip", f"biogrip, {BATCH} traces side by side"
 DEAP, PYGAD, PYMOO = "DEAP, as documented", "PyGAD, as documented", "pymoo, as documented"
@@ -42,9 +41,7 @@ Identifier = Callable[[Task, int], tuple[IntArray | Array, float]]
 
 def by_biogrip(task: Task, seed: int) -> tuple[Array, float]:
     """Run this project's algorithm; parameters in place of a chromosome."""
-    answer = evolve(
-        task.misfit, task.genome, task.settings, np.random.default_rng(seed)
-    ).identification
+    answer = evolved(task.misfit, task.genome, task.settings, np.random.default_rng(seed))
     return answer.parameters, answer.misfit_rad
 
 

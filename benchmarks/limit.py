@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.batch import BATCH
 from benchmarks.section import Row, Section, number
-from benchmarks.setup import Problem, problem
+from benchmarks.setup import Problem, evolved, problem
 from benchmarks.starts import Started, fitted, started
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array, IntArray
-from biogrip.identify.genetic import evolve, evolve_many
+from biogrip.identify.genetic import evolve_many
 from biogrip.response.decay_table import DecayTable
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.mode_rows import ModeRows
@@ -168,7 +168,7 @@ def _shares(p: Problem) -> list[Row]:
         misfit_s += misfit.misfit_s
     for seed in range(_NONLINEAR_SEEDS):
         rng = np.random.default_rng(seed)
-        nonlinear_s += clocked(partial(evolve, nonlinear_watched, p.genome, p.genetic, rng))[0]
+        nonlinear_s += clocked(partial(evolved, nonlinear_watched, p.genome, p.genetic, rng))[0]
     return [
         _row("identification", 1e3 * whole_s / _SEEDS, "ms"),
         _row("of which sums over the trace", 100 * sums_s / whole_s, "%"),

@@ -13,7 +13,7 @@ from benchmarks.starts import fitted, started
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 
@@ -63,8 +63,8 @@ def compared(problems: Sequence[Problem], rounds: int) -> list[Row]:
     best = fit.minimize()
     from_optimum = multi_start(posed, likelihood.best[None])
     ways: dict[str, Callable[[], Array]] = {
-        OURS: lambda: near_limits([likelihood], quantities)[0],
-        SIDE_BY_SIDE: lambda: near_limits(likelihoods, quantities)[0],
+        OURS: lambda: limits_and_deeper([likelihood], quantities)[0][0],
+        SIDE_BY_SIDE: lambda: limits_and_deeper(likelihoods, quantities)[0][0],
         WHOLE: partial(_whole, likelihood, quantities),
         LMFIT: partial(lmfit_limits, fit, best, which),
         PYPESTO: partial(pypesto_limits, *from_optimum, which),

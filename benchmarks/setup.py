@@ -11,6 +11,8 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
 from biogrip.experiment.sample import SampleModel, model_named
+from biogrip.identify.answer import Identification
+from biogrip.identify.genetic import evolve_many
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.identify.problem import Problem as Posed
@@ -18,7 +20,7 @@ from biogrip.identify.problem import problem_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import misfit_of
+from biogrip.response.misfit import Misfit, misfit_of, together
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
 from biogrip.study.load import load_study
@@ -95,6 +97,13 @@ class Problem:
     def population(self, count: int = POPULATION) -> Array:
         """Samples drawn uniformly from the search range, shape (count, n_parameters)."""
         return self.genome.decode(self.genome.draw(count, np.random.default_rng(1)))
+
+
+def evolved(
+    misfit: Misfit, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
+) -> Identification:
+    """Run our genetic algorithm on any misfit of parameters of shape (n, n_parameters)."""
+    return evolve_many(together([misfit]), genome, settings, [rng])[0].identification
 
 
 def problem(

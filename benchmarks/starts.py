@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.setup import Problem, posed_together
 from biogrip.arrays import Array
-from biogrip.identify.answer import silent
-from biogrip.identify.multi_start import Row, best_of_starts, screened
+from biogrip.identify.answer import Row, silent
+from biogrip.identify.multi_start import best_of_starts, screened
 from biogrip.identify.problem import Problem as Posed
 from biogrip.response.condensed import Condensed
 

@@ -20,14 +20,13 @@ from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.sampling_gap import feasible, gap_of, typical_bound
 from benchmarks.scale import watched as watched_processes
 from benchmarks.section import Section, number, renewed
-from benchmarks.setup import CONFIG, Problem, problem
+from benchmarks.setup import CONFIG, Problem, evolved, problem
 from benchmarks.starts import fitted, started
 from benchmarks.study import by_rule, in_order, processor_s
 from benchmarks.timing import Timed, alternate, time_to_success
 from biogrip.arrays import Array, IntArray
 from biogrip.design.criteria import Criterion
 from biogrip.design.sampling import best_sampling
-from biogrip.identify.genetic import evolve
 from biogrip.identify.genome import Genome
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nonlinear import nonlinear_rotation
@@ -176,7 +175,7 @@ def test_traces_side_by_side_reach_what_they_reach_alone(noisy: Problem) -> None
     settings = replace(noisy.genetic, population=40, survivors=20, max_generations=8)
     problems = [noisy, problem(1)]
     alone = [
-        evolve(p.misfit(), p.genome, settings, np.random.default_rng(seed)).identification
+        evolved(p.misfit(), p.genome, settings, np.random.default_rng(seed))
         for seed, p in enumerate(problems)
     ]
     assert in_batch(problems, settings) == [answer.misfit_rad for answer in alone]

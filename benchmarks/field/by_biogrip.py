@@ -10,7 +10,7 @@ from benchmarks.field.elements import Maxwell
 from benchmarks.field.fitted import Fitted, Limits, Method
 from benchmarks.field.traces import Trace
 from biogrip.identifiability.likelihood import likelihood_of
-from biogrip.identifiability.limits import limits_of
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.library import Identification, identify_sample
 
@@ -34,7 +34,7 @@ def _limits(trace: Trace, found: Identification) -> Limits:
         problem, np.log(found.parameters), found.misfit_rad, confidence=CONFIDENCE
     )
     quantities = [q for q in parameters_and_sum(model) if q.label in model.names]
-    low, high = limits_of([likelihood], quantities)[0].T
+    low, high = limits_and_deeper([likelihood], quantities)[0][0].T
     ends = np.nan_to_num(np.exp(low), nan=-np.inf), np.nan_to_num(np.exp(high), nan=np.inf)
     limits = {q.label: (float(a), float(b)) for q, a, b in zip(quantities, *ends, strict=True)}
     value = dict(zip(model.names, found.parameters, strict=True))

@@ -13,7 +13,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
@@ -59,7 +59,7 @@ def misses(
     rng = np.random.default_rng(0)
     starts, steps = effort
     (profiles,) = profiles_of([likelihood], quantities)
-    (near,) = near_limits([likelihood], quantities)
+    (near,) = limits_and_deeper([likelihood], quantities)[0]
     for quantity, found, limits in zip(quantities, profiles, near, strict=True):
         for limit in (found.low, found.high):
             if limit is not None:

@@ -17,7 +17,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -151,7 +151,7 @@ def _likelihood(problem: Problem, found: Identification) -> Likelihood:
 def _held(
     likelihood: Likelihood, every: Sequence[Quantity], truth: Array
 ) -> list[tuple[float, bool]]:
-    (limits,) = near_limits([likelihood], every)
+    (limits,) = limits_and_deeper([likelihood], every)[0]
     low, high = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
     logs = np.array([quantity.log(truth) for quantity in every])
     held = (low <= logs) & (logs <= high)

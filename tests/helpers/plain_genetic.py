@@ -16,6 +16,16 @@ def chromosomes_of(genome: Genome, codes: IntArray) -> IntArray:
     return digits + genome.low
 
 
+def decoded(genome: Genome, chromosomes: IntArray) -> Array:
+    """Parameters of chromosomes, read as decimal numbers."""
+    columns = np.split(chromosomes.T, np.cumsum(genome.sizes)[:-1])
+    return np.array([[_number(*genes) for genes in own.T.tolist()] for own in columns]).T
+
+
+def _number(exponent: int, *digits: int) -> float:
+    return float(f"{''.join(map(str, digits))}e{exponent - len(digits)}")
+
+
 def identified(
     misfit: Callable[[Array], Array],
     genome: Genome,
@@ -23,7 +33,7 @@ def identified(
     rng: np.random.Generator,
 ) -> Identification:
     def ranked(everyone: IntArray) -> tuple[IntArray, Array]:
-        ranking = misfit(genome.decode(everyone)).astype(np.float32)
+        ranking = misfit(decoded(genome, everyone)).astype(np.float32)
         order = np.lexsort((*everyone.T[::-1], ranking))[: settings.survivors]
         return everyone[order], ranking[order].astype(float)
 
@@ -46,7 +56,7 @@ def identified(
     best, lowest, median = map(np.array, zip(*rows, strict=True))
     offspring = settings.population - settings.survivors
     counts = settings.population + offspring * np.arange(len(rows))
-    history = History(lowest, median, genome.decode(best), counts)
+    history = History(lowest, median, decoded(genome, best), counts)
     return Identification(
         history.best_parameters[-1], float(lowest[-1]), generation, int(counts[-1]), reason, history
     )

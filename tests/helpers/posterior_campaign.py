@@ -68,7 +68,7 @@ def drawn(number: int, settings: PosteriorSettings = SETTINGS) -> Draw:
     samples = found.log_parameters.reshape(-1, len(low))
     ranks = [np.mean(q.logs(samples) < q.log(truth[0])) for q in QUANTITIES]
     # The prior is uniform, so that this orders samples as the likelihood does.
-    ranks.append(np.mean(found.log_density < posterior.log_density(truth)[0]))
+    ranks.append(np.mean(posterior.log_density(samples) < posterior.log_density(truth)[0]))
     return Draw(np.array(ranks), found.convergence.reached)
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.identifiability.confidence_set import gaps_of
 from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.limits import limits_and_deeper
-from biogrip.identifiability.profiles import Profile, profiles_of
+from biogrip.identifiability.points import Points
+from biogrip.identifiability.profiles import Profile, gaps_of, profiles_of
 from biogrip.identifiability.quantities import parameters_and_sum
-from biogrip.identifiability.smooth import Points, smoothed
 from biogrip.identifiability.verdicts import Finding
 from biogrip.products.stages.full_judgements import refitted, shown_of
 from tests.helpers.limits_campaign import likelihood_for
@@ -44,15 +44,25 @@ def test_a_verdict_names_its_gaps() -> None:
     assert words[1] == "determined: 7.39 N/m (0.0498 to 20.1), except 0.368 to 2.72 N/m"
 
 
+class Parabolas(HeldFits):
+    """Fits that stay where they start."""
+
+    def __init__(self) -> None:
+        self.best, self.at_best = np.zeros((1, 1)), np.array([2.0])
+
+    def at(
+        self, profile: IntArray, targets: Array, near: Array, tolerance: float
+    ) -> tuple[Array, Array]:
+        """Rises of the parabolas."""
+        return parabolas(targets), near
+
+
 def test_points_are_added_until_a_curve_can_be_drawn() -> None:
     """And at the limits, where a curve has to cross the threshold."""
-
-    def fit(_: IntArray, targets: Array, starts: Array) -> tuple[Array, Array]:
-        return parabolas(targets), starts
-
-    values = np.linspace(-5, 5, 6)
-    points = Points(values, parabolas(values), values[:, None])
-    smoothed([points], [[-3.0, 3.1]], fit)
+    values = np.array([-5.0, -3.0, -1.0, 1.0, 2.0, 3.0, 5.0])
+    points = Points(Parabolas(), [values])
+    points.from_optimum()
+    points.smooth(np.array([[-3.0, 3.1]]))
     assert {-3.0, 3.1} <= set(points.values)
     assert np.all(np.diff(points.values) > 0)
     np.testing.assert_allclose(points.rises, parabolas(points.values))

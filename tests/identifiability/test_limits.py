@@ -11,7 +11,7 @@ import pytest
 from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.limits import limits_of as limits_near
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.local_fits import FINE
@@ -47,7 +47,7 @@ def test_the_name_of_a_trace_changes_no_limit() -> None:
     likelihoods = [example(name) for name in NAMES]
     best = np.array([likelihood.best for likelihood in likelihoods])
     assert np.ptp(best, axis=0).max() < 1e-7
-    fast = limits_near(likelihoods, QUANTITIES)
+    fast = limits_and_deeper(likelihoods, QUANTITIES)[0]
     assert differences(fast).max() < ALIKE
     away = np.abs(best - best[0]).max(axis=1)
     two = QUANTITIES[0], QUANTITIES[4]
@@ -90,7 +90,7 @@ def test_a_held_fit_is_scipys(label: str) -> None:
     fits, one = HeldFits([likelihood], [quantity]), np.zeros(1, dtype=np.int64)
     for away in (-0.3, 0.1):
         target = quantity.log(likelihood.best) + away
-        (rise,), (x,) = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
+        (rise,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         assert quantity.log(x) == pytest.approx(target, abs=1e-11)
         scipys, _ = Held(likelihood, quantity, target).fitted(likelihood.best)
         assert rise == pytest.approx(scipys, abs=0.02)

@@ -12,7 +12,7 @@ from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper, limits_of, near_limits
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, combinations_of, parameters_and_sum
 from biogrip.identify.local_fits import FINE
@@ -95,9 +95,8 @@ def test_held_values_are_attained_to_rounding() -> None:
     quantities = [*PARAMETERS, *COMBINATIONS]
     fits = HeldFits([likelihood], quantities)
     which = np.repeat(np.arange(len(quantities)), 5)
-    targets = fits.at_best()[0, which] + np.tile([-1.0, -0.1, 0.01, 0.1, 1.0], len(quantities))
-    trace = np.zeros(len(which), dtype=np.int64)
-    rises, x = fits.at(trace, which, targets, fits.best[trace], FINE)
+    targets = fits.at_best[which] + np.tile([-1.0, -0.1, 0.01, 0.1, 1.0], len(quantities))
+    rises, x = fits.at(which, targets, fits.best[which], FINE)
     assert np.all(rises > -1e-3)
     assert np.max(np.abs(values(quantities, which, x) - targets)) < 1e-9
 
@@ -107,11 +106,10 @@ def test_a_held_parameter_is_a_known_parameter(case: str) -> None:
     """Against SciPy's fit of a model in which the parameter is fixed."""
     (likelihood,) = likelihoods(case, 1)
     problem, fits = likelihood.problem, HeldFits([likelihood], PARAMETERS)
-    trace = np.zeros(12, dtype=np.int64)
     which = np.repeat(np.arange(4), 3)
     targets = likelihood.best[which] + np.tile([-1.5, -0.3, 0.7], 4)
     targets = np.clip(targets, problem.low[which], problem.high[which])
-    rises, x = fits.at(trace, which, targets, fits.best[trace], FINE)
+    rises, x = fits.at(which, targets, fits.best[which], FINE)
     for index, target, rise, point in zip(which, targets, rises, x, strict=True):
         alone = rest_fitted(likelihood, [int(index)], [float(target)], point)
         assert rise == pytest.approx(alone, abs=2e-3, rel=1e-5)
@@ -126,7 +124,7 @@ def test_a_sum_is_held_as_by_leaving_it_out() -> None:
     for shift in (-0.05, 0.02):
         target = total.log(likelihood.best) + shift
         one = np.zeros(1, dtype=np.int64)
-        rises, points = fits.at(one, one, np.array([target]), likelihood.best[None], FINE)
+        rises, points = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         held = Held(likelihood, plain, target)
         alone = min(held.fitted(start)[0] for start in (likelihood.best, points[0]))
         assert rises[0] == pytest.approx(alone, rel=1e-3, abs=5e-3)
@@ -135,24 +133,26 @@ def test_a_sum_is_held_as_by_leaving_it_out() -> None:
 def test_limits_are_where_the_rise_equals_the_threshold() -> None:
     each = likelihoods("liquid_drop_2", 3)
     quantities = labelled("k", "c_p", "c + c_p")
-    limits = near_limits(each, quantities)
+    limits = limits_and_deeper(each, quantities)[0]
     fits = HeldFits(each, quantities)
-    trace, which, side = np.nonzero(np.isfinite(limits))
-    rises, _ = fits.at(trace, which, limits[trace, which, side], fits.best[trace], FINE)
-    threshold = np.array([likelihood.threshold for likelihood in each])[trace]
+    ends = limits.reshape(-1, 2)
+    profile, side = np.nonzero(np.isfinite(ends))
+    rises, _ = fits.at(profile, ends[profile, side], fits.best[profile], FINE)
+    threshold = np.repeat([likelihood.threshold for likelihood in each], len(quantities))[profile]
     np.testing.assert_allclose(np.sqrt(rises), np.sqrt(threshold), rtol=0, atol=3e-3)
     # Determined are k and the sum; c_p is bounded from above only.
     assert np.all(np.isfinite(limits[:, [0, 2]]))
     assert np.all(np.isnan(limits[:, 1, 0]))
-    assert np.all(limits[:, [0, 2], 0] < fits.at_best()[:, [0, 2]])
-    assert np.all(limits[:, [0, 2], 1] > fits.at_best()[:, [0, 2]])
+    at_best = fits.at_best.reshape(3, 3)[:, [0, 2]]
+    assert np.all(limits[:, [0, 2], 0] < at_best)
+    assert np.all(limits[:, [0, 2], 1] > at_best)
 
 
 def test_limits_do_not_depend_on_the_batch() -> None:
     each, quantities = likelihoods("endothelial_cell", 4), labelled("k", "c + c_p")
-    together = near_limits(each, quantities)
+    together = limits_and_deeper(each, quantities)[0]
     for chosen in ([2], [3, 0], [1, 3, 2]):
-        apart = near_limits([each[index] for index in chosen], quantities)
+        apart = limits_and_deeper([each[index] for index in chosen], quantities)[0]
         np.testing.assert_array_equal(apart, together[chosen])
 
 
@@ -166,10 +166,11 @@ def test_traces_of_any_experiments_are_judged_as_each_alone() -> None:
     limits, deeper = limits_and_deeper(mixed, quantities)
     assert list(deeper) == [3]
     for own, likelihood in zip(limits, mixed, strict=True):
-        np.testing.assert_array_equal(limits_of([likelihood], quantities)[0], own)
+        (alone,), _ = limits_and_deeper([likelihood], quantities)
+        np.testing.assert_array_equal(alone, own)
     for own, likelihood in zip(profiles_of(mixed, quantities, smooth=False), mixed, strict=True):
-        (alone,) = profiles_of([likelihood], quantities, smooth=False)
-        for one, other in zip(own, alone, strict=True):
+        (profiles,) = profiles_of([likelihood], quantities, smooth=False)
+        for one, other in zip(own, profiles, strict=True):
             assert (one.low, one.high, one.best) == (other.low, other.high, other.best)
             np.testing.assert_array_equal(one.rises, other.rises)
             np.testing.assert_array_equal(one.log_values, other.log_values)
@@ -196,7 +197,7 @@ def test_limits_of_a_profile_are_those_near_the_optimum() -> None:
     """Where there is but one basin."""
     each = likelihoods("liquid_drop_2", 2)
     quantities = labelled("k", "c + c_p")
-    limits = near_limits(each, quantities)
+    limits = limits_and_deeper(each, quantities)[0]
     for near, profiles in zip(limits, profiles_of(each, quantities), strict=True):
         ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
         np.testing.assert_allclose(ends, near, rtol=0, atol=1e-3)
@@ -234,8 +235,7 @@ def test_points_of_a_valley_take_one_call() -> None:
     total = np.exp(likelihood.best[2:]).sum() * np.array([1.0, 1.0, 1.0, 1.0, 1.02, 0.97])
     x = np.tile(likelihood.best, (len(shares), 1))
     x[:, 2], x[:, 3] = np.log(total * shares), np.log(total * (1 - shares))
-    fixed = np.tile([False, False, True, True], (len(shares), 1))
-    rises, found = fits.with_fixed(np.zeros(len(x), dtype=np.int64), x, fixed, FINE)
+    rises, found = fits.with_fixed(x, np.array([False, False, True, True]), FINE)
     np.testing.assert_array_equal(found[:, 2:], x[:, 2:])
     for rise, point in zip(rises, found, strict=True):
         alone = rest_fitted(likelihood, [2, 3], list(point[2:]), point)
@@ -256,7 +256,7 @@ def test_a_model_with_one_parameter_has_a_profile() -> None:
     assert misfit_rad == pytest.approx(scipy_fit(posed, np.array([2.0])).misfit_rad, rel=1e-9)
     likelihood = likelihood_of(posed, best.x[0], misfit_rad, confidence=0.95)
     quantities = parameters_and_sum(damper)
-    (limits,) = near_limits([likelihood], quantities)
+    (limits,) = limits_and_deeper([likelihood], quantities)[0]
     ((alone,),) = profiles_of([likelihood], quantities)
     ends = np.array([alone.low, alone.high], dtype=float)
     np.testing.assert_allclose(limits[0], ends, rtol=0, atol=1e-4)
@@ -269,7 +269,7 @@ class TwoBasins(HeldFits):
         self.threshold = np.array([4.0])
 
     def at(
-        self, trace: IntArray, which: IntArray, targets: Array, near: Array, tolerance: float
+        self, profile: IntArray, targets: Array, near: Array, tolerance: float
     ) -> tuple[Array, Array]:
         """Rises of 0.3 t^2 or, from -1, of 5 + (t - 3)^2."""
         first = near[:, 1] > -1
@@ -279,19 +279,13 @@ class TwoBasins(HeldFits):
 
 def test_a_basin_seen_on_the_way_is_followed_to_the_outer_end() -> None:
     """There it is below the threshold, at 2.7, so that the crossing lies further out."""
-    none = np.zeros(1, dtype=np.int64)
     brackets = Brackets(
-        none,
-        none,
-        inside=np.array([0.0]),
-        outside=np.array([3.0]),
-        inside_rise=np.array([0.0]),
-        outside_rise=np.array([5.0]),
-        inside_x=np.array([[0.0, 1.0]]),
-        outside_x=np.array([[3.0, -1.0]]),
-        elsewhere=np.empty((0, 1, 2)),
+        np.zeros(1, dtype=np.int64),
+        values=np.array([[0.0], [3.0]]),
+        rises=np.array([[0.0], [5.0]]),
+        x=np.array([[[0.0, 1.0]], [[3.0, -1.0]]]),
     )
-    found = crossings(TwoBasins(), brackets, 1e-7, 1e-6)
-    assert np.isnan(found.at[0])
-    assert found.outside_rise[0] == pytest.approx(2.7)
-    assert found.outside_x.tolist() == [[3.0, 1.0]]
+    (crossing,) = crossings(TwoBasins(), brackets, 1e-7, 1e-6)
+    assert np.isnan(crossing)
+    assert brackets.rises[1, 0] == pytest.approx(2.7)
+    assert brackets.x[1].tolist() == [[3.0, 1.0]]

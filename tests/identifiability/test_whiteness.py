@@ -29,7 +29,7 @@ def test_the_cumulative_periodogram_is_kolmogorovs() -> None:
 def test_white_noise_is_seldom_doubted() -> None:
     """Three tests of 0.003 and one of next to nothing: of 1500 traces 13 or so are wrong."""
     rng = np.random.default_rng(1)
-    doubted = sum(bool(doubts_about_noise(rng.standard_normal(1001))) for _ in range(1500))
+    doubted = sum(any(doubts_about_noise(rng.standard_normal(1001))) for _ in range(1500))
     assert doubted <= 3 * FALSE_ALARM * 1500 + 4 * np.sqrt(3 * FALSE_ALARM * 1500)
 
 

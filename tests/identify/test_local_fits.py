@@ -150,7 +150,7 @@ def test_fits_do_not_depend_on_the_batch() -> None:
     for count in (1, 2, 17, 60):
         chosen = rng.permutation(60)[:count]
         apart = fits.fitted(starts[chosen], trace[chosen])
-        expected = together.of(chosen)
+        expected = together[chosen]
         np.testing.assert_array_equal(apart.x, expected.x)
         np.testing.assert_array_equal(apart.misfit_rad, expected.misfit_rad)
         np.testing.assert_array_equal(apart.evaluations, expected.evaluations)
@@ -181,7 +181,8 @@ def test_the_genetic_algorithm_is_polished_alike() -> None:
     settings: Any = STUDY.config.of_methods.of("genetic_refined")
     rngs = [np.random.default_rng(seed) for seed in range(2)]
     for seed, answer in enumerate(genetic_refined.identify_many(problems, settings, rngs)):
-        alone = genetic_refined.identify(problems[seed], settings, np.random.default_rng(seed))
+        own = [np.random.default_rng(seed)]
+        (alone,) = genetic_refined.identify_many(problems[seed : seed + 1], settings, own)
         assert same(answer, alone)
 
 
@@ -218,7 +219,7 @@ def test_what_cannot_be_fitted_together_is_fitted_in_groups() -> None:
 
     together = least_squares.identify_many(problems, few, rngs())
     for problem, rng, answer in zip(problems, rngs(), together, strict=True):
-        assert same(answer, least_squares.identify(problem, few, rng))
+        assert same(answer, *least_squares.identify_many([problem], few, [rng]))
 
 
 def test_fits_from_a_point_are_those_of_each_alone() -> None:

@@ -8,7 +8,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
 from biogrip.identifiability.likelihood import likelihood_of
-from biogrip.identifiability.limits import limits_of
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.model_choice import ranked
 from biogrip.response.linear import rotation, step_response
@@ -37,7 +37,7 @@ def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float]) -> 
         likelihood_of(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)
         for problem, one in zip(problems, found, strict=True)
     ]
-    limits = limits_of(likelihoods, parameters_and_sum(model))
+    limits, _ = limits_and_deeper(likelihoods, parameters_and_sum(model))
     held = (limits[..., 0] <= np.log(truth)) & (np.log(truth) <= limits[..., 1])
     assert np.all(held.sum(axis=0) >= 33)
     # And are of use: the exponent's are a fifth of it wide, or less.

@@ -8,7 +8,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import held, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import near_limits
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.local_fits import LocalFits
@@ -66,7 +66,7 @@ def test_limits_are_those_of_the_nonlinear_model(gripper: Gripper, torque: str) 
     assert np.all(np.abs(slopes @ residual) < 1e-5 * size)
     misfit = float(np.sqrt(np.mean(residual**2)))
     likelihood = likelihood_of(problem, best, misfit, confidence=0.95)
-    (limits,) = near_limits([likelihood], parameters_and_sum(MODEL))
+    (limits,) = limits_and_deeper([likelihood], parameters_and_sum(MODEL))[0]
     assert np.all(np.isfinite(limits))
     for index, ends in enumerate(limits):
         for end in ends:

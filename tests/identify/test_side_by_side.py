@@ -19,7 +19,7 @@ from biogrip.identify.selection import best
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import together
-from tests.helpers.plain_genetic import chromosomes_of, identified
+from tests.helpers.plain_genetic import chromosomes_of, decoded, identified
 from tests.helpers.problems import condensed_of
 
 SMALL = GeneticSettings(60, 30, "pairs", 1, -1, 3, 0.5, 1, 4, 6, 25)
@@ -82,7 +82,7 @@ def content(answer: Identification) -> tuple[bytes | float | str, ...]:
 
 def assert_same_in_groups(problems: list[Problem], settings: GeneticSettings) -> None:
     alone = [
-        content(genetic.identify(problem, settings, rng(seed)))
+        content(genetic.identify_many([problem], settings, [rng(seed)])[0])
         for seed, problem in enumerate(problems)
     ]
     everyone = list(range(len(problems)))
@@ -100,7 +100,7 @@ def test_every_reading(reading: str, gripper: Gripper, steps: TorqueHistory) -> 
     assert_same_in_groups(problems, READINGS[reading])
     for seed, problem in enumerate(problems):
         plain = identified(problem.misfit, problem.genome, READINGS[reading], rng(seed))
-        found = genetic.identify(problem, READINGS[reading], rng(seed))
+        (found,) = genetic.identify_many([problem], READINGS[reading], [rng(seed)])
         assert content(found) == content(plain)
 
 
@@ -110,7 +110,8 @@ def test_every_kind_of_model(name: str, gripper: Gripper, steps: TorqueHistory) 
     assert_same_in_groups(problems, SMALL)
     (first, *_) = problems
     plain = identified(first.misfit, first.genome, SMALL, rng(0))
-    assert content(genetic.identify(first, SMALL, rng(0))) == content(plain)
+    (found,) = genetic.identify_many([first], SMALL, [rng(0)])
+    assert content(found) == content(plain)
 
 
 @pytest.mark.parametrize("how", [{"nonlinear": True}, {"offset": True, "drift": True}])
@@ -136,8 +137,9 @@ def test_polished_populations(gripper: Gripper, steps: TorqueHistory) -> None:
         replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
     )
     problems = posed(gripper, steps, 2)
-    alone = [genetic_refined.identify(p, settings, rng(s)) for s, p in enumerate(problems)]
-    found = genetic_refined.identify_many(problems, settings, [rng(0), rng(1)])
+    polished = genetic_refined.identify_many
+    alone = [polished([p], settings, [rng(s)])[0] for s, p in enumerate(problems)]
+    found = polished(problems, settings, [rng(0), rng(1)])
     assert [content(answer) for answer in found] == [content(answer) for answer in alone]
 
 
@@ -209,7 +211,7 @@ def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: Tor
     codes = genome.code(chromosomes)
     assert codes.max() < 2**WORD_BITS
     np.testing.assert_array_equal(chromosomes_of(genome, codes), chromosomes)
-    np.testing.assert_array_equal(genome.parameters(codes), genome.decode(chromosomes))
+    np.testing.assert_array_equal(genome.parameters(codes), decoded(genome, chromosomes))
     np.testing.assert_array_equal(np.lexsort(codes[::-1]), np.lexsort(chromosomes.T[::-1]))
 
 

@@ -6,7 +6,7 @@ from biogrip.experiment.protocol import TorqueHistory, held, torque_at, torque_h
 from biogrip.experiment.sample import damper, generalized_maxwell, maxwell
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
-from biogrip.response.linear import rotation, rotation_rate, step_response
+from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 from tests.helpers.responses import jaw_force_50_digits, random_samples
 from tests.response.test_linear import TIMES
@@ -47,7 +47,7 @@ def test_the_arms_equation_closes_under_ramps_and_sinusoids(
     time_s = np.linspace(0.3, 89.8, 301)
     response = step_response(gripper, network, inertia=False)
     rest = torque_at(TORQUE, time_s) - ARM.stiffness_Nm_per_rad * rotation(response, TORQUE, time_s)
-    rest -= ARM.damping_Nms_per_rad * rotation_rate(response, TORQUE, time_s)
+    rest -= ARM.damping_Nms_per_rad * rotation(response, TORQUE, time_s, rate=True)
     of_steps = jaw_force_response(gripper, network, inertia=inertia)
     force = linear_jaw_force(of_steps, TORQUE, time_s)
     largest = torque_at(TORQUE, time_s).max()

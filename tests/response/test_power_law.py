@@ -16,7 +16,7 @@ from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response
 from biogrip.response.linear import LEFT, RIGHT, StepResponse, rotation, step_response
-from biogrip.response.many_branches import modes_of_force, modes_of_rotation
+from biogrip.response.many_branches import modes_of_many
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.power_law import (
@@ -214,7 +214,7 @@ def test_few_branches_are_solved_like_many(
         given, network, symmetric=symmetric, inertia=inertia, both_arms=True
     )
     between_poles = StepResponse(
-        *modes_of_rotation(given, network, symmetric=symmetric, inertia=inertia)
+        *modes_of_many(given, network, symmetric=symmetric, inertia=inertia)
     )
     for arm in (LEFT, RIGHT):
         theirs = rotation(by_polynomials, torque, times, arm)
@@ -222,7 +222,9 @@ def test_few_branches_are_solved_like_many(
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12 * np.abs(theirs).max())
     forces = [
         jaw_force_response(given, network, symmetric=symmetric, inertia=inertia),
-        StepResponse(*modes_of_force(given, network, symmetric=symmetric, inertia=inertia)),
+        StepResponse(
+            *modes_of_many(given, network, symmetric=symmetric, inertia=inertia, force=True)
+        ),
     ]
     decays = [
         one.static[..., None] + one.weights @ np.exp(one.rates[:, :, None] * times)[:, None]

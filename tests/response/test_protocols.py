@@ -22,7 +22,7 @@ from biogrip.experiment.sample import MODELS, generalized_maxwell
 from biogrip.instrument.actuator import torque as torque_of_voltage
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.inertia import ringing_s
-from biogrip.response.linear import phi_function, rotation, rotation_rate, step_response
+from biogrip.response.linear import phi_function, rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.study.protocol_block import PhaseBlock, ProtocolBlock
 from tests.helpers.problems import problem_alone
@@ -106,7 +106,7 @@ def test_rate_is_the_derivative_of_the_rotation() -> None:
     time_s, h = np.array([5.0, 19.0, 33.3, 57.0, 66.6, 80.0]), 1e-4
     lower, upper = (rotation(response, TORQUE, time_s + d) for d in (-h, h))
     # The central difference errs by h^2/6 of the third derivative, 1e-8 of the rate here.
-    rate = rotation_rate(response, TORQUE, time_s)
+    rate = rotation(response, TORQUE, time_s, rate=True)
     np.testing.assert_allclose((upper - lower) / (2 * h), rate, rtol=0, atol=1e-6 * rate.max())
 
 

@@ -116,6 +116,7 @@ BAD = {
     "only: []": r"my.yaml, line 1: only: found a list of 0, allowed are at least 1",
     "cases: {x: {sample: {model: liquid_drop, k: 1e11, k_p: 0.1, c: 1}}}": r"x.sample.k: found "
     r"1e\+11, which is not searched for; allowed is .* N/m, or another search_range",
+    "models: {inertia: true}": r"my.yaml, line 1: models.inertia: unknown key, no longer needed: ",
     "seedz: 3": r"my.yaml, line 1: seedz: unknown key. Did you mean 'seeds'\? Allowed here: .*see",
     "seeds: many": r"my.yaml, line 1: seeds: found 'many', allowed is an integer",
     "seeds: 0": r"my.yaml, line 1: seeds: found 0, allowed is at least 1",

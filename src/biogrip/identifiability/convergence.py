@@ -77,16 +77,11 @@ def convergence_of(log_parameters: Array, axes: Straightened) -> Convergence:
     """
     steps, walkers, size = log_parameters.shape
     turned = axes.of(log_parameters.reshape(-1, size)).reshape(steps, walkers, size)
-    chains = np.concatenate([log_parameters, turned], axis=2)[:, :, np.sort(_distinct(axes, size))]
-    by_chain = chains.transpose(2, 1, 0)
+    # Of the coordinates, those that are no parameters themselves.
+    own = sorted(axes.members) if len(axes.members) > 1 else []
+    by_chain = np.concatenate([log_parameters, turned[:, :, own]], axis=2).transpose(2, 1, 0)
     return Convergence(
         float(np.max(array_stats.rhat(by_chain))),
         float(np.min(array_stats.ess(by_chain, method="bulk"))),
         float(np.min(array_stats.ess(by_chain, method="tail", prob=_TAILS))),
     )
-
-
-def _distinct(axes: Straightened, size: int) -> list[int]:
-    """Columns of parameters, and of the coordinates that are none."""
-    own = axes.members if len(axes.members) > 1 else ()
-    return [*range(size), *(size + index for index in own)]

@@ -1,11 +1,13 @@
 """Everything that one trace tells: the best fit, a verdict on every quantity, and what to doubt."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -78,7 +80,7 @@ def diagnose(
             confidence=confidence,
             noise_rad=noise_rad,
         )
-        findings = findings_of(likelihood, model)
+        findings = findings_of(likelihood, parameters_and_sum(model))
         trades = trades_of(likelihood, model, findings)
         profiled = [*findings, *(trade.finding for trade in trades)]
         lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.rises.min()))
@@ -89,8 +91,13 @@ def diagnose(
             break
         found = deeper
     grip = problem.residuals.grip(likelihood.best)
-    pulling = _pulling(grip, problem.residuals.duration_s)
-    notes = [*_in_parts(findings), *_notes(likelihood), *pulling]
+    notes = [
+        f"The values of {finding.quantity.label} within confidence are in {1 + len(finding.gaps)} "
+        "parts; the limits are those of the outermost."
+        for finding in findings
+        if finding.gaps
+    ]
+    notes += [*_noise(likelihood), *_pulling(grip, problem.residuals.duration_s)]
     if not found.converged:
         notes.append(
             "The fit could not be brought to its last digits: steps that should lead on fit worse. "
@@ -99,49 +106,38 @@ def diagnose(
     return Diagnosis(likelihood, findings, trades, grip, notes)
 
 
-def _in_parts(findings: list[Finding]) -> list[str]:
-    """Say of which quantities the values within confidence are no interval."""
-    return [
-        f"The values of {finding.quantity.label} within confidence are in {1 + len(finding.gaps)} "
-        "parts; the limits are those of the outermost."
-        for finding in findings
-        if finding.gaps
-    ]
-
-
-def _pulling(grip: Grip, last_s: float) -> list[str]:
+def _pulling(grip: Grip, last_s: float) -> Iterator[str]:
     """Doubt samples at which the jaws would have to pull what was identified."""
-    words = grip.words()
-    if words is None or grip.pulls_from_s is None or grip.pulls_from_s > last_s:
-        return []
-    return [
-        f"With the best fit {words}. Unless it sticks to them they left it there, and what "
-        "follows is no response of the sample: identify it from the samples before."
-    ]
+    if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
+        yield (
+            f"With the best fit {grip.words()}. Unless it sticks to them they left it there, and "
+            "what follows is no response of the sample: identify it from the samples before."
+        )
 
 
-def _notes(likelihood: Likelihood) -> list[str]:
+def _noise(likelihood: Likelihood) -> Iterator[str]:
+    """Doubt what a fit leaves of a trace."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
-        return []
-    notes = doubts_about_noise(residuals.left(likelihood.best))
-    if notes and not residuals.coloured:
-        notes.append(
+        return
+    doubts = list(doubts_about_noise(residuals.left(likelihood.best)))
+    yield from doubts
+    if doubts and not residuals.coloured:
+        yield (
             "Intervals that allow for such noise are those of measurement.noise_model: coloured, "
             "or --noise-model coloured."
         )
     if _too_little(likelihood):
-        notes.append(
+        yield (
             f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
             "fit leaves: its value, or its unit, is not the right one."
         )
     scale = residuals.noise_scale_rad
     if misfit_rad > _TOO_MUCH * scale:
-        notes.append(
+        yield (
             f"The misfit is {misfit_rad / scale:.2g} times the noise of the trace: the model, the "
             "protocol, the gripper or the unit is not the right one."
         )
-    return notes
 
 
 def _too_little(likelihood: Likelihood) -> bool:

@@ -67,20 +67,19 @@ class HeldQuantities:
                 self._forms[index, row] = hinge.form(len(low))
                 self._allowed[index, row] = hinge.allowed(longest_s)
                 self._stiffness[index, row] = hinge.stiffness
-        senses = {"product": 0.0, "sum": 1.0, "series": -1.0}
-        self._senses = np.array([senses[quantity.form] for quantity in quantities])
+        self._senses = np.array([float(quantity.sense) for quantity in quantities])
         self._most_members = max(len(quantity.members) for quantity in quantities)
 
     def started(self, x: Array) -> Array:
         """Move points, (n, n_parameters), to where the quantities have their values."""
         everyone = np.arange(len(x))
         powers, sense = self._form(everyone)
-        by = (self._targets - self._log(x, everyone))[:, None]
+        by = (self._targets - self._log(x, powers, sense))[:, None]
         first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
         moved = x + by * np.where(sense == 0, powers * first, powers)
         moved = np.clip(moved, self._low, self._high)
-        dominant = self._dominant(moved, self._slopes(moved, everyone))
-        restored = self.restored(moved, everyone, dominant)
+        eliminated = self._dominant(moved, self._slopes(moved, everyone))
+        restored = self.restored(moved, everyone, eliminated)
         if np.any(np.isnan(restored)):
             raise ValueError("a quantity is to be held outside its range")
         return restored
@@ -99,8 +98,7 @@ class HeldQuantities:
 
     def price(self, x: Array) -> Array:
         """What branches that relax too late add to the sums of squares, (n,)."""
-        beyond: Array = self._late(x, np.arange(len(x)))[0]
-        return np.sum(beyond**2, axis=1)
+        return np.sum(self._late(x, np.arange(len(x)))[0] ** 2, axis=1)
 
     def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
         """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
@@ -174,9 +172,9 @@ class HeldQuantities:
             of_sum = target + sense * np.log1p(-np.minimum(taken, 1.0))
         return np.where(basic, np.where(sense == 0, of_product, of_sum), x)
 
-    def _log(self, x: Array, fit: IntArray) -> Array:
-        """Logarithms of the quantities, (n,)."""
-        powers, sense = self._form(fit)
+    @staticmethod
+    def _log(x: Array, powers: Array, sense: Array) -> Array:
+        """Logarithms of quantities of these forms, (n,)."""
         member = powers != 0
         largest = np.max(np.where(member, sense * x, -np.inf), axis=1, keepdims=True)
         terms = np.where(member, np.exp(np.minimum(sense * x - largest, 0.0)), 0.0)

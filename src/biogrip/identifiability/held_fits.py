@@ -21,6 +21,8 @@ Along a valley, a fit to the last digit takes three times as many steps.
 class HeldFits:
     """Fits of any of a number of traces with any of a number of quantities held.
 
+    A profile is a quantity of a trace; those of the first trace come first.
+
     Parameters
     ----------
     likelihoods
@@ -30,31 +32,47 @@ class HeldFits:
 
     Attributes
     ----------
+    trace : (n_profiles,)
+        Which trace each profile is of.
+    best : (n_profiles, n_parameters)
+        Log-parameters of its optimum.
+    at_best : (n_profiles,)
+        Logarithm of the quantity there.
+    threshold, certainty : (n_profiles,)
+        As of `Likelihood`; certainty is no less than the threshold.
     deeper
         By trace, the lowest rise so far and its log-parameters, if that is so far below
         zero that the trace's optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
+        self.likelihoods, self.quantities = likelihoods, quantities
         problems = [likelihood.problem for likelihood in likelihoods]
-        self.quantities = quantities
-        self.best = np.stack([likelihood.best for likelihood in likelihoods])
-        self.threshold = np.array([likelihood.threshold for likelihood in likelihoods])
+        self.trace = np.repeat(np.arange(len(likelihoods)), len(quantities))
+        self._optima = np.stack([likelihood.best for likelihood in likelihoods])
+        self.best = self._optima[self.trace]
+        self.at_best = np.array([q.log(x) for x in self._optima for q in quantities])
+        told = [
+            (one.threshold, one.certainty, one.misfit_rad, one.noise_rad) for one in likelihoods
+        ]
+        threshold, certainty, self._misfit_rad, self._noise_rad = np.array(told).T
+        self.threshold = threshold[self.trace]
+        self.certainty = np.maximum(certainty, threshold)[self.trace]
         self.deeper: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
-        self._misfit_rad = np.array([likelihood.misfit_rad for likelihood in likelihoods])
-        self._noise_rad = np.array([likelihood.noise_rad for likelihood in likelihoods])
-        self._scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+        scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
+        # Of chi^2 to sums of squares in the unit of the fits' residuals.
+        self._ratio = (scale_rad / self._noise_rad) ** 2
 
     def at(
-        self, trace: IntArray, which: IntArray, targets: Array, near: Array, tolerance: float
+        self, profile: IntArray, targets: Array, near: Array, tolerance: float
     ) -> tuple[Array, Array]:
         """Fit with quantities held.
 
         Parameters
         ----------
-        trace, which : (n,)
+        profile : (n,)
             Which trace is fitted, and which quantity held.
         targets : (n,)
             Logarithms at which the quantities are held, within their ranges.
@@ -70,35 +88,40 @@ class HeldFits:
         log_parameters : (n, n_parameters)
             Where the quantities have their values to rounding.
         """
-        held = HeldQuantities(
-            self.quantities,
-            which,
-            targets,
-            self._fits.low,
-            self._fits.high,
-            self._residuals.duration_s,
-        )
+        trace, which = np.divmod(profile, len(self.quantities))
+        low, high, last_s = self._fits.low, self._fits.high, self._residuals.duration_s
+        held = HeldQuantities(self.quantities, which, targets, low, high, last_s)
         found = self._fits.fitted(near, trace, tolerance, held=held)
-        # In the unit of the fits' residuals, as what the fits are held to is.
-        price = held.price(found.x) * (self._scale_rad / self._noise_rad)[trace] ** 2
-        return self._rises(found, trace) + price, found.x
+        return self._rises(found, trace) + held.price(found.x) * self._ratio[trace], found.x
 
-    def with_fixed(
-        self, trace: IntArray, x: Array, fixed: BoolArray, tolerance: float
+    def from_each(
+        self, profile: IntArray, targets: Array, starts: Array, tolerance: float
     ) -> tuple[Array, Array]:
-        """Fit with some parameters fixed; returns as `at`.
+        """Fit as `at`, each from several starts, (n_starts, n, n_parameters).
+
+        Returns
+        -------
+        rises : (n_starts, n)
+            From each start.
+        log_parameters : (n, n_parameters)
+            Where the rise is lowest.
+        """
+        count, near = len(starts), np.concatenate(starts)
+        rises, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
+        rises = rises.reshape(count, -1)
+        return rises, x.reshape(starts.shape)[np.argmin(rises, axis=0), range(len(profile))]
+
+    def with_fixed(self, x: Array, fixed: BoolArray, tolerance: float) -> tuple[Array, Array]:
+        """Fit the first trace, some parameters fixed; tolerance and returns as of `at`.
 
         Parameters
         ----------
-        trace : (n,)
-            Which trace is fitted.
         x : (n, n_parameters)
             Log-parameters to start from.
-        fixed : (n, n_parameters)
+        fixed : (n_parameters,)
             Which of them stay, be they within the search range or not.
-        tolerance
-            Of the fits, see `biogrip.identify.local_fits`.
         """
+        trace = np.zeros(len(x), dtype=np.int64)
         low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
         found = self._fits.fitted(x, trace, tolerance, low=low, high=high)
         return self._rises(found, trace), found.x
@@ -112,26 +135,16 @@ class HeldFits:
                 self.deeper[of_trace] = float(rises[index]), found.x[index].copy()
         return rises
 
-    def ranges(self) -> tuple[Array, Array]:
-        """Lowest and highest logarithm of each quantity, (n_quantities,) each."""
+    def ranges(self) -> Array:
+        """Lowest and highest logarithm in each profile, (2, n_profiles)."""
         ends = [quantity.range(self._fits.low, self._fits.high) for quantity in self.quantities]
-        low, high = np.array(ends).T
-        return low, high
-
-    def at_best(self) -> Array:
-        """Logarithms of the quantities at the optima, (n_traces, n_quantities)."""
-        return np.array([[quantity.log(x) for quantity in self.quantities] for x in self.best])
+        return np.array(ends * len(self._optima)).T
 
     def deviations(self) -> Array:
-        """Standard deviations of the logarithms to first order, at most 1.
-
-        Returns
-        -------
-        (n_traces, n_quantities)
-        """
-        information = self._fits.normal(self.best, np.arange(len(self.best))).information
-        information = information * ((self._scale_rad / self._noise_rad) ** 2)[:, None, None]
-        slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self.best])
+        """Standard deviations of the logarithms to first order, at most 1, (n_profiles,)."""
+        information = self._fits.normal(self._optima, np.arange(len(self._optima))).information
+        information = information * self._ratio[:, None, None]
+        slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self._optima])
         # The prior keeps this regular.
         spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)
-        return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0))
+        return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0)).ravel()

@@ -21,85 +21,10 @@ _ACCURACY = 1e-3
 _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
 
 
-def near_limits(
-    likelihoods: Sequence[Likelihood],
-    quantities: Sequence[Quantity],
-    tolerance: float = CLOSE,
-    accuracy: float = _ACCURACY,
-    fits: HeldFits | None = None,
-) -> Array:
-    """Find where the rise of chi^2 equals the threshold.
-
-    Parameters
-    ----------
-    likelihoods
-        One a trace; their problems have to be `alike`.
-    quantities
-        Whose limits are wanted.
-    tolerance
-        Of the fits, see `biogrip.identify.local_fits`.
-    accuracy
-        Of the square root of the rise.
-    fits
-        Those that are to be used; they know afterwards which optima were missed.
-
-    Returns
-    -------
-    (n_traces, n_quantities, 2)
-        Logarithms of the lower and upper limits; NaN where the trace does not close the profile.
-    """
-    fits = fits or HeldFits(likelihoods, quantities)
-    shape = (len(likelihoods), len(quantities), 2)
-    trace, which, upper = (index.ravel() for index in np.indices(shape))
-    stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[trace, which]
-    # Inside and outside, by row.
-    ends = np.stack((fits.at_best()[trace, which], np.full(len(trace), np.nan)))
-    low, high = (end[which] for end in fits.ranges())
-    low, high = np.minimum(low, ends[0]), np.maximum(high, ends[0])
-    rises, x = np.zeros_like(ends), np.stack((fits.best[trace], fits.best[trace]))
-    limits = np.full(len(trace), np.nan)
-    left = np.arange(len(trace))
-    for _ in range(_MOST_DOUBLINGS):
-        if not len(left):
-            break
-        tried = np.clip(ends[0, left] + stride[left], low[left], high[left])
-        rise, found = fits.at(trace[left], which[left], tried, x[0, left], tolerance)
-        side = (rise >= fits.threshold[trace[left]]).astype(np.int64)
-        ends[side, left], rises[side, left], x[side, left] = tried, rise, found
-        closed = left[side == 1]
-        # Limits are those of the optimum's own basin.
-        nowhere_else = np.empty((0, len(closed), x.shape[2]))
-        brackets = Brackets(
-            trace[closed],
-            which[closed],
-            ends[0, closed],
-            ends[1, closed],
-            rises[0, closed],
-            rises[1, closed],
-            x[0, closed],
-            x[1, closed],
-            nowhere_else,
-        )
-        crossed = crossings(fits, brackets, tolerance, accuracy)
-        limits[closed] = crossed.at
-        # Where another basin is below the threshold there, that is the way on.
-        on = np.isnan(crossed.at)
-        ends[0, closed[on]], rises[0, closed[on]] = brackets.outside[on], crossed.outside_rise[on]
-        x[0, closed[on]] = crossed.outside_x[on]
-        stride[left] *= 2
-        left = left[np.isnan(limits[left]) & (tried > low[left]) & (tried < high[left])]
-    return limits.reshape(shape)
-
-
-def limits_of(likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> Array:
-    """Limits as of `limits_and_deeper`."""
-    return limits_and_deeper(likelihoods, quantities)[0]
-
-
 def limits_and_deeper(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> tuple[Array, dict[int, Array]]:
-    """Find limits, and what is deeper than the optima that they are about.
+    """Find where the rise of chi^2 equals the threshold, and what is deeper than the optima.
 
     Parameters
     ----------
@@ -111,7 +36,7 @@ def limits_and_deeper(
     Returns
     -------
     limits : (n_traces, n_quantities, 2)
-        As of `near_limits`.
+        Logarithms of the lower and upper limits; NaN where the trace does not close the profile.
     deeper
         By trace, log-parameters whose chi^2 is clearly below that of its optimum, so that
         this was missed.
@@ -121,8 +46,38 @@ def limits_and_deeper(
     if not quantities:
         return limits, deeper
     for group in alike([likelihood.problem for likelihood in likelihoods]):
-        own = [likelihoods[index] for index in group]
-        fits = HeldFits(own, quantities)
-        limits[group] = near_limits(own, quantities, fits=fits)
+        fits = HeldFits([likelihoods[index] for index in group], quantities)
+        limits[group] = _limits(fits).reshape(len(group), -1, 2)
         deeper.update({int(group[trace]): x for trace, (_, x) in fits.deeper.items()})
     return limits, deeper
+
+
+def _limits(fits: HeldFits) -> Array:
+    """Lower and upper limits by profile, one after the other, (2 n_profiles,)."""
+    profile, upper = (index.ravel() for index in np.indices((len(fits.best), 2)))
+    stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[profile]
+    # Inside and outside, by row.
+    ends = np.stack((fits.at_best[profile], np.full(len(profile), np.nan)))
+    low, high = fits.ranges()[:, profile]
+    low, high = np.minimum(low, ends[0]), np.maximum(high, ends[0])
+    rises, x = np.zeros_like(ends), np.stack((fits.best[profile], fits.best[profile]))
+    limits = np.full(len(profile), np.nan)
+    left = np.arange(len(profile))
+    for _ in range(_MOST_DOUBLINGS):
+        if not len(left):
+            break
+        tried = np.clip(ends[0, left] + stride[left], low[left], high[left])
+        rise, found = fits.at(profile[left], tried, x[0, left], CLOSE)
+        side = (rise >= fits.threshold[profile[left]]).astype(np.int64)
+        ends[side, left], rises[side, left], x[side, left] = tried, rise, found
+        closed = left[side == 1]
+        # From nowhere else: limits are those of the optimum's own basin.
+        brackets = Brackets(profile[closed], ends[:, closed], rises[:, closed], x[:, closed])
+        limits[closed] = crossings(fits, brackets, CLOSE, _ACCURACY)
+        # Where another basin is below the threshold there, that is the way on.
+        on = np.isnan(limits[closed])
+        ends[0, closed[on]], rises[0, closed[on]] = brackets.values[1, on], brackets.rises[1, on]
+        x[0, closed[on]] = brackets.x[1, on]
+        stride[left] *= 2
+        left = left[np.isnan(limits[left]) & (tried > low[left]) & (tried < high[left])]
+    return limits

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
 
 AGREES, PRIOR, DIFFERS = "agrees", "prior", "differs"
@@ -95,27 +95,13 @@ def marginals_of(
     confidence
         Of the outer intervals.
     """
-    return [_marginal(log_parameters, q, duration_s, confidence) for q in quantities]
-
-
-def _marginal(
-    log_parameters: Array, quantity: Quantity, duration_s: float, confidence: float
-) -> Marginal:
-    holds = _holding(log_parameters, quantity, duration_s)
-    # Where it hardly ever holds, there is nothing better to say.
-    counted = log_parameters[holds] if np.any(holds) else log_parameters
-    levels = [0.5, *_ends(_INNER), *_ends(confidence)]
-    median, *ends = np.exp(np.quantile(quantity.logs(counted), levels)).tolist()
-    return Marginal(quantity, median, (ends[0], ends[1]), (ends[2], ends[3]), float(np.mean(holds)))
-
-
-def _holding(log_parameters: Array, quantity: Quantity, duration_s: float) -> BoolArray:
-    holds = np.ones(len(log_parameters), dtype=bool)
-    for hinge in quantity.hinges:
-        late = log_parameters @ hinge.form(log_parameters.shape[1]) - hinge.allowed(duration_s)
-        holds &= late <= 0
-    return holds
-
-
-def _ends(share: float) -> tuple[float, float]:
-    return 0.5 * (1 - share), 0.5 * (1 + share)
+    levels = [0.5, *(0.5 * (1 + way * share) for share in (_INNER, confidence) for way in (-1, 1))]
+    found, (count, size) = [], log_parameters.shape
+    for quantity in quantities:
+        late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.hinges]
+        holds = np.all(np.less_equal(late, 0.0).reshape(-1, count), axis=0)
+        # Where it hardly ever holds, there is nothing better to say.
+        counted = log_parameters[holds] if np.any(holds) else log_parameters
+        median, a, b, c, d = np.exp(np.quantile(quantity.logs(counted), levels)).tolist()
+        found.append(Marginal(quantity, median, (a, b), (c, d), float(np.mean(holds))))
+    return found

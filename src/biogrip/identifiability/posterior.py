@@ -6,9 +6,7 @@ References
    1973, sections 1.3 and 2.7: noise of unknown level under Jeffreys' prior.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 from math import lgamma, log, pi
 
 import numpy as np
@@ -53,7 +51,9 @@ class Posterior:
         density = self.prior.log_density(log_parameters)
         allowed = np.flatnonzero(np.isfinite(density))
         if len(allowed):
-            misfit_rad = self.misfit(np.exp(log_parameters[allowed]))
+            # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
+            # loses, the rarer it is that two processors disagree about one.
+            misfit_rad = self.problem.residuals.condensed_misfit(np.exp(log_parameters[allowed]))
             density[allowed] += power * self.log_likelihood(misfit_rad)
         return np.where(np.isnan(density), -np.inf, density)
 
@@ -73,10 +73,3 @@ class Posterior:
             variance = self.noise_rad**2
             return -half * log(2 * pi * variance) - 0.5 * square_sum / variance
         return lgamma(half) - log(2) - half * np.log(pi * square_sum)
-
-    @cached_property
-    def misfit(self) -> Callable[[Array], Array]:
-        """RMS misfit in rad of parameters of shape (n, n_parameters)."""
-        # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
-        # loses, the rarer it is that two processors disagree about one.
-        return self.problem.residuals.condensed_misfit

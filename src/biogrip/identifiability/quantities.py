@@ -10,7 +10,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import Parameter, SampleModel
+from biogrip.experiment.sample import SampleModel
 
 # A branch may relax within twice the experiment at the price of chi^2 rising by some 50, and
 # after one that comes later, by a hundredth, at that of rising by 1.
@@ -92,36 +92,24 @@ class Quantity:
 
     def log(self, log_parameters: Array) -> float:
         """Logarithm of the quantity, from log-parameters of shape (n_parameters,)."""
-        x = log_parameters[list(self.members)]
-        if self.form == "product":
-            return float(np.dot(self.sign, x))
-        return float(self._sense * np.logaddexp.reduce(self._sense * x))
+        return float(self.logs(log_parameters[None])[0])
 
     def logs(self, log_parameters: Array) -> Array:
         """Logarithms of many, (n,), from log-parameters of shape (n, n_parameters)."""
         x = log_parameters[:, list(self.members)]
         if self.form == "product":
             return np.sum(x * np.array(self.sign), axis=1)
-        return self._sense * np.logaddexp.reduce(self._sense * x, axis=1)
+        return self.sense * np.logaddexp.reduce(self.sense * x, axis=1)
 
     def gradient(self, log_parameters: Array) -> Array:
         """Its derivatives by the log-parameters, (n_parameters,)."""
-        x = log_parameters[list(self.members)]
         slope = np.zeros_like(log_parameters)
         if self.form == "product":
             slope[list(self.members)] = self.sign
         else:
-            share = np.exp(self._sense * x - np.logaddexp.reduce(self._sense * x))
-            slope[list(self.members)] = share
+            of_sum = self.sense * log_parameters[list(self.members)]
+            slope[list(self.members)] = np.exp(of_sum - np.logaddexp.reduce(of_sum))
         return slope
-
-    def moved(self, log_parameters: Array, target: float) -> Array:
-        """Log-parameters with all members moved alike, until the quantity has a given logarithm."""
-        by = target - self.log(log_parameters)
-        moved = log_parameters.copy()
-        shares = np.divide(self.sign, len(self.members)) if self.form == "product" else 1.0
-        moved[list(self.members)] += by * shares
-        return moved
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
         """Logarithms between which it can lie if the log-parameters lie within bounds.
@@ -130,22 +118,18 @@ class Quantity:
         are: where all of them have to be at the ends of their ranges, it is these that keep
         the quantity from going further, and not the trace.
         """
-        if self.form == "product":
-            first = [
-                low[i] if s > 0 else -high[i] for i, s in zip(self.members, self.sign, strict=True)
-            ]
-            last = [
-                high[i] if s > 0 else -low[i] for i, s in zip(self.members, self.sign, strict=True)
-            ]
-            return float(sum(first)), float(sum(last))
         members = list(self.members)
+        if self.form == "product":
+            ends = np.multiply(self.sign, (low[members], high[members]))
+            return float(np.sum(np.min(ends, axis=0))), float(np.sum(np.max(ends, axis=0)))
         if self.form == "sum":
             return self.log(low), float(np.max(high[members]))
         return float(np.min(low[members])), self.log(high)
 
     @property
-    def _sense(self) -> int:
-        return 1 if self.form == "sum" else -1
+    def sense(self) -> int:
+        """Power of the members in the sum: 1, or -1 of a series; 0 of a product, which has none."""
+        return {"product": 0, "sum": 1, "series": -1}[self.form]
 
 
 def parameters_and_sum(model: SampleModel) -> list[Quantity]:
@@ -180,8 +164,9 @@ def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
         if first.kind == second.kind:
             found += [_sum(model, (a, b)), _series(model, (a, b))]
         else:
-            damper, spring = (a, b) if first.kind == "damping" else (b, a)
-            found.append(_time(model, damper, spring))
+            pair = (a, b) if first.kind == "damping" else (b, a)
+            names, symbols, _ = _named(model, pair)
+            found.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
     return [replace(quantity, hinges=ordered) for quantity in found]
 
 
@@ -190,29 +175,17 @@ def _ordered(model: SampleModel) -> tuple[Hinge, ...]:
 
 
 def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    chosen = _chosen(model, members)
-    label, symbol = (" + ".join(names) for names in zip(*_names(chosen), strict=True))
-    return Quantity(label, symbol, chosen[0].unit, members, "sum")
+    names, symbols, unit = _named(model, members)
+    return Quantity(" + ".join(names), " + ".join(symbols), unit, members, "sum")
 
 
 def _series(model: SampleModel, members: tuple[int, ...]) -> Quantity:
-    chosen = _chosen(model, members)
-    label, symbol = zip(*_names(chosen), strict=True)
-    text = f"1/({' + '.join(f'1/{name}' for name in label)})"
-    shown = f"$1/($ {' + '.join(f'1/{name}' for name in symbol)} $)$"
-    return Quantity(text, shown, chosen[0].unit, members, "series")
+    names, symbols, unit = _named(model, members)
+    label, symbol = (" + ".join(f"1/{each}" for each in told) for told in (names, symbols))
+    return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, "series")
 
 
-def _time(model: SampleModel, damper: int, spring: int) -> Quantity:
-    (label, symbol), (under, under_symbol) = _names(_chosen(model, (damper, spring)))
-    return Quantity(
-        f"{label}/{under}", f"{symbol}/{under_symbol}", "s", (damper, spring), sign=(1, -1)
-    )
-
-
-def _chosen(model: SampleModel, members: tuple[int, ...]) -> list[Parameter]:
-    return [model.parameters[index] for index in members]
-
-
-def _names(parameters: list[Parameter]) -> list[tuple[str, str]]:
-    return [(p.name, p.symbol) for p in parameters]
+def _named(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:
+    """Names and symbols of parameters, and the unit of the first."""
+    chosen = [model.parameters[index] for index in members]
+    return [p.name for p in chosen], [p.symbol for p in chosen], chosen[0].unit

@@ -56,8 +56,6 @@ class Samples:
     Parameters
     ----------
     log_parameters : (n_steps, n_walkers, n_parameters)
-    log_density : (n_steps, n_walkers)
-        Of the posterior, up to the evidence.
     accepted
         Share of the proposals.
     convergence
@@ -65,7 +63,6 @@ class Samples:
     """
 
     log_parameters: Array
-    log_density: Array
     accepted: float
     convergence: Convergence
 
@@ -92,7 +89,7 @@ def sampled(
         If the model has no answer anywhere.
     """
     axes = straightened(posterior.problem.residuals.model)
-    walkers = starts(posterior, settings.walkers, rng)
+    walkers = _starts(posterior, settings.walkers, rng)
     # The sampler draws from NumPy's older generator, whose streams never change.
     seed = np.random.RandomState(np.random.MT19937(int(rng.integers(2**63)))).get_state()
     ensemble = _Ensemble(posterior, emcee.State(walkers, random_state=seed), progress)
@@ -118,25 +115,13 @@ def sampled(
 
 
 def _samples(stretches: Sequence["Stretch"], axes: Straightened) -> Samples:
-    chains, densities, accepted = map(list, zip(*stretches, strict=True))
+    chains, accepted = zip(*stretches, strict=True)
     together = np.concatenate(chains)
-    convergence = convergence_of(together, axes)
-    return Samples(together, np.concatenate(densities), float(np.mean(accepted)), convergence)
+    return Samples(together, float(np.mean(accepted)), convergence_of(together, axes))
 
 
-def starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
-    """Choose where walkers set out: by their densities, from the prior and about all optima.
-
-    Returns
-    -------
-    (count, n_parameters)
-        Log-parameters.
-
-    Raises
-    ------
-    BiogripError
-        If the model has no answer anywhere.
-    """
+def _starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
+    """Choose where walkers set out: by their densities, from the prior and about all optima."""
     prior, problem = posterior.prior, posterior.problem
     drawn = prior.draw(_DRAWN, rng)
     order = np.argsort(-posterior.log_density(drawn).astype(np.float32), kind="stable")
@@ -170,7 +155,8 @@ def _tempered(log_weights: Array, count: int) -> Array:
 
 
 Moves = Sequence[tuple[emcee.moves.Move, float]]
-Stretch = tuple[Array, Array, float]
+# Where walkers were, and the share of accepted proposals.
+Stretch = tuple[Array, float]
 
 
 class _Ensemble:
@@ -184,14 +170,7 @@ class _Ensemble:
         self.recent = state.coords
 
     def walk(self, steps: int, moves: Moves, power: float = 1.0) -> Stretch:
-        """Take steps, under a power of the likelihood.
-
-        Returns
-        -------
-        Stretch
-            Where the walkers were, the logarithm of the density there, and the share of
-            proposals that were accepted.
-        """
+        """Take steps, under a power of the likelihood."""
         count, size = self._state.coords.shape
         density = partial(self._posterior.log_density, power=power)
         sampler = _Sampler(count, size, density, moves=moves, vectorize=True)
@@ -201,8 +180,9 @@ class _Ensemble:
         self.recent = chain[steps // 2 :: _KEPT].reshape(-1, size)
         self._evaluations += count * steps
         best = self._state.coords[[np.argmax(self._state.log_prob)]]
-        self._progress(self._evaluations, float(self._posterior.misfit(np.exp(best))[0]))
-        return chain, sampler.get_log_prob(), float(np.mean(sampler.acceptance_fraction))
+        misfit_rad = self._posterior.problem.residuals.condensed_misfit(np.exp(best))
+        self._progress(self._evaluations, float(misfit_rad[0]))
+        return chain, float(np.mean(sampler.acceptance_fraction))
 
 
 class _Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
@@ -225,8 +205,7 @@ class _AlongValley(DEMove):  # type: ignore[misc]
     ) -> tuple[Array, Array]:
         """Propose for walkers `s`, by differences of the others, `c`."""
         others = [self._axes.of(np.concatenate(c))]
-        found = super().get_proposal(self._axes.of(s), others, random)
-        proposed, factors = found
+        proposed, factors = super().get_proposal(self._axes.of(s), others, random)
         return _gridded(self._axes.back(proposed)), factors
 
 

@@ -28,13 +28,7 @@ class Straightened:
     def of(self, log_parameters: Array) -> Array:
         """Put the sum's logarithm in place of the last member's, log-ratios to it of the others'.
 
-        Parameters
-        ----------
-        log_parameters : (n, n_parameters)
-
-        Returns
-        -------
-        (n, n_parameters)
+        Both of shape (n, n_parameters).
         """
         found = log_parameters.copy()
         if len(self.members) > 1:

@@ -24,11 +24,6 @@ _FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 1
 _SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
 
-def valley_data(likelihood: Likelihood, model: SampleModel) -> dict[str, Any] | None:
-    """Valley as of `valley_and_deeper`."""
-    return valley_and_deeper(likelihood, model)[0]
-
-
 def valley_and_deeper(
     likelihood: Likelihood, model: SampleModel
 ) -> tuple[dict[str, Any] | None, Array | None]:
@@ -64,14 +59,10 @@ def valley_and_deeper(
         grid = {"x_values": _listed(x_values, rounded), "y_values": _listed(y_values, rounded)}
         grids.append({**grid, "rises": _listed(rises, rounded_rise)})
         deeper = deeper if lower is None else lower
-    x, y = (model.parameters[index] for index in pair)
-    data = {
-        "x": {"name": x.name, "symbol": x.symbol, "unit": x.unit},
-        "y": {"name": y.name, "symbol": y.symbol, "unit": y.unit},
-        "grids": grids,
-        "best": [rounded(float(value)) for value in best],
-    }
-    return data, deeper
+    both = [model.parameters[index] for index in pair]
+    x, y = ({"name": p.name, "symbol": p.symbol, "unit": p.unit} for p in both)
+    at_best = [rounded(float(value)) for value in best]
+    return {"x": x, "y": y, "grids": grids, "best": at_best}, deeper
 
 
 def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[list[float | None]]:
@@ -89,8 +80,7 @@ def _rises(
     rows, columns = x_values.shape
     x = np.tile(likelihood.best, (rows * columns, 1))
     x[:, pair[0]], x[:, pair[1]] = np.log(x_values.ravel()), np.log(y_values.ravel())
-    held = np.zeros(x.shape[1], dtype=bool)
-    held[pair] = True
+    held = np.isin(np.arange(x.shape[1]), pair)
     rises = np.full(len(x), np.inf)
     points, start = np.arange(len(x)), x.copy()
     # A point, and its neighbours on the grid.
@@ -99,9 +89,7 @@ def _rises(
     neighbours = np.stack([beside[i : i + rows, j : j + columns].ravel() for i, j in shifts])
     tolerance = FAIR
     while len(points):
-        fixed = np.broadcast_to(held, start.shape)
-        trace = np.zeros(len(points), dtype=np.int64)
-        found, fitted = fits.with_fixed(trace, start, fixed, tolerance)
+        found, fitted = fits.with_fixed(start, held, tolerance)
         news = np.zeros(len(x), dtype=bool)
         for point, rise, parameters in zip(points, found, fitted, strict=True):
             if rise < rises[point]:

@@ -1,6 +1,7 @@
 """What a trace says about every parameter, in words that can be relied on."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -9,11 +10,7 @@ import numpy as np
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.profiles import Profile, profiles_of
-from biogrip.identifiability.quantities import (
-    Quantity,
-    combinations_of,
-    parameters_and_sum,
-)
+from biogrip.identifiability.quantities import Quantity, combinations_of
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
@@ -81,7 +78,11 @@ class Finding:
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
         words = self._limits_in_words() + (f", except {but}{self._unit}" if but else "")
         provided = self.quantity.provided
-        return f"{words}, provided {provided}" if provided and self.told else words
+        return (
+            f"{words}, provided {provided}"
+            if provided and self.verdict != NOT_DETERMINED
+            else words
+        )
 
     def _limits_in_words(self) -> str:
         unit = self._unit
@@ -122,9 +123,13 @@ class Trade:
         )
 
 
-def findings_of(likelihood: Likelihood, model: SampleModel) -> list[Finding]:
-    """Judge every parameter, and the sum of those that the model calls exchangeable."""
-    return _findings(likelihood, parameters_and_sum(model))
+def findings_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Finding]:
+    """Judge quantities, each by its profile."""
+    (profiles,) = profiles_of([likelihood], quantities)
+    return [
+        Finding(quantity, profile, likelihood.deviation(quantity))
+        for quantity, profile in zip(quantities, profiles, strict=True)
+    ]
 
 
 def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding]) -> list[Trade]:
@@ -134,30 +139,20 @@ def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding
         for finding in findings
         if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
     ]
-    trades = []
+    found: list[tuple[list[int], Finding]] = []
     for finding in findings:
         members = [index for index in finding.quantity.members if index in open_ones]
-        if len(finding.quantity.members) > 1 and len(members) > 1:
-            if finding.verdict == DETERMINED:
-                trades.append(_trade(model, members, finding))
+        if len(members) > 1:
+            found.append((members, finding))
             open_ones = [index for index in open_ones if index not in members]
     for pair in combinations(open_ones, 2):
         candidates = combinations_of(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
         if min(deviations, default=np.inf) < _WORTH_A_LOOK:
-            (finding,) = _findings(likelihood, [candidates[int(np.argmin(deviations))]])
-            if finding.verdict == DETERMINED:
-                trades.append(_trade(model, list(pair), finding))
-    return trades
-
-
-def _trade(model: SampleModel, members: list[int], finding: Finding) -> Trade:
-    return Trade(tuple(model.parameters[index].name for index in members), finding)
-
-
-def _findings(likelihood: Likelihood, quantities: list[Quantity]) -> list[Finding]:
-    (profiles,) = profiles_of([likelihood], quantities)
+            best = candidates[int(np.argmin(deviations))]
+            found += [(list(pair), finding) for finding in findings_of(likelihood, [best])]
     return [
-        Finding(quantity, profile, likelihood.deviation(quantity))
-        for quantity, profile in zip(quantities, profiles, strict=True)
+        Trade(tuple(model.parameters[index].name for index in members), finding)
+        for members, finding in found
+        if finding.verdict == DETERMINED
     ]

@@ -16,7 +16,7 @@ _CORRELATED = 5.0
 _STRETCHES, _SHORTEST = 20, 5
 
 
-def doubts_about_noise(residual: Array) -> list[str]:
+def doubts_about_noise(residual: Array) -> Iterator[str]:
     """Say in sentences why a residual is not white noise.
 
     Parameters
@@ -24,10 +24,6 @@ def doubts_about_noise(residual: Array) -> list[str]:
     residual : (n_samples,)
         What a fit leaves of a trace.
     """
-    return list(_doubts(residual))
-
-
-def _doubts(residual: Array) -> Iterator[str]:
     correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
     chance = uneven(residual)
     if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
@@ -69,12 +65,8 @@ def wandering(residual: Array) -> float:
     The sum of n_i m_i^2 / sigma^2 over stretches of n_i samples and mean m_i is
     chi-squared for white noise, with a degree of freedom each; what a fit has
     taken from it only lowers it. Parts of a spectrum below some ten periods a trace
-    show in it, however little they are beside the noise of single samples.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        What a fit leaves of a trace.
+    show in it, however little they are beside the noise of single samples. The residual is
+    that of `doubts_about_noise`.
     """
     from scipy.special import chdtrc
 
@@ -91,12 +83,7 @@ def uneven(residual: Array) -> float:
 
     By the largest distance between the cumulative periodogram and a straight line, which is
     Kolmogorov's [1]_. Parts that are forgotten within some samples show in it where neighbours
-    are hardly correlated yet.
-
-    Parameters
-    ----------
-    residual : (n_samples,)
-        What a fit leaves of a trace.
+    are hardly correlated yet. The residual is that of `doubts_about_noise`.
 
     References
     ----------

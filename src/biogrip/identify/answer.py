@@ -1,6 +1,6 @@
 """What every identifier returns."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,6 +11,10 @@ from biogrip.identify.levenberg_marquardt import Minima
 
 Progress = Callable[[int, float], None]
 """Is told, now and then, how many responses were simulated and the lowest misfit in rad."""
+
+
+Row = tuple[Array, float, float, int]
+"""Of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
 def silent(evaluations: int, misfit_rad: float) -> None:
@@ -35,6 +39,12 @@ class History:
     median_misfit: Array
     best_parameters: Array
     evaluations: IntArray
+
+    @classmethod
+    def of(cls, rows: Sequence[Row]) -> "History":
+        """Put the rows of a history together."""
+        parameters, best_misfit, median_misfit, counts = map(np.array, zip(*rows, strict=True))
+        return cls(best_misfit, median_misfit, parameters, counts)
 
 
 @dataclass(frozen=True)

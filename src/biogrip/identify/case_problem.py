@@ -11,11 +11,13 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, for_model, problem_of
+from biogrip.identify.problem import Problem, problem_of, searched
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
+from biogrip.response.misfit import Misfit
+from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
 from biogrip.response.residuals import noise_of
 from biogrip.response.whitening import Colour, Whitening
@@ -118,8 +120,12 @@ class CaseProblem:
         """
         noise_rad = noise_rad or self.noise_rad
         if condensed is None:
+            # Once for all traces of a case: it takes as long as some fifty responses.
             shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
-            condensed = self._condensed_at(time_s, inertia=shown)
+            sampled = time_s.tobytes(), shown
+            if sampled not in self._condensed:
+                self._condensed[sampled] = self._condense(time_s, self.nuisance(time_s), shown)
+            condensed = self._condensed[sampled]
         return problem_of(
             self.gripper,
             model or self.searched,
@@ -142,8 +148,12 @@ class CaseProblem:
         return inertia_shows(self._changes[sampled], rotation_rad, noise_rad)
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
-        """Pose one of its problems for another model, at less than the price of a new one."""
-        return for_model(problem, model, self.ranges)
+        """Pose one of its problems for another model; what is tabulated of the trace is shared."""
+        residuals = problem.residuals.of_model(model)
+        misfit: Misfit = residuals.condensed_misfit
+        if isinstance(problem.misfit, SeriesMisfit):
+            misfit = problem.misfit.of_model(model)
+        return searched(misfit, residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
         """What the instrument may have added, (n_functions, n_samples)."""
@@ -170,24 +180,13 @@ class CaseProblem:
             whitening = Whitening(time_s, colour, nuisance, uncertain)
         return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)
 
-    def _condensed_at(self, time_s: Array, *, inertia: bool) -> Condensed:
-        # Once for all traces of a case: it takes as long as some fifty responses.
-        sampled = time_s.tobytes(), inertia
-        if sampled not in self._condensed:
-            self._condensed[sampled] = self._condense(time_s, self.nuisance(time_s), inertia)
-        return self._condensed[sampled]
-
     def _condense(
-        self,
-        time_s: Array,
-        nuisance: Array,
-        inertia: bool,
-        whitening: Whitening | None = None,
+        self, time_s: Array, basis: Array, inertia: bool, whitening: Whitening | None = None
     ) -> Condensed:
         return Condensed(
             self.torque,
             time_s,
-            nuisance,
+            basis,
             nonlinear=self.nonlinear,
             ringing_s=ringing_s(self.gripper) if inertia else 0.0,
             whitening=whitening,

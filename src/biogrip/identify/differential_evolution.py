@@ -7,13 +7,14 @@ References
    341-359.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.identify.answer import History, Identification, Progress, silent
+from biogrip.identify.answer import History, Identification, Progress, Row, silent
 from biogrip.identify.problem import Problem
 from biogrip.keys import Key
 
@@ -37,30 +38,30 @@ class DifferentialEvolutionSettings:
     ]
 
 
-def identify(
+def identify_many(
+    problems: Sequence[Problem],
+    settings: DifferentialEvolutionSettings,
+    rngs: Sequence[np.random.Generator],
+    progress: Progress = silent,
+) -> list[Identification]:
+    """Identify samples one after the other, as `biogrip.identify.methods` says.
+
+    Individuals are ranked on their misfit in single precision, as in `biogrip.identify.genetic`.
+    Progress is told after every generation of each.
+    """
+    pairs = zip(problems, rngs, strict=True)
+    return [_identified(problem, settings, rng, progress) for problem, rng in pairs]
+
+
+def _identified(
     problem: Problem,
     settings: DifferentialEvolutionSettings,
     rng: np.random.Generator,
-    progress: Progress = silent,
+    progress: Progress,
 ) -> Identification:
-    """Identify a sample with differential evolution; a step is a generation.
-
-    Individuals are ranked on their misfit in single precision, as in `biogrip.identify.genetic`.
-
-    Parameters
-    ----------
-    problem
-        What is identified.
-    settings
-        Its budget.
-    rng
-        The only source of randomness.
-    progress
-        Is told after every generation.
-    """
     from scipy.optimize import Bounds, differential_evolution
 
-    rows: list[tuple[Array, float, float, int]] = []
+    rows: list[Row] = []
     evaluations = 0
 
     def ranking(columns: Array) -> Array:
@@ -68,13 +69,13 @@ def identify(
         evaluations += columns.shape[1]
         return problem.misfit(np.exp(columns.T)).astype(np.float32).astype(float)
 
+    def row_of(result: "OptimizeResult") -> Row:
+        median = float(np.median(result.population_energies))
+        return np.exp(result.x), float(result.fun), median, evaluations
+
     def record(intermediate_result: "OptimizeResult") -> None:
-        lowest, middle = (
-            float(intermediate_result.fun),
-            float(np.median(intermediate_result.population_energies)),
-        )
-        rows.append((np.exp(intermediate_result.x), lowest, middle, evaluations))
-        progress(evaluations, lowest)
+        rows.append(row_of(intermediate_result))
+        progress(evaluations, rows[-1][1])
 
     found = differential_evolution(
         ranking,
@@ -88,20 +89,6 @@ def identify(
         updating="deferred",
         vectorized=True,
     )
-    final = np.exp(found.x), float(found.fun), float(np.median(found.population_energies))
-    rows.append((*final, evaluations))
-    parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
-    history = History(
-        np.array(best_misfit),
-        np.array(median_misfit),
-        np.array(parameters),
-        np.array(counts, dtype=np.int64),
-    )
-    return Identification(
-        history.best_parameters[-1],
-        float(found.fun),
-        int(found.nit),
-        evaluations,
-        "converged" if found.success else "generation limit",
-        history,
-    )
+    rows.append(final := row_of(found))
+    why = "converged" if found.success else "generation limit"
+    return Identification(*final[:2], int(found.nit), evaluations, why, History.of(rows))

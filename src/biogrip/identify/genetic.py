@@ -13,34 +13,7 @@ from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import Genome
 from biogrip.identify.problem import Problem
 from biogrip.identify.selection import Ranking, best
-from biogrip.response.misfit import Misfit, Misfits, together
-
-
-def identify(
-    problem: Problem,
-    settings: GeneticSettings,
-    rng: np.random.Generator,
-    progress: Progress = silent,
-) -> Identification:
-    """Identify a sample with the genetic algorithm; a step is a generation.
-
-    Individuals are ranked on their misfit in single precision, ties broken by
-    the chromosome. Its 24 bits are far finer than noise can tell apart, and far
-    coarser than what differs between processors and BLAS libraries: the last
-    bits of a misfit cannot change which trajectory is taken.
-
-    Parameters
-    ----------
-    problem
-        What is identified.
-    settings
-        How the population evolves.
-    rng
-        The only source of randomness.
-    progress
-        Is told after every generation.
-    """
-    return identify_many([problem], settings, [rng], progress)[0]
+from biogrip.response.misfit import Misfits, together
 
 
 def identify_many(
@@ -49,20 +22,16 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
-    """Identify samples side by side; each answer is, to the bit, that of `identify`.
+    """Identify samples of one genome, as `biogrip.identify.methods` says.
 
-    Parameters
-    ----------
-    problems
-        What is identified; all have the same genome.
-    settings
-        How each population evolves.
-    rngs
-        The only source of randomness of each problem.
-    progress
-        Is told after every generation, of all problems together.
+    Individuals are ranked on their misfit in single precision, ties broken by
+    the chromosome. Its 24 bits are far finer than noise can tell apart, and far
+    coarser than what differs between processors and BLAS libraries: the last
+    bits of a misfit cannot change which trajectory is taken.
+
+    Progress is told after every generation, of all problems together.
     """
-    evolutions = evolve_problems(problems, settings, rngs, progress)
+    evolutions = evolved(problems, settings, rngs, progress)
     return [evolution.identification for evolution in evolutions]
 
 
@@ -83,26 +52,15 @@ class Evolution:
     last_survivors: Array
 
 
-def evolve_problems(
+def evolved(
     problems: Sequence[Problem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Evolution]:
-    """Run the algorithm on problems side by side; arguments as of `identify_many`."""
+    """Identify as `identify_many` does, and return the survivors as well."""
     misfits = together([problem.misfit for problem in problems])
     return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
-
-
-def evolve(
-    misfit: Misfit,
-    genome: Genome,
-    settings: GeneticSettings,
-    rng: np.random.Generator,
-    progress: Progress = silent,
-) -> Evolution:
-    """Run the algorithm on any misfit of parameters of shape (n, n_parameters)."""
-    return evolve_many(together([misfit]), genome, settings, [rng], progress)[0]
 
 
 def evolve_many(
@@ -124,19 +82,16 @@ def evolve_many(
         those populations, (n_populations,).
     genome
         What a chromosome may be.
-    settings
-        How each population evolves.
-    rngs
-        The only source of randomness of each population.
-    progress
-        Is told after every generation, of all populations together.
+    settings, rngs, progress
+        As of `identify_many`, with a generator for each population.
     """
     running = np.arange(len(rngs))
     drawn = [genome.code(genome.draw(settings.population, rng)) for rng in rngs]
     survivors = _evaluated(np.stack(drawn, axis=1), misfits, genome, running)
     survivors = survivors.best(settings.survivors)
     first, last = survivors.codes, survivors.codes.copy()
-    course = [_Generation.of(running, survivors)]
+    middle = settings.survivors // 2
+    course = [(running, survivors.at(0, middle))]
     improved, stalled = np.zeros_like(running), np.zeros(len(rngs), dtype=bool)
     evaluations = settings.population * len(rngs)
     for generation in range(1, settings.max_generations + 1):
@@ -157,11 +112,11 @@ def evolve_many(
                 mutate(others, genome, settings, chosen)
                 evaluations += others[0].size
                 others_now = _evaluated(others, misfits, genome, running)
-                survivors = survivors.first().joined(others_now)
+                survivors = survivors.at(0).joined(others_now)
         everyone = survivors.joined(_evaluated(children, misfits, genome, running))
         survivors = everyone.best(settings.survivors)
         improved[running[survivors.ranking[:, 0] < before]] = generation
-        course.append(_Generation.of(running, survivors))
+        course.append((running, survivors.at(0, middle)))
         evaluations += children[0].size
         progress(evaluations, float(survivors.ranking[:, 0].min()))
     last[:, running] = survivors.codes
@@ -189,8 +144,9 @@ class _Populations:
             np.concatenate((self.ranking, other.ranking), axis=1),
         )
 
-    def first(self) -> "_Populations":
-        return _Populations(self.codes[:, :, :1], self.ranking[:, :1])
+    def at(self, *places: int) -> "_Populations":
+        # Copies, for a part of an array keeps all of it.
+        return _Populations(self.codes.take(places, axis=2), self.ranking.take(places, axis=1))
 
     def only(self, which: NDArray[np.bool_]) -> "_Populations":
         return _Populations(self.codes[:, which], self.ranking[which])
@@ -208,43 +164,16 @@ def _evaluated(
     return _Populations(codes, ranking)
 
 
-@dataclass(frozen=True)
-class _Generation:
-    """What is kept of a generation.
-
-    Parameters
-    ----------
-    running : (n_populations,)
-        Indices of those that have not stopped.
-    best_codes : (n_words, n_populations)
-    best_misfit, median_misfit : (n_populations,)
-        Of the survivors.
-    """
-
-    running: IntArray
-    best_codes: IntArray
-    best_misfit: Ranking
-    median_misfit: Ranking
-
-    @classmethod
-    def of(cls, running: IntArray, survivors: _Populations) -> "_Generation":
-        codes, ranking = survivors.codes, survivors.ranking
-        middle = ranking.shape[1] // 2
-        # Copies, for a part of an array keeps all of it.
-        return cls(running, codes[:, :, 0].copy(), ranking[:, 0].copy(), ranking[:, middle].copy())
-
-
 def _identifications(
-    course: Sequence[_Generation],
+    course: Sequence[tuple[IntArray, _Populations]],
     stalled: NDArray[np.bool_],
     genome: Genome,
     settings: GeneticSettings,
 ) -> list[Identification]:
-    """Sort the generations of all populations into what each of them went through."""
-    running = np.concatenate([generation.running for generation in course])
-    codes = np.concatenate([generation.best_codes for generation in course], axis=1)
-    best_misfit = np.concatenate([generation.best_misfit for generation in course])
-    median_misfit = np.concatenate([generation.median_misfit for generation in course])
+    """Sort generations, the best and the middle survivor of all populations that run, by these."""
+    running = np.concatenate([populations for populations, _ in course])
+    codes = np.concatenate([kept.codes[:, :, 0] for _, kept in course], axis=1)
+    best_misfit, median_misfit = np.concatenate([kept.ranking for _, kept in course]).T
     found = []
     for population, has_stalled in enumerate(stalled):
         own = np.flatnonzero(running == population)
@@ -254,16 +183,11 @@ def _identifications(
             genome.parameters(codes[:, own]),
             _evaluations(settings, len(own)),
         )
-        found.append(
-            Identification(
-                history.best_parameters[-1],
-                float(history.best_misfit[-1]),
-                len(own) - 1,
-                int(history.evaluations[-1]),
-                "stalled" if has_stalled else "generation limit",
-                history,
-            )
-        )
+        parameters, misfit_rad = history.best_parameters[-1], float(history.best_misfit[-1])
+        evaluations = int(history.evaluations[-1])
+        why = "stalled" if has_stalled else "generation limit"
+        steps = len(own) - 1
+        found.append(Identification(parameters, misfit_rad, steps, evaluations, why, history))
     return found
 
 

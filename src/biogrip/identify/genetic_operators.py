@@ -25,10 +25,8 @@ def cross(
     ----------
     parents : (n_words, n_populations, n_parents)
         Codes, best first.
-    genome
-        What the codes say.
-    settings
-        How parents are mated.
+    genome, settings
+        What the codes say, and how parents are mated and children mutate.
     rngs
         A generator for each population.
 
@@ -62,8 +60,6 @@ def _mates(
         rank = np.arange(parents, 0, -1)
         return rng.choice(parents, size=(pairs, 2), p=rank / rank.sum())
     even = parents // 2 * 2
-    if 2 * pairs <= even:
-        return rng.permutation(parents)[: 2 * pairs].reshape(pairs, 2)
     rounds = [rng.permutation(parents)[:even] for _ in range(-(-2 * pairs // even))]
     return np.concatenate(rounds)[: 2 * pairs].reshape(pairs, 2)
 
@@ -80,12 +76,8 @@ def mutate(
     ----------
     children : (n_words, n_populations, n_children)
         Codes.
-    genome
-        What the codes say.
-    settings
-        How many children mutate, and how many genes of each.
-    rngs
-        A generator for each population.
+    genome, settings, rngs
+        As of `cross`.
     """
     chance = np.empty(children.shape[1:])
     for own, rng in zip(chance, rngs, strict=True):

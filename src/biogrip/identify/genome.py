@@ -101,7 +101,7 @@ class Genome:
         (n, n_parameters)
             Each the double nearest to the decimal number that is encoded.
         """
-        return np.stack([_decoded(chromosomes[:, own].T) for own in self._own], axis=1)
+        return self.parameters(self.code(chromosomes))
 
     def code(self, chromosomes: IntArray) -> IntArray:
         """Number chromosomes in the order of their genes; different ones differ.
@@ -235,10 +235,8 @@ class Genome:
     @cached_property
     def _values_of(self) -> list["_Values"]:
         """Looks up values of each parameter by the number that its genes are."""
-        return [
-            _values(tuple(self.low[own].tolist()), tuple(self.high[own].tolist()))
-            for own in self._own
-        ]
+        ends = [(self.low[own].tolist(), self.high[own].tolist()) for own in self._own]
+        return [_values(tuple(low), tuple(high)) for low, high in ends]
 
 
 _Values = Callable[[IntArray, Array], None]
@@ -249,6 +247,7 @@ _Values = Callable[[IntArray, Array], None]
 def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
     """Look up values of a parameter by the number that its genes are."""
     exponents, mantissas = np.arange(low[0], high[0] + 1), _mantissas(low[1:], high[1:])
+    # Both powers are exact doubles, and one of them is 1, so this rounds once.
     power = exponents + (_LARGEST_POWER - len(low) + 1)
     multiplier, divisor = _MULTIPLIER[power], _DIVISOR[power]
     if len(exponents) * len(mantissas) <= _LARGEST_TABLE:
@@ -275,16 +274,6 @@ def _mantissas(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
     for least, most in zip(low, high, strict=True):
         numbers = (10 * numbers[:, None] + np.arange(least, most + 1)).ravel()
     return numbers
-
-
-def _decoded(genes: IntArray) -> Array:
-    """Numbers of an exponent and digits, (n_genes, n)."""
-    mantissa = np.zeros(genes.shape[1])
-    for digit in genes[1:]:
-        mantissa = 10 * mantissa + digit
-    # Both powers are exact doubles, and one of them is 1, so this rounds once.
-    power = genes[0] + (_LARGEST_POWER - len(genes) + 1)
-    return mantissa * _MULTIPLIER[power] / _DIVISOR[power]
 
 
 # A table of all values of a parameter is looked up in one go; of six digits it would take 100 MB.

@@ -8,8 +8,8 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identify.answer import Identification, Progress, silent
-from biogrip.identify.multi_start import Row, best_of_starts, screened
+from biogrip.identify.answer import Identification, Progress, Row, silent
+from biogrip.identify.multi_start import best_of_starts, screened
 from biogrip.identify.problem import Problem
 from biogrip.keys import Key
 
@@ -25,33 +25,6 @@ class LeastSquaresSettings:
     starts: Annotated[int, Key("Local fits, from the best of them.", low=1, high=10_000)]
 
 
-def identify(
-    problem: Problem,
-    settings: LeastSquaresSettings,
-    rng: np.random.Generator,
-    progress: Progress = silent,
-) -> Identification:
-    """Identify a sample by local fits from the best of many random points; a step is a fit.
-
-    Parameters
-    ----------
-    problem
-        What is identified.
-    settings
-        Its budget.
-    rng
-        The only source of randomness.
-    progress
-        Is told in the end.
-
-    Raises
-    ------
-    BiogripError
-        If the model has no answer at any of the points.
-    """
-    return identify_many([problem], settings, [rng], progress)[0]
-
-
 def identify_many(
     problems: Sequence[Problem],
     settings: LeastSquaresSettings,
@@ -59,18 +32,12 @@ def identify_many(
     progress: Progress = silent,
     further: Sequence[Array] | None = None,
 ) -> list[Identification]:
-    """Identify many traces at once, each as if it were alone; a step is a fit.
+    """Identify samples by local fits from the best of many random points.
 
     Parameters
     ----------
-    problems
-        What is identified, one a trace.
-    settings
-        The budget of each.
-    rngs
-        A source of randomness for each.
-    progress
-        Is told after every trace.
+    problems, settings, rngs, progress
+        As `biogrip.identify.methods` says; progress is told after every trace.
     further
         More starting points of each, log-parameters (n_further, n_parameters).
 
@@ -79,10 +46,9 @@ def identify_many(
     BiogripError
         If the model has no answer at any of the points.
     """
-    screened_points = [
-        _screened(problem, settings, rng) for problem, rng in zip(problems, rngs, strict=True)
-    ]
-    starts, before = zip(*screened_points, strict=True)
+    pairs = zip(problems, rngs, strict=True)
+    points = [_screened(problem, settings, rng) for problem, rng in pairs]
+    starts, before = zip(*points, strict=True)
     if further is not None:
         starts = tuple(map(np.concatenate, zip(starts, further, strict=True)))
     return best_of_starts(problems, starts, before, progress)

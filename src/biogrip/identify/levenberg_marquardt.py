@@ -25,7 +25,7 @@ References
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
 
@@ -43,8 +43,26 @@ _RATIOS = 256
 _SPACING, _WIDEST = 1e-3, 2.0**-10
 
 
+class Rows:
+    """Arrays, fields of a dataclass, with a row for each of n problems."""
+
+    @property
+    def parts(self) -> tuple[Any, ...]:
+        """All of them, in order."""
+        return tuple(vars(self).values())
+
+    def __getitem__(self, which: BoolArray | IntArray) -> Self:
+        """Return the rows of some problems."""
+        return type(self)(*(part[which] for part in self.parts))
+
+    @classmethod
+    def joined(cls, some: Sequence[Self]) -> Self:
+        """Put the rows of some behind one another."""
+        return cls(*map(np.concatenate, zip(*(each.parts for each in some), strict=True)))
+
+
 @dataclass
-class Normal:
+class Normal(Rows):
     """Normal equations of n problems.
 
     Parameters
@@ -64,20 +82,6 @@ class Normal:
     information: Array
     misfit_rad: Array
 
-    @property
-    def parts(self) -> tuple[Array, ...]:
-        """All of it, in order."""
-        return self.square_sum, self.gradient, self.information, self.misfit_rad
-
-    def of(self, which: BoolArray | IntArray) -> "Normal":
-        """Return those of some problems."""
-        return Normal(*(part[which] for part in self.parts))
-
-
-def together(normals: Sequence[Normal]) -> Normal:
-    """Put normal equations behind one another."""
-    return Normal(*(np.concatenate(p) for p in zip(*(n.parts for n in normals), strict=True)))
-
 
 Objective = Callable[[Array, IntArray], Normal]
 """Normal equations at points (n, n_parameters) of the problems with given indices, (n,)."""
@@ -94,7 +98,7 @@ class Constraint(Protocol):
 
 
 @dataclass
-class Minima:
+class Minima(Rows):
     """Where the problems ended.
 
     Parameters
@@ -114,24 +118,16 @@ class Minima:
     evaluations: IntArray
     converged: BoolArray
 
-    def of(self, which: IntArray) -> "Minima":
-        """Return those of some problems."""
-        x, misfit_rad, evaluations = self.x, self.misfit_rad, self.evaluations
-        return Minima(x[which], misfit_rad[which], evaluations[which], self.converged[which])
-
-
-def joined(minima: Sequence[Minima]) -> Minima:
-    """Put minima of one model behind one another."""
-    return Minima(
-        np.concatenate([each.x for each in minima]),
-        np.concatenate([each.misfit_rad for each in minima]),
-        np.concatenate([each.evaluations for each in minima]),
-        np.concatenate([each.converged for each in minima]),
-    )
+    @classmethod
+    def none_yet(cls, starts: Array, evaluations: int) -> "Minima":
+        """Return what is known of starting points that are not compared with any other yet."""
+        count = len(starts)
+        misfit_rad, converged = np.full(count, np.inf), np.zeros(count, dtype=bool)
+        return cls(starts.copy(), misfit_rad, np.full(count, evaluations), converged)
 
 
 @dataclass
-class _State:
+class _State(Rows):
     problem: IntArray
     x: Array
     low: Array
@@ -170,33 +166,20 @@ def minimized(
     most_steps
         Stop after so many.
     """
-    count = len(starts)
-    everyone = np.arange(count)
-    minima = Minima(
-        starts.copy(),
-        np.zeros(count),
-        np.ones(count, dtype=np.int64),
-        np.zeros(count, dtype=bool),
-    )
-    state = _State(
-        everyone,
-        starts,
-        low,
-        high,
-        objective(starts, everyone),
-        np.full(count, damping),
-        np.full(count, 2.0),
-    )
+    everyone, minima = np.arange(len(starts)), Minima.none_yet(starts, evaluations=1)
+    normal, growth = objective(starts, everyone), np.full(len(starts), 2.0)
+    dampings = np.full(len(starts), damping)
+    state = _State(everyone, starts, low, high, normal, dampings, growth)
     for _ in range(most_steps):
         minima.evaluations[state.problem] += 1
         done = _advance(state, objective, constraint, tolerance)
         if np.any(done):
             minima.converged[state.problem[done]] = True
-            _leave(state, done, minima)
-            state = _chosen(state, ~done)
+            _leave(state[done], minima)
+            state = state[~done]
         if not len(state.problem):
             break
-    _leave(state, np.ones(len(state.problem), dtype=bool), minima)
+    _leave(state, minima)
     return minima
 
 
@@ -321,30 +304,15 @@ def _damp(state: _State, gained: Array, predicted: Array) -> None:
     state.growth = np.where(better, 2.0, 2 * state.growth)
 
 
-def _leave(state: _State, which: BoolArray, minima: Minima) -> None:
-    minima.x[state.problem[which]] = state.x[which]
-    minima.misfit_rad[state.problem[which]] = state.normal.misfit_rad[which]
-
-
-def _chosen(state: _State, which: BoolArray) -> _State:
-    return _State(
-        state.problem[which],
-        state.x[which],
-        state.low[which],
-        state.high[which],
-        state.normal.of(which),
-        state.damping[which],
-        state.growth[which],
-    )
+def _leave(state: _State, minima: Minima) -> None:
+    minima.x[state.problem] = state.x
+    minima.misfit_rad[state.problem] = state.normal.misfit_rad
 
 
 def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:
-    return Normal(
-        *(
-            np.where(which.reshape(-1, *[1] * (a.ndim - 1)), a, b)
-            for a, b in zip(one.parts, other.parts, strict=True)
-        )
-    )
+    pairs = zip(one.parts, other.parts, strict=True)
+    chosen = (np.where(which.reshape(-1, *[1] * (a.ndim - 1)), a, b) for a, b in pairs)
+    return Normal(*chosen)
 
 
 def _times(matrices: Array, vectors: Array) -> Array:

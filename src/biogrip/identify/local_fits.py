@@ -11,13 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
-from biogrip.identify.levenberg_marquardt import (
-    Constraint,
-    Minima,
-    Normal,
-    minimized,
-    together,
-)
+from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, minimized
 from biogrip.identify.problem import Problem
 from biogrip.identify.refreshed_fits import minimized_with_refreshes
 
@@ -113,7 +107,7 @@ class LocalFits:
             rows = self._residuals.condensed_responses(here)
             normals.append(self._normal_of(rows, here, own))
             normals[-1].information += self._second(rows[:, 0], here, own)
-        return together(normals)
+        return Normal.joined(normals)
 
     def _second(self, residual: Array, x: Array, trace: IntArray) -> Array:
         """Residuals times their second derivatives, in units of the noise."""
@@ -152,20 +146,16 @@ class LocalFits:
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
         if len(x) <= size:
             return self._normal_of(rows_of(x, *beside), x, trace)
-        return together(
-            [
-                self._normal_of(
-                    rows_of(x[some], *(row[some] for row in beside)), x[some], trace[some]
-                )
-                for some in parts(len(x), size)
-            ]
-        )
+        normals = []
+        for some in parts(len(x), size):
+            rows = rows_of(x[some], *(row[some] for row in beside))
+            normals.append(self._normal_of(rows, x[some], trace[some]))
+        return Normal.joined(normals)
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
         """Normal equations, given rows of the responses; infinitely bad where these are none."""
         answered = np.isfinite(rows[:, 0, 0])
-        if not np.all(answered):
-            rows[~answered] = 0.0
+        rows[~answered] = 0.0
         rows[:, 0] -= self._traces[trace]
         products = rows @ rows.swapaxes(1, 2)
         misfit_rad = np.sqrt(products[:, 0, 0] / self._residuals.samples)
@@ -218,9 +208,8 @@ class LocalFits:
                 rows += correction
             return rows
 
-        def objective(x: Array, fit: IntArray, correction: Array | None = None) -> Normal:
-            beside = () if correction is None else (correction,)
-            normal = self._in_parts(rows_of, x, trace[fit], *beside)
+        def objective(x: Array, fit: IntArray, *correction: Array) -> Normal:
+            normal = self._in_parts(rows_of, x, trace[fit], *correction)
             return normal if held is None else held.added(normal, x, fit)
 
         if self._residuals.nonlinear:

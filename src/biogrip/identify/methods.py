@@ -1,10 +1,10 @@
 """The identifiers that there are.
 
 Each is a module of its own here, named like the method. It has the class of its settings,
-whose fields are the keys of its config block (`biogrip.keys.Key`), and a function or two:
-``identify(problem, settings, rng, progress)`` returns an `Identification`, and
-``identify_many(problems, settings, rngs, progress)`` those of many traces at once. Ranges and
-traces are the problem's, randomness is the generator's, the budget is in the settings.
+whose fields are the keys of its config block (`biogrip.keys.Key`), and a function
+``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
+trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
+in the settings, its generator is its only source of randomness, and progress is told of all.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from biogrip.identify.problem import Problem
 Identify = Callable[
     [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
 ]
-"""Identifies traces, each with a generator of its own, and each as if it were alone."""
+"""Identifies traces as the ``identify_many`` of a method does, with its settings."""
 
 
 @dataclass(frozen=True)
@@ -108,15 +108,9 @@ def identifier(name: str, settings: object) -> Identify:
     def identify(
         problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
     ) -> list[Identification]:
-        if hasattr(module, "identify_many"):
-            answers = module.identify_many(problems, settings, rngs, progress)
-        else:
-            pairs = zip(problems, rngs, strict=True)
-            answers = [module.identify(problem, settings, rng, progress) for problem, rng in pairs]
-        return [
-            answer.in_order(problem.residuals.model)
-            for problem, answer in zip(problems, answers, strict=True)
-        ]
+        answers = module.identify_many(problems, settings, rngs, progress)
+        pairs = zip(problems, answers, strict=True)
+        return [answer.in_order(problem.residuals.model) for problem, answer in pairs]
 
     return identify
 
@@ -124,18 +118,6 @@ def identifier(name: str, settings: object) -> Identify:
 def best_fit(
     problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
 ) -> Identification:
-    """Identify one trace by multi-start least squares, the method of every judgement.
-
-    Parameters
-    ----------
-    problem
-        The trace.
-    least_squares
-        The method's settings.
-    rng
-        Draws the starts.
-    progress
-        Is told of the fits.
-    """
+    """Identify one trace by multi-start least squares, the method of every judgement."""
     (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
     return found

@@ -88,7 +88,7 @@ def advice(tried: Sequence[Tried], chosen: str) -> str:
     """
     own = next(each for each in tried if each.candidate == chosen)
     best = min(tried, key=lambda each: each.delta_bic)
-    title = _capital(own.model.title)
+    title = own.model.title[0].upper() + own.model.title[1:]
     if own.delta_bic < WORTH_A_MENTION:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
     more, fewer = len(best.model.names), len(own.model.names)
@@ -100,7 +100,3 @@ def advice(tried: Sequence[Tried], chosen: str) -> str:
     if more < fewer:
         return f"{title} is richer than the trace asks for: {lead}"
     return f"{title} suits the trace less well: {lead}"
-
-
-def _capital(title: str) -> str:
-    return title[0].upper() + title[1:]

@@ -14,17 +14,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identify.answer import History, Identification, Progress, silent
-from biogrip.identify.levenberg_marquardt import Minima, joined
+from biogrip.identify.answer import History, Identification, Progress, Row, silent
+from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.local_fits import ROUGH, LocalFits, alike
 from biogrip.identify.problem import Problem
 from biogrip.identify.settling import settled
 
+# Shares by which springs differ in starts for arms that ring.
+_BESIDE = np.array([-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
+
 FINISHED = 4
 """Of the rough fits, so many of the best are finished."""
-
-Row = tuple[Array, float, float, int]
-"""Of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
 def best_of_starts(
@@ -71,15 +71,14 @@ def _best_of_alike(
     if problems[0].residuals.inertia:
         starts, before = _started_quietly(problems, starts, before)
     fits, traces = LocalFits(problems), np.arange(len(problems))
-    trace = np.repeat(traces, [len(own_starts) for own_starts in starts])
-    rough, fine, finalists = _finished(fits, starts)
-    winners = np.concatenate([_best(fine, trace[finalists] == own, 1) for own in traces])
-    best = settled(fits, fine.of(winners), traces)
+    rough, trace, fine, trace_of_fine = _finished(fits, starts)
+    winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
+    best = settled(fits, fine[winners], traces)
     answers = []
     for own, first_row in enumerate(before):
-        rows = _descents(rough.of(np.flatnonzero(trace == own)), first_row)
+        rows = _descents(rough[trace == own], first_row)
         # Not the steps that settle it: how many it takes, the last bits of a processor decide.
-        finished = fine.evaluations[trace[finalists] == own].sum()
+        finished = fine.evaluations[trace_of_fine == own].sum()
         misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
         progress(evaluations, misfit_rad)
@@ -87,15 +86,16 @@ def _best_of_alike(
     return answers
 
 
-def _finished(fits: LocalFits, starts: Sequence[Array]) -> tuple[Minima, Minima, IntArray]:
-    """Fit roughly from all starts, and the best of each trace finely: both, and which these are."""
-    counts = [len(own_starts) for own_starts in starts]
-    trace = np.repeat(np.arange(len(starts)), counts)
+def _finished(
+    fits: LocalFits, starts: Sequence[Array]
+) -> tuple[Minima, IntArray, Minima, IntArray]:
+    """Fit roughly from all starts, and the best of each trace finely: both, each with its trace."""
+    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Which basin is deepest shows before its bottom is reached; only the best are worth that.
     best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
     finalists = np.concatenate(best)
-    return rough, fits.fitted(rough.x[finalists], trace[finalists]), finalists
+    return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
 
 
 def _started_quietly(
@@ -104,18 +104,21 @@ def _started_quietly(
     """Add the best fits of arms that do not ring to the starts.
 
     Rings of different frequencies look alike at the instants of the samples: chi^2 has many
-    basins. Without inertia it has few, of which the deepest lies by the right one.
+    basins. Without inertia it has few, of which the deepest lies by the right one: starts with
+    springs a little stiffer and softer are in the basins beside it.
     """
-    rough, fine, finalists = _finished(
-        LocalFits([problem.without_inertia() for problem in problems]), starts
-    )
-    trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
+    quiet = LocalFits([problem.without_inertia() for problem in problems])
+    rough, trace, fine, trace_of_fine = _finished(quiet, starts)
+    model = problems[0].residuals.model
+    springs = [parameter.kind == "stiffness" for parameter in model.parameters]
     # Rings beside a power law take a hundred times as long.
-    most = FINISHED if problems[0].residuals.model.power_law else None
+    most, beside = (FINISHED, _BESIDE[:0]) if model.power_law else (None, _BESIDE)
     more, rows = [], []
     for own, (own_starts, row) in enumerate(zip(starts, before, strict=True)):
-        here = trace[finalists] == own
-        more.append(np.concatenate((fine.x[here], own_starts[:most])))
+        here = trace_of_fine == own
+        best = fine.x[here][np.argmin(fine.misfit_rad[here].astype(np.float32))]
+        around = best + beside[:, None] * np.array(springs, dtype=float)
+        more.append(np.concatenate((fine.x[here], around, own_starts[:most])))
         spent = rough.evaluations[trace == own].sum() + fine.evaluations[here].sum()
         rows.append((*row[:3], row[3] + int(spent)))
     return more, rows
@@ -148,7 +151,7 @@ def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
     for group in groups:
         fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
         found.append(settled(fits, fits.fitted(starts[group], traces), traces))
-    return joined(found).of(np.argsort(np.concatenate(groups)))
+    return Minima.joined(found)[np.argsort(np.concatenate(groups))]
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:
@@ -189,19 +192,8 @@ def _descents(found: Minima, before: Row) -> list[Row]:
 
 def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
     """Return the last row of a history as the answer."""
-    parameters, best_misfit, median_misfit, counts = zip(*rows, strict=True)
-    history = History(
-        np.array(best_misfit),
-        np.array(median_misfit),
-        np.array(parameters),
-        np.array(counts, dtype=np.int64),
-    )
+    parameters, misfit_rad, _, evaluations = rows[-1]
+    steps, why = len(rows) - 1, "all starts fitted"
     return Identification(
-        history.best_parameters[-1],
-        best_misfit[-1],
-        len(rows) - 1,
-        counts[-1],
-        "all starts fitted",
-        history,
-        converged,
+        parameters, misfit_rad, steps, evaluations, why, History.of(rows), converged
     )

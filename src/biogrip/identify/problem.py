@@ -12,7 +12,6 @@ from biogrip.identify.genome import GeneRange, Genome, genome_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import Misfit, misfit_of
-from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.residuals import Residuals
 
 
@@ -76,29 +75,11 @@ def problem_of(
         gripper, model, torque, time_s, rotation_rad, condensed, noise_rad=noise_rad
     )
     misfit = misfit_of(residuals, gripper, torque, time_s, rotation_rad)
-    return _searched(misfit, residuals, ranges)
+    return searched(misfit, residuals, ranges)
 
 
-def for_model(problem: Problem, model: SampleModel, ranges: Mapping[str, GeneRange]) -> Problem:
-    """Pose a problem of `problem_of` for another model; what is tabulated of the trace is shared.
-
-    Parameters
-    ----------
-    problem
-        Of the trace.
-    model
-        The other model.
-    ranges
-        As of `problem_of`.
-    """
-    residuals = problem.residuals.of_model(model)
-    misfit: Misfit = residuals.condensed_misfit
-    if isinstance(problem.misfit, SeriesMisfit):
-        misfit = problem.misfit.of_model(model)
-    return _searched(misfit, residuals, ranges)
-
-
-def _searched(misfit: Misfit, residuals: Residuals, ranges: Mapping[str, GeneRange]) -> Problem:
+def searched(misfit: Misfit, residuals: Residuals, ranges: Mapping[str, GeneRange]) -> Problem:
+    """Pose the problem of residuals, searched for in the ranges of `problem_of`."""
     chosen = [ranges[parameter.range_name] for parameter in residuals.model.parameters]
     return Problem(
         misfit,

@@ -9,8 +9,7 @@ References
    and Computer Simulation 29 (2019), article 3.
 """
 
-from collections.abc import Iterator, Sequence
-from itertools import chain, repeat
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,32 +43,32 @@ def redraws(
         Genes and their values, the chromosomes of all generators side by side.
     """
     # What cannot vary takes no word, and products must not overflow.
-    usual = genome.values.min() > 1 and genome.values.max() < _WIDEST
-    if len(rngs) == 1 or not usual:
-        drawn_apart = [
-            _by_numpy(genome, count, times, rng) for count, rng in zip(counts, rngs, strict=True)
-        ]
-        return np.concatenate(drawn_apart, axis=2)
+    if len(rngs) > 1 and genome.values.min() > 1 and genome.values.max() < _WIDEST:
+        before = [rng.bit_generator.state for rng in rngs]
+        drawn, doubtful = _side_by_side(genome, counts, times, rngs)
+        if not doubtful:
+            return drawn
+        for rng, state in zip(rngs, before, strict=True):
+            rng.bit_generator.state = state
+    apart = [_by_numpy(genome, count, times, rng) for count, rng in zip(counts, rngs, strict=True)]
+    return np.concatenate(apart, axis=2)
+
+
+def _side_by_side(
+    genome: Genome, counts: Sequence[int], times: int, rngs: Sequence[np.random.Generator]
+) -> tuple[IntArray, bool]:
+    """Draw as `redraws` does; whether a word may favour some numbers, and numpy draw again."""
     words = [
         rng.integers(_WORDS, size=2 * times * count, dtype=np.uint32).reshape(times, 2, count)
         for count, rng in zip(counts, rngs, strict=True)
     ]
     together = np.concatenate(words, axis=2)
-    drawn = np.empty(together.shape, dtype=np.int64)
-    doubtful = False
+    drawn, doubtful = np.empty(together.shape, dtype=np.int64), False
     for (of_gene, of_value), (gene, value) in zip(together, drawn, strict=True):
         doubtful |= _scaled(of_gene, genome.genes, gene)
         doubtful |= _scaled(of_value, genome.values.take(gene), value)
         value += genome.low.take(gene)
-    if not doubtful:
-        return drawn
-    return np.concatenate(
-        [
-            _one_by_one(genome, chain(own.ravel().tolist(), _fresh(rng)), own.shape)
-            for own, rng in zip(words, rngs, strict=True)
-        ],
-        axis=2,
-    )
+    return drawn, doubtful
 
 
 def _by_numpy(genome: Genome, count: int, times: int, rng: np.random.Generator) -> IntArray:
@@ -87,24 +86,3 @@ def _scaled(words: NDArray[np.uint32], spans: IntArray | int, numbers: IntArray)
     np.right_shift(products, 32, out=numbers)
     products &= _WORDS - 1
     return bool((products < spans).any())
-
-
-def _fresh(rng: np.random.Generator) -> Iterator[int]:
-    return (int(rng.integers(_WORDS, dtype=np.uint32)) for _ in repeat(None))
-
-
-def _one_by_one(genome: Genome, words: Iterator[int], shape: tuple[int, ...]) -> IntArray:
-    """Draw from the words of a generator, again where a word would favour some numbers."""
-    low, values = genome.low.tolist(), genome.values.tolist()
-
-    def below(span: int) -> int:
-        while True:
-            product = next(words) * span
-            if product % _WORDS >= _WORDS % span:
-                return product // _WORDS
-
-    drawn = np.empty(shape, dtype=np.int64)
-    for genes_and_values in drawn:
-        genes = [below(genome.genes) for _ in range(shape[2])]
-        genes_and_values[:] = genes, [low[gene] + below(values[gene]) for gene in genes]
-    return drawn

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, minimized
+from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, Rows, minimized
 
 # Most fits need two or three.
 _MOST_ROUNDS = 12
@@ -30,7 +30,7 @@ Objective = Callable[[Array, IntArray, Array], Normal]
 
 
 @dataclass
-class Expansion:
+class Expansion(Rows):
     """A correction to first order about a point of each problem.
 
     Parameters
@@ -80,26 +80,11 @@ def minimized_with_refreshes(
 ) -> Minima:
     """Descend as `minimized` does, with a correction expanded about few points on the way.
 
-    Parameters
-    ----------
-    objective, correction
-        What is minimized.
-    starts, low, high : (n, n_parameters)
-        As of `minimized`.
-    tolerance
-        Of the sum of squares.
-    constraint
-        What is to hold on the way.
+    Other arguments are as of `minimized`.
     """
-    count = len(starts)
-    best = Minima(
-        starts.copy(),
-        np.full(count, np.inf),
-        np.zeros(count, dtype=np.int64),
-        np.zeros(count, dtype=bool),
-    )
-    lowest, foreseen = np.full(count, np.inf), np.full(count, np.nan)
-    x, left = starts.copy(), np.arange(count)
+    best = Minima.none_yet(starts, evaluations=0)
+    lowest, foreseen = np.full(len(starts), np.inf), np.full(len(starts), np.nan)
+    x, left = starts.copy(), np.arange(len(starts))
     for _ in range(_MOST_ROUNDS):
         here = x[left]
         expansion = Expansion(here, correction(here))
@@ -113,7 +98,7 @@ def minimized_with_refreshes(
         possible = np.isfinite(found.square_sum)
         on = possible & ~(missed <= tolerance * found.square_sum)
         best.converged[left[~on]] = possible[~on]
-        left, expansion = left[on], Expansion(here[on], expansion.rows[on])
+        left, expansion = left[on], expansion[on]
         if not len(left):
             break
 
@@ -122,14 +107,7 @@ def minimized_with_refreshes(
         ) -> Normal:
             return objective(points, which[problem], of.at(points, problem))
 
-        descended = minimized(
-            expanded,
-            x[left],
-            low[left],
-            high[left],
-            tolerance,
-            None if constraint is None else _Some(constraint, left),
-        )
-        x[left] = descended.x
+        held = None if constraint is None else _Some(constraint, left)
+        x[left] = minimized(expanded, x[left], low[left], high[left], tolerance, held).x
         foreseen[left] = expanded(x[left], np.arange(len(left))).square_sum
     return best

@@ -60,22 +60,17 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         those whose next step would change nothing.
     """
     low, high = (np.broadcast_to(bound, found.x.shape) for bound in (fits.low, fits.high))
-    closer = minimized(
-        lambda x, fit: _convex(fits, x, trace[fit]),
-        found.x,
-        low,
-        high,
-        _CLOSE,
-        damping=_DAMPING,
-        most_steps=_MOST_STEPS,
-    )
+
+    def convex(x: Array, fit: IntArray) -> Normal:
+        return _convex(fits, x, trace[fit])
+
+    closer = minimized(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
-    state = _State(found.x.copy(), fits.on_all_samples(found.x, trace))
-    everyone = np.arange(len(found.x))
-    rounding = _rounding(fits, state.here.misfit_rad, trace)
-    _keep(fits, state, everyone, closer.x, trace, rounding)
-    converged, damping = np.zeros(len(everyone), dtype=bool), np.zeros(len(everyone))
-    moving = everyone
+    here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
+    rounding = _rounding(fits, here.misfit_rad, trace)
+    state = _State(fits, trace, rounding, found.x.copy(), here)
+    state.move(moving, closer.x)
+    converged, damping = np.zeros(len(moving), dtype=bool), np.zeros(len(moving))
     for _ in range(_MOST_STEPS):
         if not len(moving):
             break
@@ -93,7 +88,7 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
             break
         evaluations[moving] += 2 + 2 * x.shape[1]
         ahead = np.clip(_on_grid(state.x[moving] + step, step), fits.low, fits.high)
-        kept = _keep(fits, state, moving, ahead, trace, rounding)
+        kept = state.move(moving, ahead)
         more, less = _MORE * damping[moving], damping[moving] / _MORE
         less[less < _LITTLE] = 0.0
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
@@ -114,26 +109,21 @@ def _on_grid(x: Array, step: Array) -> Array:
 class _State:
     """Where fits are, and what is minimized there, on all samples."""
 
+    fits: LocalFits
+    trace: IntArray
+    rounding: Array
     x: Array
     here: Normal
 
-
-def _keep(
-    fits: LocalFits,
-    state: _State,
-    which: IntArray,
-    x: Array,
-    trace: IntArray,
-    rounding: Array,
-) -> BoolArray:
-    """Move some fits, in place, to points that are no worse on all samples; tell which."""
-    there = fits.on_all_samples(x, trace[which])
-    kept = there.square_sum <= state.here.square_sum[which] + rounding[which]
-    moved = which[kept]
-    state.x[moved] = x[kept]
-    for part, new in zip(state.here.parts, there.parts, strict=True):
-        part[moved] = new[kept]
-    return kept
+    def move(self, which: IntArray, x: Array) -> BoolArray:
+        """Move some fits to points that are no worse on all samples; tell which."""
+        there = self.fits.on_all_samples(x, self.trace[which])
+        kept = there.square_sum <= self.here.square_sum[which] + self.rounding[which]
+        moved = which[kept]
+        self.x[moved] = x[kept]
+        for part, new in zip(self.here.parts, there.parts, strict=True):
+            part[moved] = new[kept]
+        return kept
 
 
 def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:

@@ -46,10 +46,7 @@ def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
     optimum: 2 % more misfit than noise is a chi^2 of 162 in 4001 of them; see
     `chi_square_rise`.
     """
-    misfit, noise = (
-        found["misfit_rad"].to_numpy(float),
-        found["noise_rms_rad"].to_numpy(float),
-    )
+    misfit, noise = (found[name].to_numpy(float) for name in ("misfit_rad", "noise_rms_rad"))
     reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise
     return reached
 

@@ -136,7 +136,7 @@ def _without_outliers(
     for _ in range(_ROUNDS):
         plain = posed.of(time_s[kept], rotation_rad[kept])
         found = find(plain)
-        struck = outliers_of(_left(plain, found)[0])
+        struck = outliers_of(plain.residuals(np.log(found.parameters))[0])
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
@@ -149,7 +149,8 @@ def _in_turn(
     """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
     problem, colour = plain, None
     for _ in range(_ROUNDS):
-        residual, sensitivity = _left(plain, found)
+        start = np.log(found.parameters)
+        residual, sensitivity = plain.residuals(start)
         uncertain = gripper_functions(posed, time_s, found.parameters)
         left = problem.residuals.free - len(found.parameters)
         noise_rad = posed.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
@@ -162,7 +163,6 @@ def _in_turn(
         inertia = problem.residuals.inertia
         condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, inertia=inertia)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
-        start = np.log(found.parameters)
         found = found.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_rad
@@ -172,11 +172,6 @@ def _in_turn(
         freedom = likelihood.freedom(colour, sensitivity / noise_rad, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
     return problem, found, colour
-
-
-def _left(plain: Problem, found: Identification) -> tuple[Array, Array]:
-    """What a fit leaves of a trace, and its derivatives, less offset and drift."""
-    return plain.residuals(np.log(found.parameters))
 
 
 def _alike(one: Colour | None, other: Colour | None) -> bool:

@@ -45,10 +45,8 @@ def gripper_functions(posed: CaseProblem, time_s: Array, parameters: Array) -> A
         rows = simulated_rotation(gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear)
         return rows[0]
 
-    found = [
-        0.5 * (simulated(above) - simulated(below))
-        for above, below in _pairs(posed.gripper, posed.uncertainty)
-    ]
+    pairs = _pairs(posed.gripper, posed.uncertainty)
+    found = [0.5 * (simulated(above) - simulated(below)) for above, below in pairs]
     return np.reshape(found, (len(found), len(time_s)))
 
 

@@ -55,6 +55,7 @@ class ModelsTried:
                 "parameters": len(each.model.names),
                 "misfit_rad": rounded(each.misfit_rad),
                 "vanished": vanished(each.candidate, answer),
+                "converged": answer.converged,
                 "delta_aic": rounded(each.delta_aic),
                 "delta_bic": rounded(each.delta_bic),
             }

@@ -107,22 +107,12 @@ class Condensed:
     def reduced(self) -> bool:
         """Whether rows are fewer than nodes."""
         functions = len(self._edges_s) * (STAGES + 1)
-        few = len(self._dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
+        few = len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
         return few and not self.ringing_s
 
     def of_trace(self, rotation_rad: Array) -> Array:
-        """Rows of a trace less nuisance.
-
-        Parameters
-        ----------
-        rotation_rad : (n_samples,)
-
-        Returns
-        -------
-        (n_rows,)
-            The last is what no response can reach.
-        """
-        seen, rest = self.nodes_of_trace(rotation_rad)
+        """Rows of a trace less nuisance, (n_rows,); the last is what no response can reach."""
+        seen, rest = self.dense.rows_of_samples(rotation_rad)
         if not self.reduced:
             return np.append(seen, rest)
         rows = seen @ self._basis
@@ -131,20 +121,11 @@ class Condensed:
     @cached_property
     def time_s(self) -> Array:
         """Times at which a response has to be known, (n_times,)."""
-        return self.node_time_s[self._chosen] if self.reduced else self.node_time_s
-
-    @property
-    def node_time_s(self) -> Array:
-        """Times of the nodes, (n_nodes,)."""
-        return self._dense.time_s
-
-    def nodes_of_trace(self, rotation_rad: Array) -> tuple[Array, float]:
-        """Rows of the nodes of a trace less nuisance, (n_nodes,), and the norm of the rest."""
-        return self._dense.rows_of_samples(rotation_rad)
+        return self.dense.time_s[self._chosen] if self.reduced else self.dense.time_s
 
     def rows_of_nodes(self, values: Array) -> Array:
         """Rows of responses less nuisance, from their values at the nodes, (..., n_nodes)."""
-        return self._cleared_rows(self._dense.rows_of_values(values))
+        return self._cleared_rows(self.dense.rows_of_values(values))
 
     def rows(self, values: Array) -> Array:
         """Rows of responses, (..., n_rows), from their values at `time_s`, (..., n_times)."""
@@ -156,7 +137,7 @@ class Condensed:
     @cached_property
     def to_rows(self) -> Array:
         """Matrix that turns values at few times, from its left, into rows, (n_times, n_rows)."""
-        values = self._dense.values_of_rows(self._span.T)
+        values = self.dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
             values[:, self._chosen], self._cleared_rows(self._span.T) @ self._basis
         )
@@ -171,7 +152,8 @@ class Condensed:
         return ModeRows(self._torque, self.time_s, self.to_rows, shortest_s)
 
     @cached_property
-    def _dense(self) -> DenseSamples:
+    def dense(self) -> DenseSamples:
+        """Nodes that stand for the samples."""
         # What is whitened is no longer smooth: each sample is a node.
         dense = self._whitening is None
         return DenseSamples(
@@ -187,9 +169,9 @@ class Condensed:
     def _corrections(self) -> Array:
         """Rows of the nodes of what corrections are a sum of, (n_functions, n_nodes)."""
         if not self.nonlinear:
-            return np.zeros((0, len(self._dense.time_s)))
-        functions = mesh_functions(self._edges_s, self._dense.time_s)
-        return self._dense.rows_of_values(functions)
+            return np.zeros((0, len(self.dense.time_s)))
+        functions = mesh_functions(self._edges_s, self.dense.time_s)
+        return self.dense.rows_of_values(functions)
 
     @cached_property
     def of_corrections(self) -> Array:
@@ -200,18 +182,18 @@ class Condensed:
     @cached_property
     def _seen_nuisance(self) -> Array:
         """The nuisance as rows of the nodes, (n_functions, n_nodes)."""
-        rows = [self._dense.rows_of_samples(function)[0] for function in self.nuisance]
-        return np.reshape(rows, (len(rows), len(self._dense.time_s)))
+        rows = [self.dense.rows_of_samples(function)[0] for function in self.nuisance]
+        return np.reshape(rows, (len(rows), len(self.dense.time_s)))
 
     @cached_property
     def _span(self) -> Array:
         """Orthonormal rows of the nodes that span all responses, (n_nodes, n_rows)."""
-        end_s, time_s = self._all_s[-1], self._dense.time_s
+        end_s, time_s = self._all_s[-1], self.dense.time_s
         shortest_s = np.diff(self._all_s).min()
         last = np.log1p(_FASTEST * end_s / shortest_s)
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
         growth, slope = (
-            self._dense.rows_of_values(of[0])
+            self.dense.rows_of_values(of[0])
             for of in growth_of_modes(rates[None], self._torque, time_s)
         )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
@@ -231,7 +213,7 @@ class Condensed:
         # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
         from scipy.linalg import qr
 
-        span = self._dense.values_of_rows(self._span.T)
+        span = self.dense.values_of_rows(self._span.T)
         _, order = qr(span, mode="r", pivoting=True)
         chosen: IntArray = np.sort(order[: span.shape[0]])
         return chosen

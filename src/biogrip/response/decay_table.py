@@ -49,7 +49,7 @@ class DecayTable:
     def __init__(self, function: Callable[[Array], Array], longest: float, shortest: float) -> None:
         self._longest = longest
         pieces = np.ceil(np.log1p(_DECAYED * longest / shortest) / WIDTH)
-        u = WIDTH * (np.arange(pieces)[:, None] + _NODES)
+        u = WIDTH * (np.arange(pieces)[:, None] + NODES)
         values = function(-np.expm1(u).ravel() / longest).reshape(-1, *u.shape)
         short = (values @ _TO_SHORT).reshape(len(values), -1, SHORT_DEGREE + 1)
         # Straight from values to powers would lose digits: they are large and cancel.
@@ -63,16 +63,9 @@ class DecayTable:
         return self.of(every, rates)
 
     def of(self, which: IntArray, rates: Array) -> Array:
-        """Some of the sums.
+        """Some of the sums, each of which depends on its own rate alone.
 
-        Each depends on its own rate alone, not on what else is asked for.
-
-        Parameters
-        ----------
-        which
-            Indices of sums, of a shape that broadcasts with that of the rates.
-        rates
-            At which rates.
+        Which they are are indices of a shape that broadcasts with that of the rates.
         """
         place = np.fmin(np.log(1 - self._longest * rates) / (WIDTH / SHORTER), self._end)
         piece = place.astype(np.intp)
@@ -86,13 +79,7 @@ class DecayTable:
         return sums
 
 
-def _nodes(degree: int) -> Array:
-    """Chebyshev's nodes on (0, 1)."""
-    nodes: Array = 0.5 + 0.5 * chebyshev.chebpts1(degree + 1)
-    return nodes
-
-
-def _series(places: Array, degree: int) -> NDArray[np.floating]:
+def series(places: Array, degree: int) -> NDArray[np.floating]:
     """Chebyshev's polynomials on (0, 1), shape (n_places, degree + 1)."""
     return chebyshev.chebvander(2 * places - 1, degree)
 
@@ -106,8 +93,9 @@ def _powers(degree: int) -> Array:
     return rows
 
 
-_NODES, _SHORT_NODES = _nodes(DEGREE), _nodes(SHORT_DEGREE)
+# Chebyshev's on (0, 1).
+NODES, _SHORT_NODES = (0.5 + 0.5 * chebyshev.chebpts1(d + 1) for d in (DEGREE, SHORT_DEGREE))
 _DIVIDED = (np.arange(SHORTER)[:, None] + _SHORT_NODES).ravel() / SHORTER
-_TO_SHORT = np.linalg.solve(_series(_NODES, DEGREE).T, _series(_DIVIDED, DEGREE).T)
-_TO_SERIES = np.linalg.inv(_series(_SHORT_NODES, SHORT_DEGREE)).T
+_TO_SHORT = np.linalg.solve(series(NODES, DEGREE).T, series(_DIVIDED, DEGREE).T)
+_TO_SERIES = np.linalg.inv(series(_SHORT_NODES, SHORT_DEGREE)).T
 _TO_POWERS = _powers(SHORT_DEGREE)

@@ -15,7 +15,7 @@ References
    how fast Chebyshev's coefficients of analytic functions fall.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -43,12 +43,8 @@ _MOST_KEPT = 100_000
 class _Piece:
     """Samples from `first` up to `stop`, and what their nodes have to do with them.
 
-    Parameters
-    ----------
-    first, stop
-        Indices of samples.
-    triangle : (n_nodes, n_nodes) or None
-        R^T of the samples' Legendre polynomials Q R, Q orthonormal; None where samples are nodes.
+    With the samples' Legendre polynomials Q R, Q orthonormal, the triangle is R^T; it is None
+    where samples are nodes.
     """
 
     first: int
@@ -92,53 +88,33 @@ class DenseSamples:
         edges = starts if further_edges_s is None else [*starts, *further_edges_s]
         bounds = np.unique(np.concatenate(([0], time_s.searchsorted(edges), [len(time_s)])))
         divided = (p for ends in pairwise(bounds) for p in self._divided(*ends))
-        self._pieces = list(_joined(divided)) if dense else [_Piece(0, len(time_s), None)]
+        self._pieces = _joined(divided) if dense else [_Piece(0, len(time_s), None)]
         self.time_s = np.concatenate([self._nodes(piece) for piece in self._pieces])
         """Times of the nodes, (n_nodes,), ascending."""
 
     def rows_of_values(self, values: Array) -> Array:
-        """Rows of functions known at the nodes.
-
-        Parameters
-        ----------
-        values : (..., n_nodes)
-
-        Returns
-        -------
-        (..., n_nodes)
-            Their products are those of the functions' samples.
-        """
-        rows, start = np.empty_like(values), 0
-        for piece in self._pieces:
-            here = slice(start, start + self._count(piece))
-            start = here.stop
-            own = values[..., here]
-            rows[..., here] = (
-                own if piece.triangle is None else own @ (_TO_SERIES.T @ piece.triangle)
-            )
-        return rows
+        """Rows that have the products of the samples, from values at the nodes, (..., n_nodes)."""
+        return self._turned(values, lambda own, triangle: own @ (_TO_SERIES.T @ triangle))
 
     def values_of_rows(self, rows: Array) -> Array:
         """Values at the nodes, from rows: the inverse of `rows_of_values`."""
-        values, start = np.empty_like(rows), 0
         to_nodes = legendre.legvander(_PLACES, _DEGREE).T
+        return self._turned(
+            rows, lambda own, triangle: np.linalg.solve(triangle.T, own.T).T @ to_nodes
+        )
+
+    def _turned(self, values: Array, turn: Callable[[Array, Array], Array]) -> Array:
+        """Turn what nodes of pieces have by their triangles."""
+        turned, start = np.copy(values), 0
         for piece in self._pieces:
             here = slice(start, start + self._count(piece))
             start = here.stop
-            own = rows[..., here]
-            values[..., here] = (
-                own
-                if piece.triangle is None
-                else np.linalg.solve(piece.triangle.T, own.T).T @ to_nodes
-            )
-        return values
+            if piece.triangle is not None:
+                turned[..., here] = turn(values[..., here], piece.triangle)
+        return turned
 
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
-        """Rows of any function known at the samples, smooth or not, as seen by smooth ones.
-
-        Parameters
-        ----------
-        samples : (n_samples,)
+        """Rows of any function of the samples, (n_samples,), smooth or not, as smooth ones see it.
 
         Returns
         -------
@@ -212,15 +188,12 @@ class DenseSamples:
         return piece.stop - piece.first if piece.triangle is None else _NODES
 
 
-def _joined(pieces: Iterator[_Piece]) -> Iterator[_Piece]:
+def _joined(pieces: Iterator[_Piece]) -> list[_Piece]:
     """Join neighbours whose samples are nodes."""
-    last: _Piece | None = None
+    joined: list[_Piece] = []
     for piece in pieces:
-        if last is not None and last.triangle is None and piece.triangle is None:
-            last = _Piece(last.first, piece.stop, None)
-            continue
-        if last is not None:
-            yield last
-        last = piece
-    if last is not None:
-        yield last
+        if joined and joined[-1].triangle is None and piece.triangle is None:
+            joined[-1] = _Piece(joined[-1].first, piece.stop, None)
+        else:
+            joined.append(piece)
+    return joined

@@ -2,8 +2,9 @@
 
 After a change of the torque arms ring, for milliseconds. How much of that a trace shows depends
 on when it is sampled, and beside which noise; not on who fits it. A bare spring between the jaws
-rings hardest and longest, since dampers only take energy from the ring: what inertia changes
-there bounds what it changes elsewhere.
+rings hardest and longest, since dampers only take energy from the ring: while arms ring, what
+inertia changes there bounds what it changes elsewhere. What it changes later is next to nothing
+(docs/model.md, "Without inertia").
 """
 
 import numpy as np
@@ -21,11 +22,11 @@ _STIFFNESS = np.geomspace(0.1, 1e4, 16)
 # Samples at which the size of a rotation is looked at.
 _SOME = 500
 
-VISIBLE = 0.002
+VISIBLE = 2e-4
 """Share of its standard deviation by which an estimate may move where inertia is left out."""
 
-# Of a trace's peak: what 14 bits resolve. Traces without noise count as having that much.
-_FINEST_NOISE = 2.0**-14
+# Of a peak, a thousandth: traces with less, or none, count as having that much noise.
+_FINEST_NOISE = 2.0**-10
 
 
 def ringing_s(gripper: Gripper) -> float:
@@ -46,6 +47,16 @@ def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> Boo
     return ringing
 
 
+def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
+    """Return what inertia adds to the left arm's rotation, (n, n_times) in rad, at any times."""
+    responses = (
+        step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
+        for inertia in (True, False)
+    )
+    with_it, without = (rotation(response, torque, time_s) for response in responses)
+    return with_it - without
+
+
 def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> float:
     """Norm of what inertia changes in the samples of a rotation, over the rotation's RMS.
 
@@ -62,14 +73,11 @@ def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) ->
     springs = np.append(0.0, _STIFFNESS) * gripper.jaw_stiffness_N_per_m
     none = np.zeros((len(springs), 0))
     network = Network(k_p=springs, c_p=np.zeros_like(springs), k=none, c=none)
-    with_it, without = (
-        step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
-        for inertia in (True, False)
-    )
-    change = rotation(with_it, torque, seen) - rotation(without, torque, seen)
+    change = np.linalg.norm(ring(gripper, network, torque, seen), axis=1)
     some_s = time_s[np.linspace(0, len(time_s) - 1, min(_SOME, len(time_s))).astype(np.int64)]
+    without = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     size = np.sqrt(np.mean(rotation(without, torque, some_s) ** 2, axis=1))
-    return float(np.max(np.linalg.norm(change, axis=1) / size))
+    return float(np.max(change / size))
 
 
 def inertia_shows(change: float, rotation_rad: Array, noise_rad: float) -> bool:

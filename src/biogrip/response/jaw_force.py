@@ -16,10 +16,8 @@ them of second order, so that again no large terms cancel.
 """
 
 from math import factorial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.experiment.network import MOST_BRANCHES, Network
@@ -27,17 +25,15 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import (
     StepResponse,
-    TransferFunctions,
     add,
     arm_polynomial,
     multiply,
     partial_fractions,
     phi_function,
-    poles,
     sample_polynomials,
     transfer_functions,
 )
-from biogrip.response.many_branches import modes_of_force
+from biogrip.response.many_branches import modes_of_many
 from biogrip.response.nonlinear import FINE, computed_correction
 
 
@@ -58,19 +54,18 @@ def jaw_force_response(
         The force takes the place of an arm.
     """
     if network.k.shape[1] > MOST_BRANCHES:
-        return StepResponse(*modes_of_force(gripper, network, symmetric=symmetric, inertia=inertia))
-    denominator = transfer_functions(
-        gripper, network, symmetric=symmetric, inertia=inertia
-    ).denominator
+        return StepResponse(
+            *modes_of_many(gripper, network, symmetric=symmetric, inertia=inertia, force=True)
+        )
+    _, denominator = transfer_functions(gripper, network, symmetric=symmetric, inertia=inertia)
     p = gripper.lever_m * sample_polynomials(network)[0]
     z_2 = arm_polynomial(gripper.left, inertia)
     if symmetric and gripper.left == gripper.right:
-        numerators = [2 * p.T]
+        numerators = [2 * p]
     else:
         both = add(z_2, arm_polynomial(gripper.right, inertia))
-        numerators = [multiply(p, both).T, -multiply(p, z_2).T][: 1 if symmetric else 2]
-    transfer = TransferFunctions([numerators], denominator)
-    return partial_fractions(transfer, poles(denominator, real=not inertia))
+        numerators = [multiply(p, both), -multiply(p, z_2)][: 1 if symmetric else 2]
+    return partial_fractions(np.array([numerators]).swapaxes(2, 3), denominator, real=not inertia)
 
 
 def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
@@ -86,16 +81,14 @@ def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Arra
         At the instant of a step: what follows it.
     """
     force = np.zeros((len(response.rates), len(time_s)))
-    rates, static, weights = (
-        response.rates[:, :, None],
-        response.static[:, 0],
-        response.weights[:, 0],
-    )
+    rates = response.rates[:, :, None]
+    static, weights = response.static[:, 0], response.weights[:, 0]
     for start, order, heights in torque.jumps:
         after = time_s >= start
         elapsed = time_s[after] - start
         constant, amplitude = static @ heights, np.einsum("ndj,d->nj", weights, heights)
-        growth = elapsed**order * _growth(order, rates * elapsed)
+        z = rates * elapsed
+        growth = elapsed**order * (phi_function(order, z) if order else np.exp(z))
         rest = constant[:, None] * elapsed**order / factorial(order)
         force[:, after] += rest + np.einsum("nj,njt->nt", amplitude, growth).real
     for start, omega, a in torque.swings:
@@ -107,11 +100,6 @@ def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Arra
         swing = steady[:, None] * np.exp(1j * omega * elapsed)
         force[:, after] += (swing + np.einsum("nj,njt->nt", fading, np.exp(rates * elapsed))).real
     return force
-
-
-def _growth(order: int, z: NDArray[Any]) -> NDArray[Any]:
-    """Response of a mode, over its weight and t^order, to t^order/order!."""
-    return np.exp(z) if order == 0 else phi_function(order, z)
 
 
 def jaw_force(

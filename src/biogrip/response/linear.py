@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.experiment.network import MOST_BRANCHES, Network
-from biogrip.experiment.protocol import TorqueHistory, drives
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Arm, Gripper
-from biogrip.response.many_branches import modes_of_rotation
+from biogrip.response.many_branches import modes_of_many
 from biogrip.response.roots import real_quadratic_roots, roots, separate
 
 LEFT, RIGHT = 0, 1
@@ -51,22 +51,6 @@ class StepResponse:
     static: Array
     rates: NDArray[Any]
     weights: NDArray[Any]
-
-
-@dataclass(frozen=True)
-class TransferFunctions:
-    """Rotation over torque of n samples, polynomials in ascending powers of s.
-
-    Parameters
-    ----------
-    numerators : [n_arms][n_drives] of (n, terms)
-        One a way from drive to arm.
-    denominator : (n, terms)
-        The one that all share.
-    """
-
-    numerators: list[list[NDArray[Any]]]
-    denominator: NDArray[Any]
 
 
 def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:
@@ -99,7 +83,7 @@ def step_response(
         Whether the right arm's rotation is wanted too.
     """
     if network.k.shape[1] > MOST_BRANCHES:
-        static, rates, weights = modes_of_rotation(
+        static, rates, weights = modes_of_many(
             gripper, network, symmetric=symmetric, inertia=inertia
         )
         arms = slice(2 if both_arms else 1)
@@ -107,7 +91,7 @@ def step_response(
     transfer = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia, both_arms=both_arms
     )
-    return partial_fractions(transfer, poles(transfer.denominator, real=not inertia))
+    return partial_fractions(*transfer, real=not inertia)
 
 
 def transfer_functions(
@@ -117,67 +101,58 @@ def transfer_functions(
     symmetric: bool,
     inertia: bool = False,
     both_arms: bool = False,
-) -> TransferFunctions:
-    """Rotation over torque as rational functions of s; arguments as of `step_response`.
+) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Rotation over torque as quotients of polynomials in s; arguments as of `step_response`.
 
     Parameters may be complex: nothing but arithmetic is done to them.
+
+    Returns
+    -------
+    numerators : (n_arms, n_drives, n, terms)
+        One a way from drive to arm, in ascending powers.
+    denominator : (n, terms)
+        The one that all share.
     """
     p, q = sample_polynomials(network)
-    z_2 = arm_polynomial(gripper.left, inertia)
-    z_4 = arm_polynomial(gripper.right, inertia)
-    coupling = gripper.lever_m**2
+    z_2, z_4 = (arm_polynomial(arm, inertia) for arm in (gripper.left, gripper.right))
+    coupled = gripper.lever_m**2 * p
+    arms, drives = 2 if both_arms else 1, 1 if symmetric else 2
     if symmetric and gripper.left == gripper.right:
-        numerators = [[q.T]] * (2 if both_arms else 1)
-        return TransferFunctions(numerators, add(multiply(z_2, q), 2 * coupling * p).T)
+        denominator = add(multiply(z_2, q), 2 * coupled)
+        return q[None, None].repeat(arms, axis=0).swapaxes(2, 3), denominator.T
     left, right = multiply(z_4, q), multiply(z_2, q)
-    numerators = [
-        [left.T, coupling * p.T],
-        [right.T, -add(right, coupling * p).T],
-    ]
-    numerators = [row[: 1 if symmetric else 2] for row in numerators[: 2 if both_arms else 1]]
-    arms = multiply(z_2, z_4)
-    denominator = add(multiply(arms, q), coupling * multiply(p, add(z_2, z_4)))
-    return TransferFunctions(numerators, denominator.T)
+    padded = add(coupled, np.zeros_like(left))
+    numerators = np.array([[left, padded], [right, -add(right, coupled)]])
+    denominator = add(
+        multiply(multiply(z_2, z_4), q), gripper.lever_m**2 * multiply(p, add(z_2, z_4))
+    )
+    return numerators[:arms, :drives].swapaxes(2, 3), denominator.T
 
 
 def rotation(
-    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int = LEFT
+    response: StepResponse,
+    torque: TorqueHistory,
+    time_s: Array,
+    arm: int = LEFT,
+    *,
+    rate: bool = False,
 ) -> Array:
-    """Closing rotation of an arm in rad, shape (n, n_times), at any times.
+    """Closing rotation of an arm in rad, or its rate in rad/s, (n, n_times), at any times.
 
     What sets in at different times superposes. A step response starts at zero,
     so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the constant
     where a sample creeps far from its rest; ramps and parabolas are its integrals.
     """
-    return _superposed(response, torque, time_s, arm, rate=False)
-
-
-def rotation_rate(
-    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int = LEFT
-) -> Array:
-    """Closing rate of an arm in rad/s, shape (n, n_times), at any times."""
-    return _superposed(response, torque, time_s, arm, rate=True)
-
-
-def _superposed(
-    response: StepResponse, torque: TorqueHistory, time_s: Array, arm: int, *, rate: bool
-) -> Array:
-    symmetric = response.static.shape[2] == 1
-    phi = np.zeros((response.static.shape[0], len(time_s)))
-    weights = response.weights[:, arm]
+    phi = np.zeros((len(response.static), len(time_s)))
+    # Arms that differ have a second drive, which does nothing if both are driven alike.
+    weights = response.weights[:, arm, : 1 if torque.symmetric else 2]
     rates = response.rates[:, :, None]
-    jumps = drives(torque.left, torque.right, symmetric)
-    for start, jump in zip(torque.time_s, np.moveaxis(jumps, 1, 0), strict=True):
+    for start, order, heights in torque.jumps:
         after = time_s >= start
-        elapsed = time_s[after] - start
-        for order in np.flatnonzero(np.any(jump != 0, axis=0)):
-            amplitude = np.einsum("ndj,d->nj", weights, jump[:, order])
-            growth = _growth(int(order) - rate, rates, elapsed)
-            phi[:, after] += np.einsum("nj,njt->nt", amplitude, growth).real
-    amplitudes = drives(torque.harmonic_left, torque.harmonic_right, symmetric)
-    for start, omega, a in zip(
-        torque.harmonic_time_s, torque.omega_rad_per_s, amplitudes.T, strict=True
-    ):
+        growth = _growth(order - rate, rates, time_s[after] - start)
+        amplitude = np.einsum("ndj,d->nj", weights, heights)
+        phi[:, after] += np.einsum("nj,njt->nt", amplitude, growth).real
+    for start, omega, a in torque.swings:
         after = time_s >= start
         elapsed = time_s[after] - start
         # int_0^t h'(t - s) e^(i omega s) ds with h' = sum_j w_j p_j e^(p_j t).
@@ -282,17 +257,14 @@ def slope_at_poles(denominator: NDArray[Any], rates: NDArray[Any]) -> NDArray[An
     return slope
 
 
-def partial_fractions(transfer: TransferFunctions, rates: NDArray[Any]) -> StepResponse:
+def partial_fractions(
+    numerators: NDArray[Any], denominator: NDArray[Any], *, real: bool
+) -> StepResponse:
     """Step response of N(s)/D(s): N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
-    numerators, denominator = transfer.numerators, transfer.denominator
+    rates = poles(denominator, real=real)
     slope = rates * slope_at_poles(denominator, rates)
-    shape = (len(rates), len(numerators), len(numerators[0]))
-    static = np.empty(shape, dtype=denominator.dtype)
-    weights = np.empty((*shape, rates.shape[1]), dtype=slope.dtype)
-    for arm, row in enumerate(numerators):
-        for drive, numerator in enumerate(row):
-            static[:, arm, drive] = numerator[:, 0] / denominator[:, 0]
-            weights[:, arm, drive] = evaluate(numerator, rates) / slope
+    found = numerators[..., 0] / denominator[:, 0], evaluate(numerators, rates) / slope
+    static, weights = (np.ascontiguousarray(np.moveaxis(of, 2, 0)) for of in found)
     return StepResponse(static, rates, weights)
 
 

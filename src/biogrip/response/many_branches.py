@@ -27,7 +27,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.network import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.interlacing import Zeros, interlaced_zeros
-from biogrip.response.many_branches_ringing import ringing
+from biogrip.response.many_branches_ringing import Ringing
 from biogrip.response.roots import SMALLEST_GAP
 
 # Equal arms differ by this share: their branch does nothing, but has its mode.
@@ -111,10 +111,8 @@ class Arms:
         away = zeros.from_pole(np.asarray(self._rate))
         share = self._chi / self._c.sum() / away
         slope = -share / away
-        through, through_slope = (
-            (left + share) * (share - right),
-            slope * (left - right + 2 * share),
-        )
+        through = (left + share) * (share - right)
+        through_slope = slope * (left - right + 2 * share)
         return (
             np.array([[right - share, through], [left + share, -(left + share) - through]]),
             np.array([[-slope, through_slope], [slope, -slope - through_slope]]),
@@ -163,10 +161,10 @@ def _ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any]
     return weights, rates
 
 
-def modes_of_rotation(
-    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
+def modes_of_many(
+    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool, force: bool = False
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
-    """Step responses of both arms: constants, rates in 1/s and weights.
+    """Step responses of both arms, or of the jaw force: constants, rates in 1/s and weights.
 
     Parameters
     ----------
@@ -176,56 +174,33 @@ def modes_of_rotation(
         Whether both arms are driven alike; decides the drives.
     inertia
         Whether the arms have any.
+    force
+        Whether the jaw force, in N, takes the place of the arms.
 
     Returns
     -------
     static : (n, n_arms, n_drives)
-        In rad per N m.
+        In rad (N) per N m.
     rates : (n, n_modes)
     weights : (n, n_arms, n_drives, n_modes)
-        In rad per N m.
+        In rad (N) per N m.
     """
-    arms, network, impedance, zeros = _held(gripper, network, symmetric=symmetric)
-    static = arms.rotations_at_rest(network)
-    if inertia:
-        found = ringing(gripper, network, zeros, alike=arms.alike)
-        return _by_sample(static, found.rates.T, found.rotations(), symmetric)
-    weights = -arms.rotations(zeros)[0] / impedance.steepness(zeros)
-    return _by_sample(static, -zeros.values, weights, symmetric)
-
-
-def modes_of_force(
-    gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool
-) -> tuple[Array, NDArray[Any], NDArray[Any]]:
-    """Jaw force after unit steps, in N per N m; as of `modes_of_rotation`, with one arm."""
-    arms, network, impedance, zeros = _held(gripper, network, symmetric=symmetric)
-    static = arms.forces_at_rest(network)
-    if inertia:
-        found = ringing(gripper, network, zeros, alike=arms.alike)
-        return _by_sample(static, found.rates.T, found.forces(), symmetric)
-    weights = -arms.forces(zeros) / impedance.steepness(zeros)
-    return _by_sample(static, -zeros.values, weights, symmetric)
-
-
-def _held(
-    gripper: Gripper, network: Network, *, symmetric: bool
-) -> tuple[Arms, Network, Impedance, Zeros]:
-    """Samples between the arms, and the rates of their modes without inertia."""
     network = separated(network)
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
     impedance = arms.with_sample(network)
-    return arms, network, impedance, impedance.zeros()
-
-
-def _by_sample(
-    static: Array, rates: NDArray[Any], weights: NDArray[Any], symmetric: bool
-) -> tuple[Array, NDArray[Any], NDArray[Any]]:
+    zeros = impedance.zeros()
+    static = arms.forces_at_rest(network) if force else arms.rotations_at_rest(network)
+    if inertia:
+        found = Ringing(gripper, network, zeros, alike=arms.alike)
+        rates: NDArray[Any] = found.rates
+        weights: NDArray[Any] = found.forces() if force else found.rotations()
+    else:
+        rates = np.ascontiguousarray(-zeros.values.T)
+        numerators = arms.forces(zeros) if force else arms.rotations(zeros)[0]
+        weights = -numerators / impedance.steepness(zeros)
     drives = slice(1 if symmetric else 2)
-    return (
-        np.ascontiguousarray(np.moveaxis(static[:, drives], 2, 0)),
-        np.ascontiguousarray(rates.T),
-        np.ascontiguousarray(np.moveaxis(weights[:, drives], 3, 0)),
-    )
+    static, weights = (np.moveaxis(of[:, drives], -1, 0) for of in (static, weights))
+    return np.ascontiguousarray(static), rates, np.ascontiguousarray(weights)
 
 
 def modes_with_slopes(
@@ -238,7 +213,7 @@ def modes_with_slopes(
     Parameters
     ----------
     gripper, symmetric
-        As of `modes_of_rotation`.
+        As of `modes_of_many`.
     tilted
         n samples, and after them the same with each of `count` parameters tilted into the
         complex plane by the share `tilt`.
@@ -263,9 +238,8 @@ def modes_with_slopes(
     x = zeros.values
     moved = np.zeros((count, *x.shape)) - d_level[:, None]
     steepness = np.zeros_like(x)
-    for weight, rate, d_weight, d_rate in zip(
-        impedance.weights, impedance.rates, d_weights, d_rates, strict=True
-    ):
+    branches = list(zip(impedance.weights, impedance.rates, d_weights, d_rates, strict=True))
+    for weight, rate, d_weight, d_rate in branches:
         inverse = 1 / zeros.from_pole(rate)
         steepness += weight * (x * inverse) ** 2
         moved += d_weight[:, None] * inverse
@@ -273,14 +247,11 @@ def modes_with_slopes(
             moved += (weight * d_rate)[:, None] * (inverse * inverse)
     moved *= x * x / steepness
     steepening = np.zeros_like(moved)
-    for weight, rate, d_weight, d_rate in zip(
-        impedance.weights, impedance.rates, d_weights, d_rates, strict=True
-    ):
+    for weight, rate, d_weight, d_rate in branches:
         inverse = 1 / zeros.from_pole(rate)
         ratio = x * inverse
-        steepening += d_weight[:, None] * (ratio * ratio) - moved * (
-            2 * weight * rate * ratio * inverse * inverse
-        )
+        away = 2 * weight * rate * ratio * inverse * inverse
+        steepening += d_weight[:, None] * (ratio * ratio) - moved * away
         if np.any(d_rate):
             steepening += d_rate[:, None] * (2 * weight * (ratio * inverse) * ratio)
     drives = slice(1 if symmetric else 2)

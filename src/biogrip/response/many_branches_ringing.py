@@ -12,8 +12,6 @@ where a branch is weak. To begin with there are the rates without inertia, and t
 of arms on a sample whose dampers hold.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from biogrip.arrays import Array, ComplexArray
@@ -26,82 +24,60 @@ from biogrip.response.roots import roots, swept
 _ASIDE = 1 + 1e-3j
 
 
-@dataclass(frozen=True)
 class Ringing:
-    """Roots of E, and what the numerators over s E' are made of, (n, n_modes) each.
+    """Modes of arms with inertia on n samples with any number of branches.
 
-    Parameters
-    ----------
-    rates
-        In 1/s.
-    sample
-        G, in N/m.
-    left, right
-        Z_2 and Z_4, in N m/rad.
-    slope
-        dE/ds.
-    lever_m
-        b.
-    alike
-        Whether both arms are equal, and driven alike.
-    """
-
-    rates: ComplexArray
-    sample: ComplexArray
-    left: ComplexArray
-    right: ComplexArray
-    slope: ComplexArray
-    lever_m: float
-    alike: bool
-
-    def rotations(self) -> ComplexArray:
-        """Weights of the rotations, (n_arms, n_drives, n_modes, n)."""
-        if self.alike:
-            return self._weights([[np.ones_like(self.rates)]] * 2)
-        sample = self.lever_m**2 * self.sample
-        return self._weights([[self.right, sample], [self.left, -(self.left + sample)]])
-
-    def forces(self) -> ComplexArray:
-        """Weights of the jaw force, (1, n_drives, n_modes, n)."""
-        force = self.lever_m * self.sample
-        if self.alike:
-            return self._weights([[2 * force]])
-        return self._weights([[force * (self.left + self.right), -force * self.left]])
-
-    def _weights(self, numerators: list[list[ComplexArray]]) -> ComplexArray:
-        weights: ComplexArray = np.array(numerators) / (self.rates * self.slope)
-        return weights.swapaxes(2, 3)
-
-
-def ringing(gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> Ringing:
-    """Find the modes of arms with inertia.
+    Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero.
 
     Parameters
     ----------
     gripper, network
-        Arms, and n samples with any number of branches.
+        Arms and samples.
     zeros
         Rates without inertia.
     alike
         Whether both arms are equal, and driven alike.
     """
-    system = _System(gripper, network, alike=alike)
-    origin, beyond = system.begin(zeros)
-    between = origin[:, None] - origin[..., None]
-    beyond = swept(beyond, lambda points: system.newton_step(origin, points), between)
-    return system.at(origin, beyond)
 
-
-class _System:
-    """E of n samples, at points -origin + beyond, (n, n_points)."""
-
-    def __init__(self, gripper: Gripper, network: Network, *, alike: bool) -> None:
+    def __init__(self, gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> None:
         self._lever_m, self._b_2, self._alike = gripper.lever_m, gripper.lever_m**2, alike
         self._arms = gripper.left, gripper.right
         self._k_p, self._c_p = network.k_p[:, None], network.c_p[:, None]
         self._k, self._rates = network.k[:, None], (network.k / network.c)[:, None]
+        origin, beyond = self._begin(zeros)
+        between = origin[:, None] - origin[..., None]
+        beyond = swept(beyond, lambda points: self._newton_step(origin, points), between)
+        self.rates = s = beyond - origin
+        """Roots of E in 1/s, (n, n_modes)."""
+        inverse = 1 / ((self._rates - origin[..., None]) + beyond[..., None])
+        # G and dG/ds, and dE/ds.
+        self._sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
+        sample_slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)
+        _, arms_slope, factor, factor_slope = self._of_arms(s)
+        through = factor_slope * self._sample + factor * sample_slope
+        self._slope = arms_slope + self._b_2 * through
 
-    def begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
+    def rotations(self) -> ComplexArray:
+        """Weights of the rotations in rad per N m, (n_arms, n_drives, n_modes, n)."""
+        if self._alike:
+            return self._weights([[np.ones_like(self.rates)]] * 2)
+        left, right = (_value(arm, self.rates) for arm in self._arms)
+        sample = self._b_2 * self._sample
+        return self._weights([[right, sample], [left, -(left + sample)]])
+
+    def forces(self) -> ComplexArray:
+        """Weights of the jaw force in N per N m, (1, n_drives, n_modes, n)."""
+        force = self._lever_m * self._sample
+        if self._alike:
+            return self._weights([[2 * force]])
+        left, right = (_value(arm, self.rates) for arm in self._arms)
+        return self._weights([[force * (left + right), -force * left]])
+
+    def _weights(self, numerators: list[list[ComplexArray]]) -> ComplexArray:
+        weights: ComplexArray = np.array(numerators) / (self.rates * self._slope)
+        return weights.swapaxes(2, 3)
+
+    def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
         """Where to begin."""
         branches = self._k.shape[2]
         ring = roots(self._ring()) * _ASIDE
@@ -121,7 +97,7 @@ class _System:
             ]
         )
 
-    def newton_step(self, origin: Array, beyond: ComplexArray) -> ComplexArray:
+    def _newton_step(self, origin: Array, beyond: ComplexArray) -> ComplexArray:
         """E times all s + r_j, over its derivative."""
         s = beyond - origin
         away = (self._rates - origin[..., None]) + beyond[..., None]
@@ -135,22 +111,10 @@ class _System:
         # With a branch of its own: both sides times s + r.
         spring = self._b_2 * np.where(own, self._k, 0).sum(axis=2)
         has_own = np.any(own, axis=2)
-        slope = np.where(
-            has_own, value + beyond * slope + spring * (factor_slope * s + factor), slope
-        )
+        whole = value + beyond * slope + spring * (factor_slope * s + factor)
+        slope = np.where(has_own, whole, slope)
         value = np.where(has_own, beyond * value + spring * factor * s, value)
         return value / (slope + value * inverse.sum(axis=2))
-
-    def at(self, origin: Array, beyond: ComplexArray) -> Ringing:
-        """What weights follow from."""
-        s = beyond - origin
-        inverse = 1 / ((self._rates - origin[..., None]) + beyond[..., None])
-        sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
-        sample_slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)
-        _, arms_slope, factor, factor_slope = self._of_arms(s)
-        slope = arms_slope + self._b_2 * (factor_slope * sample + factor * sample_slope)
-        left, right = (_value(arm, s) for arm in self._arms)
-        return Ringing(s, sample, left, right, slope, self._lever_m, self._alike)
 
     def _of_arms(
         self, s: ComplexArray

@@ -88,14 +88,11 @@ class SeriesMisfit:
 
     def joins(self, other: "SeriesMisfit") -> bool:
         """Whether populations against traces of both give the same bits together as apart."""
-        (gripper, *same, interval_s), (others_gripper, *others, others_interval_s) = (
-            self._simulated,
-            other._simulated,
-        )
+        gripper, model, torque, interval_s = self._simulated
+        others, others_model, others_torque, others_interval_s = other._simulated
         return (
-            all(one is another for one, another in zip(same, others, strict=True))
-            and (gripper, interval_s) == (others_gripper, others_interval_s)
-            and self._samples == other._samples
+            (model is others_model and torque is others_torque)
+            and (gripper, interval_s, self._samples) == (others, others_interval_s, other._samples)
             and self._closed_form
         )
 
@@ -111,33 +108,25 @@ class SeriesMisfit:
         return DecayTable(self.exact_projections, self._samples, shortest)
 
     def __call__(self, parameters: Array) -> Array:
-        """Misfit in rad of each individual against the only trace, or the first.
+        """Misfit in rad of each individual, (n,), against the only trace, or the first.
 
         Parameters
         ----------
-        parameters : (n_individuals, n_parameters)
+        parameters : (n, n_parameters)
             Sample parameters in the model's order, SI units.
-
-        Returns
-        -------
-        (n_individuals,)
         """
         misfit: Array = self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
         return misfit
 
     def of_each(self, parameters: Array, traces: IntArray) -> Array:
-        """Misfit in rad of populations, each against a trace.
+        """Misfit in rad of populations, each against a trace, (n_populations, n).
 
         Parameters
         ----------
-        parameters : (n_populations, n_individuals, n_parameters)
+        parameters : (n_populations, n, n_parameters)
             Sample parameters in the model's order, SI units.
         traces : (n_populations,)
             Indices of the traces.
-
-        Returns
-        -------
-        (n_populations, n_individuals)
         """
         populations, size = parameters.shape[:2]
         some = max(1, _AT_ONCE // size)
@@ -210,20 +199,10 @@ class SeriesMisfit:
         return _sum(_sum(terms)) + _sum(constants)[0]
 
     def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
-        """Amplitudes of modes at the first sample of each phase.
+        """Amplitudes of modes at the first sample of each phase, (n_phases, n_modes, n).
 
-        Parameters
-        ----------
-        rates : (n_modes, n)
-            Over the sampling rate.
-        weights : (n_drives, n_modes, n)
-            Of unit steps.
-        decays : (n_phases, n_modes, n)
-            To what share a mode decays within each phase.
-
-        Returns
-        -------
-        (n_phases, n_modes, n)
+        Weights are those of unit steps, (n_drives, n_modes, n); decays, (n_phases, n_modes, n),
+        to what share a mode decays within each phase.
         """
         amplitudes = _sum(self._heights * weights[:, None])
         for phase, late in enumerate(self._late):
@@ -236,14 +215,7 @@ class SeriesMisfit:
     def exact_projections(self, rates: Array) -> Array:
         """Projections of each trace on the response of a mode to each drive, summed up.
 
-        Parameters
-        ----------
-        rates : (n,)
-            Rates of modes, over the sampling rate.
-
-        Returns
-        -------
-        (n_traces * n_drives, n)
+        Of rates over the sampling rate, (n,), they are (n_traces * n_drives, n).
         """
         sums = _power_sums(self._traces, self._first_samples, rates)
         decays = np.exp(self._lengths[1:] * rates)

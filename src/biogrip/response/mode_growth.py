@@ -87,14 +87,10 @@ def _from_phase_to_phase(
         elapsed = np.append(time_s[here], starts[k + 1]) - start
         decay = 1 + _expm1(rate * elapsed)
         grown, tilted = reached * decay, (slanted + reached * elapsed) * decay
-        sets_in = [
-            (heights, _growth(order, rate, elapsed))
-            for order, heights in enumerate(powers[k].T)
-            if heights.any()
-        ]
-        for heights, (one, its_slope) in sets_in:
-            grown = grown + heights[:, None, None] * one
-            tilted = tilted + heights[:, None, None] * its_slope
+        for order, heights in enumerate(powers[k].T[..., None, None]):
+            if heights.any():
+                one, its_slope = _growth(order, rate, elapsed)
+                grown, tilted = grown + heights * one, tilted + heights * its_slope
         for omega, amplitudes in swings[k]:
             swung = _swing(omega, rate, elapsed, amplitudes[:, None, None])
             grown, tilted = grown + swung[0], tilted + swung[1]

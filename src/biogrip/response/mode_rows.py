@@ -17,7 +17,7 @@ from numpy.polynomial import chebyshev
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.response.decay_table import DEGREE, WIDTH
+from biogrip.response.decay_table import DEGREE, NODES, WIDTH, series
 from biogrip.response.mode_growth import growth_of_modes
 from biogrip.response.modes import Modes
 
@@ -29,14 +29,10 @@ _ORDERS = np.arange(_DEGREE + 1)
 # exp(-40) is lost in rounding; under a ramp, something is left that falls with the rate.
 _DECAYED, _DECAYED_UNDER_RAMPS = 40.0, 1e12
 
-_WIDE_NODES = 0.5 + 0.5 * chebyshev.chebpts1(DEGREE + 1)
 # On a short piece from -1/2 to 1/2.
 _SHORT_NODES = 0.5 * chebyshev.chebpts1(_DEGREE + 1)
 _DIVIDED = (np.arange(_SHORTER)[:, None] + 0.5 + _SHORT_NODES).ravel() / _SHORTER
-_TO_SHORT = np.linalg.solve(
-    chebyshev.chebvander(2 * _WIDE_NODES - 1, DEGREE).T,
-    chebyshev.chebvander(2 * _DIVIDED - 1, DEGREE).T,
-).T
+_TO_SHORT = np.linalg.solve(series(NODES, DEGREE).T, series(_DIVIDED, DEGREE).T).T
 _TO_POWERS = np.linalg.inv(np.vander(_SHORT_NODES, increasing=True))
 
 
@@ -66,7 +62,7 @@ class ModeRows:
         # (n_pieces, n_drives, degree + 1, n_rows).
         self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
         for piece in range(wide):
-            u = WIDTH * (piece + _WIDE_NODES)
+            u = WIDTH * (piece + NODES)
             growth, _ = growth_of_modes(-np.expm1(u)[None] / self._end_s, torque, time_s)
             values = (growth[0] / np.expm1(u)[:, None]) @ to_rows
             short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
@@ -74,17 +70,12 @@ class ModeRows:
             self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
 
     def __call__(self, modes: Modes) -> Array:
-        """Rows of responses and of their derivatives.
+        """Rows of responses and their derivatives, (n, 1 + n_parameters, n_rows) in rad.
 
         Parameters
         ----------
         modes
             Poles and weights of n samples, with derivatives.
-
-        Returns
-        -------
-        (n, 1 + n_parameters, n_rows)
-            In rad; first the response, then its derivatives by the log-parameters.
         """
         count, parameters, n_modes = modes.rate_slopes.shape
         scaled = -self._end_s * modes.rates
@@ -98,10 +89,8 @@ class ModeRows:
         scale_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
         place_slopes = scale_slopes / (_WIDTH * (1 + scaled))[:, None]
         # Now (n, n_modes, n_drives), and (n, n_parameters, n_modes, n_drives).
-        weights, weight_slopes = (
-            modes.weights.swapaxes(-1, -2),
-            modes.weight_slopes.swapaxes(-1, -2),
-        )
+        weights = modes.weights.swapaxes(-1, -2)
+        weight_slopes = modes.weight_slopes.swapaxes(-1, -2)
         amplitudes = weights * scale[..., None]
         amplitude_slopes = weight_slopes * scale[:, None, :, None]
         amplitude_slopes += weights[:, None] * scale_slopes[..., None]

@@ -17,7 +17,7 @@ References
 from dataclasses import dataclass
 from functools import cache
 from itertools import permutations
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +32,7 @@ from biogrip.response.many_branches import modes_with_slopes
 _TILT = 1e-30
 
 
-@dataclass(frozen=True)
-class Modes:
+class Modes(NamedTuple):
     """Step responses of n samples' left arm, and their derivatives by the log-parameters.
 
     Parameters
@@ -61,54 +60,26 @@ class Polynomials:
     denominator : (n, terms)
         In ascending powers of s.
     denominator_slopes : (n_parameters, n, terms)
-    numerators : [n_drives] of (n, terms)
-    numerator_slopes : [n_drives] of (n_parameters, n, terms)
+    numerators : (n_drives, n, terms)
+    numerator_slopes : (n_parameters, n_drives, n, terms)
     """
 
     denominator: Array
     denominator_slopes: Array
-    numerators: list[Array]
-    numerator_slopes: list[Array]
+    numerators: Array
+    numerator_slopes: Array
 
     def of(self, rows: NDArray[Any]) -> "Polynomials":
         """Those of some of the samples."""
         return Polynomials(
             self.denominator[rows],
             self.denominator_slopes[:, rows],
-            [numerator[rows] for numerator in self.numerators],
-            [slopes[:, rows] for slopes in self.numerator_slopes],
+            self.numerators[:, rows],
+            self.numerator_slopes[:, :, rows],
         )
 
 
-def polynomials_of(
-    gripper: Gripper,
-    model: SampleModel,
-    parameters: Array,
-    *,
-    symmetric: bool,
-    inertia: bool,
-    slopes: bool = True,
-) -> Polynomials:
-    """Transfer functions of samples, and their derivatives.
-
-    Parameters
-    ----------
-    gripper, model
-        What is simulated.
-    parameters : (n, n_parameters)
-        All positive.
-    symmetric
-        Whether both arms are driven alike; decides the drives.
-    inertia
-        Whether the arms have any.
-    slopes
-        Whether derivatives are wanted; without, there are those of no parameter.
-    """
-    network, count = _tilted(model, parameters, slopes=slopes)
-    return _polynomials(gripper, network, count, symmetric=symmetric, inertia=inertia)
-
-
-def _tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Network, int]:
+def tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Network, int]:
     """Networks of samples, and after them, for slopes, with each of so many parameters tilted."""
     if not slopes:
         return model.network(parameters), 0
@@ -116,16 +87,26 @@ def _tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Net
     return model.network((parameters * _tilts(count)[:, None]).reshape(-1, count)), count
 
 
-def _polynomials(
-    gripper: Gripper, tilted: Network, count: int, *, symmetric: bool, inertia: bool
+def polynomials_of(
+    gripper: Gripper, network: Network, count: int, *, symmetric: bool, inertia: bool
 ) -> Polynomials:
-    """Of n samples, after which there are the same with each of so many parameters tilted."""
-    transfer = transfer_functions(gripper, tilted, symmetric=symmetric, inertia=inertia)
-    denominator, denominator_slopes = _untilted(transfer.denominator, count)
-    rows = [_untilted(row, count) for row in transfer.numerators[LEFT]]
-    return Polynomials(
-        denominator, denominator_slopes, [row for row, _ in rows], [slope for _, slope in rows]
+    """Transfer functions of samples, and their derivatives.
+
+    Parameters
+    ----------
+    gripper
+        Its arms may differ.
+    network, count
+        From `tilted`: without slopes, there are those of no parameter.
+    symmetric
+        Whether both arms are driven alike; decides the drives.
+    inertia
+        Whether the arms have any.
+    """
+    numerators, denominator = transfer_functions(
+        gripper, network, symmetric=symmetric, inertia=inertia
     )
+    return Polynomials(*_untilted(denominator, count), *_untilted(numerators[LEFT], count))
 
 
 def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
@@ -139,38 +120,47 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
     for i, j in permutations(range(rates.shape[1]), 2):
         approach = rate_slopes[..., i] - rate_slopes[..., j]
         steepening[..., i] += approach / (rates[:, i] - rates[:, j])
-    weights, weight_slopes = [], []
-    for numerator, numerator_slopes in zip(
-        polynomials.numerators, polynomials.numerator_slopes, strict=True
-    ):
-        weight = evaluate(numerator, rates) / (rates * slope)
-        along = evaluate(numerator[:, 1:] * np.arange(1, numerator.shape[1]), rates)
-        change = evaluate(numerator_slopes, rates) + along * rate_slopes
-        weights.append(weight)
-        weight_slopes.append(change / (rates * slope) - weight * steepening)
+    numerators = polynomials.numerators
+    weights = evaluate(numerators, rates) / (rates * slope)
+    along = evaluate(numerators[..., 1:] * np.arange(1, numerators.shape[-1]), rates)
+    change = evaluate(polynomials.numerator_slopes, rates) + along * rate_slopes[:, None]
+    weight_slopes = change / (rates * slope) - weights * steepening[:, None]
     return Modes(
         rates,
-        np.array(weights).swapaxes(0, 1),
+        weights.swapaxes(0, 1),
         rate_slopes.swapaxes(0, 1),
-        np.array(weight_slopes).transpose(2, 1, 0, 3),
+        weight_slopes.transpose(2, 0, 1, 3),
     )
 
 
 def modes_of(
     gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
 ) -> Modes:
-    """Modes of samples without inertia, all real; arguments as of `polynomials_of`."""
-    network, count = _tilted(model, parameters, slopes=slopes)
+    """Modes of samples without inertia, all real.
+
+    Parameters
+    ----------
+    gripper, model
+        What is simulated.
+    parameters : (n, n_parameters)
+        All positive.
+    symmetric
+        Whether both arms are driven alike; decides the drives.
+    slopes
+        Whether derivatives are wanted; without, there are those of no parameter.
+    """
+    network, count = tilted(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:
         parts = modes_with_slopes(gripper, network, _TILT, count, symmetric=symmetric)
         return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    polynomials = _polynomials(gripper, network, count, symmetric=symmetric, inertia=False)
+    polynomials = polynomials_of(gripper, network, count, symmetric=symmetric, inertia=False)
     return modes_at(polynomials, poles(polynomials.denominator, real=True))
 
 
 def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
-    """Polynomials of n samples, (n, terms), and their derivatives, (n_parameters, n, terms)."""
-    of_tilts = coefficients.reshape(count + 1, -1, coefficients.shape[1])
+    """Polynomials of n samples, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
+    *others, _, terms = coefficients.shape
+    of_tilts = coefficients.reshape(*others, count + 1, -1, terms).swapaxes(0, -3)
     return of_tilts[0].real, of_tilts[1:].imag / _TILT
 
 

@@ -40,7 +40,6 @@ from biogrip.response.linear import (
     StepResponse,
     is_symmetric,
     rotation,
-    rotation_rate,
     step_response,
 )
 
@@ -102,9 +101,8 @@ class Correction:
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate at ascending times, shape (n, n_times)."""
-        return self._interpolated(
-            self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)], time_s
-        )
+        own = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
+        return self._interpolated(own, time_s)
 
     def force_at(self, time_s: Array) -> Array:
         """Evaluate nonlinear minus linear jaw force in N at ascending times, (n, n_times)."""
@@ -120,18 +118,9 @@ class Correction:
 
 
 def mesh_functions(edges_s: Array, time_s: Array) -> Array:
-    """Functions that a `Correction` is a sum of, weighted by its values.
+    """Functions of ascending times that a `Correction` is a sum of, weighted by its values.
 
-    Parameters
-    ----------
-    edges_s : (n_elements + 1,)
-        The mesh.
-    time_s : (n_times,)
-        Ascending times.
-
-    Returns
-    -------
-    (n_elements * (STAGES + 1), n_times)
+    There are (n_elements * (STAGES + 1), n_times) of a mesh of (n_elements + 1,) edges.
     """
     functions, start = np.zeros((len(edges_s) - 1, STAGES + 1, len(time_s))), 0
     for element, on_piece in enumerate(_interpolation(edges_s, time_s)):
@@ -148,7 +137,8 @@ def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
         np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
         for of_elements in (edges_s[:-1], np.diff(edges_s))
     )
-    return np.split(_lagrange((time_s - starts) / lengths), cuts, axis=1)
+    points = np.concatenate(([0.0], _radau()[0]))
+    return np.split(_polynomials(points, (time_s - starts) / lengths), cuts, axis=1)
 
 
 def nonlinear_rotation(
@@ -214,15 +204,13 @@ def correction(
     before_jumps = np.minimum(nodes, np.nextafter(edges[1:, None], 0)).ravel()
     shape = (len(network.k_p), len(arms), *nodes.shape)
     b_0 = gripper.lever_m
-    linear = np.empty(shape)
-    linear_rate = np.empty(shape)
-    tau = np.empty(shape[1:])
+    linear, linear_rate, tau = np.empty(shape), np.empty(shape), np.empty(shape[1:])
     for index, name in enumerate(("left", "right")[: len(arms)]):
-        linear[:, index] = rotation(response, torque, nodes.ravel(), index).reshape(
-            -1, *nodes.shape
+        phi = rotation(response, torque, nodes.ravel(), index)
+        rate = rotation(response, torque, before_jumps, index, rate=True)
+        linear[:, index], linear_rate[:, index] = (
+            of.reshape(-1, *nodes.shape) for of in (phi, rate)
         )
-        rate = rotation_rate(response, torque, before_jumps, index)
-        linear_rate[:, index] = rate.reshape(-1, *nodes.shape)
         tau[index] = torque_at(torque, before_jumps, name).reshape(nodes.shape)
     times = np.ones(shape[0]) if factors is None else factors
     linear, linear_rate, tau = (
@@ -237,7 +225,8 @@ def correction(
         u = b_0 * (linear[left] + extra[left])
         u_rate = b_0 * (linear_rate[left] + extra_rate[left])
         loads[left] = load = b_0 * _load(gripper, arms, tau[left], u, u_rate)
-        found, extra_rate[left] = modes.respond(_as_drives(load), left)
+        as_drives = np.moveaxis(drives(load[:, 0], load[:, -1], symmetric), 0, 1)
+        found, extra_rate[left] = modes.respond(as_drives, left)
         change = np.abs(found - extra[left]).max(axis=(1, 2, 3))
         extra[left] = found
         converged[left] = change <= accuracy.tolerance * peak[left]
@@ -297,13 +286,6 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
     return load
 
 
-def _as_drives(load: Array) -> Array:
-    """Loads of the arms as drives, shape (n, n_drives, n_elements, STAGES)."""
-    if load.shape[1] == 1:
-        return load
-    return np.moveaxis(drives(load[:, 0], load[:, 1], symmetric=False), 0, 1)
-
-
 class _Modes:
     """The linear modes, ready to respond to loads given at the nodes of a mesh."""
 
@@ -323,12 +305,7 @@ class _Modes:
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
         """Rotation and rate of the arms at the nodes, (n, n_arms, n_elements, STAGES) each.
 
-        Parameters
-        ----------
-        load : (n, n_drives, n_elements, STAGES)
-            At the nodes.
-        which : (n,)
-            Of the samples.
+        Under loads there, (n, n_drives, n_elements, STAGES), on `which` of the samples, (n,).
         """
         forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])
@@ -363,11 +340,6 @@ def _nodes(edges: Array) -> Array:
     nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
     nodes[:, -1] = edges[1:]
     return nodes
-
-
-def _lagrange(x: Array) -> Array:
-    """Values at x of the polynomials that are 1 at one of 0 and the nodes, (STAGES + 1, n)."""
-    return _polynomials(np.concatenate(([0.0], _radau()[0])), x)
 
 
 def _polynomials(points: Array, x: Array) -> Array:

@@ -99,19 +99,12 @@ class Residuals:
         return other
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Residuals and their derivatives.
+        """Residuals, (n_samples,), and their derivatives, (n_parameters, n_samples), in rad.
 
         Parameters
         ----------
         log_parameters : (n_parameters,)
             Natural logarithms of the parameters in SI units.
-
-        Returns
-        -------
-        residual : (n_samples,)
-            In rad.
-        sensitivity : (n_parameters, n_samples)
-            In rad.
         """
         rotation, sensitivity = self._simulated(log_parameters, self._time_s)
         residual = self._condensed.cleared(rotation) - self._rotation_rad
@@ -119,11 +112,6 @@ class Residuals:
 
     def gradient(self, log_parameters: Array) -> tuple[Array, float]:
         """Sum the squares of the residuals, and find where they grow, to all digits.
-
-        Parameters
-        ----------
-        log_parameters : (n_parameters,)
-            Natural logarithms of the parameters in SI units.
 
         Returns
         -------
@@ -137,14 +125,14 @@ class Residuals:
             return sensitivity @ residual, self._rms(residual)
         # So many are dense: their sums are those of nodes, to rounding.
         condensed, (seen, rest) = self._condensed, self._trace_at_nodes
-        rotation, sensitivity = self._simulated(log_parameters, condensed.node_time_s)
+        rotation, sensitivity = self._simulated(log_parameters, condensed.dense.time_s)
         rows = condensed.rows_of_nodes(np.vstack((rotation, sensitivity)))
         residual = np.append(rows[0] - seen, rest)
         return rows[1:] @ residual[:-1], self._rms(residual)
 
     @cached_property
     def _trace_at_nodes(self) -> tuple[Array, float]:
-        return self._condensed.nodes_of_trace(self._rotation_rad)
+        return self._condensed.dense.rows_of_samples(self._rotation_rad)
 
     def left(self, log_parameters: Array) -> Array:
         """Residuals alone, (n_samples,) in rad."""
@@ -196,33 +184,23 @@ class Residuals:
 
     def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the linear model gives."""
-        parameters, condensed, torque = np.exp(log_parameters), self._condensed, self._torque
+        gripper, model, torque = self._gripper, self.model, self._torque
+        parameters, condensed = np.exp(log_parameters), self._condensed
         if not condensed.reduced:
+            time_s, inertia = condensed.time_s, self.inertia
             rotations = linear_responses(
-                self._gripper,
-                self.model,
-                torque,
-                condensed.time_s,
-                parameters,
-                inertia=self.inertia,
-                slopes=slopes,
+                gripper, model, torque, time_s, parameters, inertia=inertia, slopes=slopes
             )
             return condensed.rows(rotations)
-        modes = modes_of(
-            self._gripper, self.model, parameters, symmetric=torque.symmetric, slopes=slopes
-        )
+        modes = modes_of(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
         return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Of `condensed_responses`, what the nonlinear model has over the linear one."""
         # As many modes at once, about.
         few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
-        return np.concatenate(
-            [
-                self._corrections(log_parameters[some], slopes)
-                for some in parts(len(log_parameters), few)
-            ]
-        )
+        every = (log_parameters[some] for some in parts(len(log_parameters), few))
+        return np.concatenate([self._corrections(some, slopes) for some in every])
 
     def _corrections(self, log_parameters: Array, slopes: bool) -> Array:
         found = corrections(
@@ -240,17 +218,12 @@ class Residuals:
         return rows
 
     def condensed_misfit(self, parameters: Array) -> Array:
-        """RMS misfit of a population; a sample's does not depend on the others.
+        """RMS misfit of a population, (n,) in rad; a sample's does not depend on the others.
 
         Parameters
         ----------
         parameters : (n, n_parameters)
             Sample parameters in the model's order, SI units.
-
-        Returns
-        -------
-        (n,)
-            In rad.
         """
         misfit = np.empty(len(parameters))
         at_once = max(1, _AT_ONCE // len(self.condensed_trace))
@@ -274,12 +247,8 @@ class Residuals:
 
     def shares_responses(self, other: "Residuals") -> bool:
         """Whether only the trace, and its noise, tell this from others."""
-        if type(self) is not type(other):
-            return False
-        return self._assumed() == other._assumed() and self._condensed is other._condensed
-
-    def _assumed(self) -> tuple[object, ...]:
-        return self._gripper, self.model, self.nonlinear
+        alike = type(self) is type(other) and self._condensed is other._condensed
+        return alike and (self._gripper, self.model) == (other._gripper, other.model)
 
     def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
         return rotation_and_sensitivity(

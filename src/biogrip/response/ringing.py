@@ -27,7 +27,7 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import evaluate
 from biogrip.response.mode_growth import growth_of_modes
-from biogrip.response.modes import Modes, Polynomials, modes_at, polynomials_of
+from biogrip.response.modes import Modes, Polynomials, modes_at, polynomials_of, tilted
 from biogrip.response.roots import roots
 
 # Weights of poles a relative gap g apart lose eps/g^2, their slopes eps/g^3.
@@ -123,7 +123,7 @@ def ringing_modes(
     Parameters
     ----------
     gripper, model, parameters, symmetric, slopes
-        As of `polynomials_of`.
+        As of `modes_of`.
 
     Yields
     ------
@@ -132,9 +132,8 @@ def ringing_modes(
     modes
         Real ones, and complex ones with weights of which the real part is meant.
     """
-    polynomials = polynomials_of(
-        gripper, model, parameters, symmetric=symmetric, inertia=True, slopes=slopes
-    )
+    network, count = tilted(model, parameters, slopes=slopes)
+    polynomials = polynomials_of(gripper, network, count, symmetric=symmetric, inertia=True)
     rates = roots(polynomials.denominator)
     size = np.abs(rates)
     close = _closest(rates, size) < _CLOSE
@@ -156,28 +155,13 @@ def ringing_modes(
             continue
         modes = modes_at(polynomials.of(some), rates[some])
         above = _part(modes, len(rows), slice(reals, reals + count))
-        yield rows, (_real(_part(modes, len(rows), slice(reals))), _scaled(above, 2.0))
+        above = above._replace(weights=2.0 * above.weights, weight_slopes=2.0 * above.weight_slopes)
+        yield rows, (Modes(*(of.real for of in _part(modes, len(rows), slice(reals)))), above)
 
 
 def _part(modes: Modes, rows: int, which: slice) -> Modes:
     """Some of the modes of the first samples."""
-    return Modes(
-        modes.rates[:rows, which],
-        modes.weights[:rows, ..., which],
-        modes.rate_slopes[:rows, ..., which],
-        modes.weight_slopes[:rows, ..., which],
-    )
-
-
-def _real(modes: Modes) -> Modes:
-    """Modes that are real, as real numbers."""
-    return Modes(
-        modes.rates.real, modes.weights.real, modes.rate_slopes.real, modes.weight_slopes.real
-    )
-
-
-def _scaled(modes: Modes, times: float) -> Modes:
-    return Modes(modes.rates, times * modes.weights, modes.rate_slopes, times * modes.weight_slopes)
+    return Modes(*(of[:rows, ..., which] for of in modes))
 
 
 def _closest(rates: ComplexArray, size: Array) -> Array:
@@ -195,18 +179,14 @@ def _circled(polynomials: Polynomials, rates: ComplexArray) -> Modes:
     while left:
         first = min(left, key=lambda j: _next(rates, j))
         inside, centre, radius = _circle(rates, first)
-        if inside:
+        # A larger circle may hold poles that a smaller one stands for: none counts twice.
+        if inside and set(inside) <= set(left):
             parts.append(_nodes(polynomials, centre, radius))
         else:
             inside = [first]
             parts.append(_part(plain, 1, slice(first, first + 1)))
         left = [j for j in left if j not in inside]
-    return Modes(
-        *(
-            np.concatenate([getattr(part, name) for part in parts], axis=-1)
-            for name in ("rates", "weights", "rate_slopes", "weight_slopes")
-        )
-    )
+    return Modes(*(np.concatenate(of, axis=-1) for of in zip(*parts, strict=True)))
 
 
 def _next(rates: ComplexArray, j: int) -> float:
@@ -243,11 +223,7 @@ def _nodes(polynomials: Polynomials, centre: complex, radius: float) -> Modes:
     denominator = evaluate(polynomials.denominator, s)
     steepening = evaluate(polynomials.denominator_slopes, s) / denominator
     share = turn / (_NODES * s * denominator)
-    weights = [share * evaluate(numerator, s) for numerator in polynomials.numerators]
-    slopes = [
-        share * evaluate(changes, s) - weight * steepening
-        for weight, changes in zip(weights, polynomials.numerator_slopes, strict=True)
-    ]
-    weight_slopes = np.array(slopes).transpose(2, 1, 0, 3)
-    rate_slopes = np.zeros((1, weight_slopes.shape[1], _NODES), dtype=complex)
-    return Modes(s, np.array(weights).swapaxes(0, 1), rate_slopes, weight_slopes)
+    weights = share * evaluate(polynomials.numerators, s)
+    slopes = share * evaluate(polynomials.numerator_slopes, s) - weights * steepening[:, None]
+    rate_slopes = np.zeros((1, len(slopes), _NODES), dtype=complex)
+    return Modes(s, weights.swapaxes(0, 1), rate_slopes, slopes.transpose(2, 0, 1, 3))

@@ -12,8 +12,7 @@ from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.inertia import while_ringing
-from biogrip.response.linear import rotation, step_response
+from biogrip.response.inertia import ring, while_ringing
 from biogrip.response.modes import modes_of
 from biogrip.response.nonlinear import COARSE, Correction, correction
 from biogrip.response.ringing import responses_of, ringing_responses
@@ -38,23 +37,8 @@ def linear_responses(
 ) -> Array:
     """Rotations of the left arm on the linear model, and their derivatives d phi / d log p.
 
-    Parameters
-    ----------
-    gripper, model, torque
-        What is simulated.
-    time_s : (n_times,)
-        Ascending times.
-    parameters : (n, n_parameters)
-        All positive.
-    inertia
-        Whether the arms ring, for milliseconds after every change of the torque.
-    slopes
-        Whether the derivatives are wanted.
-
-    Returns
-    -------
-    (n, 1 + n_parameters, n_times)
-        In rad; without `slopes`, (n, 1, n_times).
+    Arguments and result are those of `ringing_responses`; `inertia` tells whether the arms ring,
+    for milliseconds after every change of the torque.
     """
     if inertia and not model.power_law:
         return ringing_responses(gripper, model, torque, time_s, parameters, slopes=slopes)
@@ -63,32 +47,11 @@ def linear_responses(
     for some in parts(len(time_s), _AT_ONCE):
         rows[:, :, some] = responses_of(modes, torque, time_s[some])
     if inertia and np.any(seen := while_ringing(gripper, torque, time_s)):
-        rows[..., seen] += _ring(gripper, model, torque, time_s[seen], parameters, slopes=slopes)
+        around = model.network(_around(parameters, _RINGING_STEP, slopes=slopes))
+        added = ring(gripper, around, torque, time_s[seen])
+        added = added.reshape(len(parameters), -1, added.shape[1])
+        rows[..., seen] += differences(added, _RINGING_STEP)
     return rows
-
-
-def _ring(
-    gripper: Gripper,
-    model: SampleModel,
-    torque: TorqueHistory,
-    time_s: Array,
-    parameters: Array,
-    *,
-    slopes: bool,
-) -> Array:
-    """What inertia adds, with derivatives by differences; as of `linear_responses`."""
-    network = model.network(_around(parameters, _RINGING_STEP, slopes=slopes))
-    with_it, without = (
-        rotation(
-            step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia),
-            torque,
-            time_s,
-        )
-        for inertia in (True, False)
-    )
-    return _differences(
-        (with_it - without).reshape(len(parameters), -1, len(time_s)), _RINGING_STEP
-    )
 
 
 def rotation_and_sensitivity(
@@ -144,14 +107,7 @@ def corrections(
 ) -> Correction:
     """Nonlinear minus linear rotation of samples, and of those that are a little different.
 
-    Parameters
-    ----------
-    gripper, model, torque
-        What is simulated.
-    parameters : (n, n_parameters)
-        All positive.
-    slopes
-        Whether the samples that are a little different are wanted.
+    Arguments are as of `ringing_responses`.
 
     Returns
     -------
@@ -162,21 +118,15 @@ def corrections(
     return correction(gripper, model.network(around), torque, COARSE)
 
 
-def differences(values: Array) -> Array:
-    """What `corrections` found, and its derivatives by the log-parameters.
+def differences(values: Array, step: float = _STEP) -> Array:
+    """What `corrections` found, (n, 1 + 2 n_parameters, ...), and derivatives by log-parameters.
 
-    Parameters
-    ----------
-    values : (n, 1 + 2 n_parameters, ...)
+    The step is that of the log-parameters.
 
     Returns
     -------
     (n, 1 + n_parameters, ...)
     """
-    return _differences(values, _STEP)
-
-
-def _differences(values: Array, step: float) -> Array:
     slopes = (values[:, 1::2] - values[:, 2::2]) / (2 * step)
     return np.concatenate((values[:, :1], slopes), axis=1)
 

@@ -63,16 +63,10 @@ class UnilateralResponse:
 
 @dataclass(frozen=True)
 class _Stretch:
-    """From an instant on, with or without contact.
+    """From an instant on, with or without contact, as functions of the time since then.
 
-    Parameters
-    ----------
-    state
-        phi_2, phi_4, delta and the branches' dampers at times since then, (n, n_times).
-    margin
-        What may not become negative: the force, or the gap.
-    fastest_per_s
-        Largest rate.
+    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers; the margin is what
+    may not become negative: the force, or the gap.
     """
 
     state: Callable[[Array], Array]
@@ -114,11 +108,8 @@ class _System:
             self._sample = Modes(springs, np.diag(np.sqrt(c)))
         self._branches = n
 
-    def stretch(self, touching: bool, state: Array, torque: Forcing) -> _Stretch:
-        """Go on from a state."""
-        return self._in_contact(state, torque) if touching else self._apart(state, torque)
-
-    def _in_contact(self, state: Array, torque: Forcing) -> _Stretch:
+    def in_contact(self, state: Array, torque: Forcing) -> _Stretch:
+        """Go on from a state while the jaws touch."""
         motion = self._touching.follow(np.delete(state, 2), torque)
 
         def states(elapsed_s: Array) -> Array:
@@ -131,7 +122,8 @@ class _System:
 
         return _Stretch(states, force, float(self._touching.rates.max()))
 
-    def _apart(self, state: Array, torque: Forcing) -> _Stretch:
+    def apart(self, state: Array, torque: Forcing) -> _Stretch:
+        """Go on from a state while they do not."""
         arms = self._arms.follow(state[:2], torque)
         sample = self._recovery(state)
 
@@ -193,7 +185,8 @@ def unilateral_response(
     for start, length, loads in pieces:
         done = 0.0
         while True:
-            stretch = system.stretch(touching, state, loads.later(done))
+            go_on = system.in_contact if touching else system.apart
+            stretch = go_on(state, loads.later(done))
             grid = _grid(stretch.fastest_per_s, loads.omega_rad_per_s, length - done)
             lasts = _first_below(stretch.margin, grid, least[touching])
             begin, end = start + done, start + (length if lasts is None else done + lasts)
@@ -282,13 +275,10 @@ def _first_below(
                 return before or 0.0
             from scipy.optimize import brentq
 
-            return float(
-                brentq(
-                    lambda t: float(margin(np.array([t]))[0]),
-                    before,
-                    float(times[at]),
-                    xtol=1e-14 * float(times[at]),
-                )
+            after = float(times[at])
+            end = brentq(
+                lambda t: float(margin(np.array([t]))[0]), before, after, xtol=1e-14 * after
             )
+            return float(end)
         before, last = float(times[-1]), float(values[-1])
     return None

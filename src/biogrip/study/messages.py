@@ -13,6 +13,12 @@ from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, nearest_unit
 
 MOST_EXPLAINED = 1000
 
+# Keys that configs of earlier versions have, by their last two names.
+_RETIRED: dict[tuple[int | str, ...], str] = {
+    ("models", "inertia"): "no longer needed: traces that show the arms ringing are fitted with "
+    "their inertia. Leave it out.",
+}
+
 _UNITS = (tuple(TIME_UNITS), tuple(ROTATION_UNITS))
 _LONGEST = 40
 _KEY = "[key]"
@@ -89,6 +95,8 @@ def _explained(
 ) -> Problem:
     key = leaf.key
     match error:
+        case "extra_forbidden" if path[-2:] in _RETIRED:
+            return path, f"unknown key, {_RETIRED[path[-2:]]}"
         case "extra_forbidden" if above.block:
             allowed = list(keys(above.block))
             hint = nearest(path[-1], allowed)

@@ -13,7 +13,7 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.fisher import covariance
 from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper, limits_of
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import Identification, silent
@@ -198,7 +198,7 @@ def _fitted(
     limits, deeper = limits_and_deeper(found, quantities)
     for trace, x in deeper.items():
         if (again := refitted(found[trace], x, confidence)) is not None:
-            found[trace], limits[trace] = again, limits_of([again], quantities)[0]
+            found[trace], limits[trace] = again, limits_and_deeper([again], quantities)[0][0]
     return found, limits
 
 

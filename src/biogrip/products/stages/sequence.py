@@ -17,7 +17,7 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
 from biogrip.identifiability.likelihood import MISSED, likelihood_of
-from biogrip.identifiability.limits import limits_of
+from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
@@ -243,7 +243,7 @@ class _Cell:
                 confidence=settings.confidence,
                 noise_rad=each.noise_rad,
             )
-            limits = limits_of([likelihood], quantities)[0]
+            limits = limits_and_deeper([likelihood], quantities)[0][0]
             deeper = fit_from([each.problem], self._truth)
             missed = int(likelihood.rise(float(deeper.misfit_rad[0])) < -MISSED)
             pressed = int(all(self._pressed(experiment) for experiment in done))

@@ -1,0 +1,122 @@
+"""Points of profiles: fitted from one another, and as many as it takes to draw them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.identifiability.held_fits import CLOSE, HeldFits
+from biogrip.identify.local_fits import FAIR
+
+HIGHEST = 16.0
+"""Rise up to which a profile has dense points: what a figure shows of it."""
+
+# Between neighbours the square root of the rise, nearly linear, changes by so much at most.
+_STEP = 0.3
+_MOST_ROUNDS = 8
+# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
+_NEWS = 1e-3
+
+
+class Points:
+    """Points of profiles, one profile after the other, as far as they are fitted.
+
+    Parameters
+    ----------
+    fits
+        The profiles.
+    grids
+        Of each, ascending logarithms of the quantity, that of the optimum among them.
+
+    Attributes
+    ----------
+    profile : (n_points,)
+        Which profile each is of.
+    values, rises : (n_points,)
+        Logarithms of the quantity, and rises of chi^2.
+    x : (n_points, n_parameters)
+        Log-parameters fitted there.
+    """
+
+    def __init__(self, fits: HeldFits, grids: Sequence[Array]) -> None:
+        self.fits = fits
+        self.profile = np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
+        self.values = np.concatenate(grids)
+        self.x = fits.best[self.profile]
+        self._optimum = self.values == fits.at_best[self.profile]
+        self.rises = np.where(self._optimum, 0.0, np.inf)
+
+    def from_optimum(self) -> None:
+        """Fit every point but the optimum from the optimum, which is where they start."""
+        point = np.flatnonzero(~self._optimum)
+        self._try(point, point, FAIR)
+
+    def from_neighbours(self) -> None:
+        """Fit points from their neighbours' fits, as long as these are news."""
+        # Neither an optimum nor what is beyond the ends is any profile's to fit.
+        to_fit = np.append(np.where(self._optimum, -1, self.profile), -1)
+        news = np.full(len(self.values), True)
+        while np.any(news):
+            start = np.tile(np.flatnonzero(news), 2)
+            point = start + np.repeat((-1, 1), len(start) // 2)
+            own = to_fit[point] == self.profile[start]
+            news = self._try(point[own], start[own], CLOSE)
+
+    def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
+        """Fit points from other points' fits; tell which have become much better."""
+        profile, targets = self.profile[point], self.values[point]
+        rises, x = self.fits.at(profile, targets, self.x[start], tolerance)
+        news = np.zeros(len(self.values), dtype=bool)
+        # A point may be fitted from both sides, so one side after the other.
+        for side in (point <= start, point > start):
+            before, after = self.rises[point[side]], rises[side]
+            news[point[side]] |= after < before - _NEWS * (1 + np.abs(after))
+            better = after < before
+            at = point[side][better]
+            self.rises[at], self.x[at] = after[better], x[side][better]
+        return news
+
+    def ends(self) -> IntArray:
+        """First and last point of every profile, (2, n_profiles)."""
+        every = np.arange(len(self.fits.best))
+        last = np.searchsorted(self.profile, every, side="right") - 1
+        return np.stack((np.searchsorted(self.profile, every), last))
+
+    def extremes(self) -> Array:
+        """Fits at both ends of each trace's profiles, (2 n_quantities, n_traces, n_parameters).
+
+        A basin that some profile comes to may be the deepest at the limit of another.
+        """
+        ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
+        extremes: Array = np.concatenate(ends.swapaxes(1, 2))
+        return extremes
+
+    def smooth(self, limits: Array) -> None:
+        """Add points, at last: the limits, then halfway wherever two neighbours are far apart.
+
+        Parameters
+        ----------
+        limits : (n_profiles, 2)
+            Logarithms of the quantity, within the profiles; NaN where there is none.
+        """
+        profile, side = np.nonzero(np.isfinite(limits))
+        values = limits[profile, side]
+        below = (self.profile == profile[:, None]) & (self.values < values[:, None])
+        left = self.ends()[0, profile] + np.sum(below, axis=1) - 1
+        new = self.values[left + 1] != values
+        self._add(left[new], values[new])
+        for _ in range(_MOST_ROUNDS):
+            roots = np.sqrt(np.clip(self.rises, 0.0, HIGHEST))
+            left = np.flatnonzero((np.abs(np.diff(roots)) > _STEP) & (np.diff(self.profile) == 0))
+            self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
+
+    def _add(self, left: IntArray, values: Array) -> None:
+        """Fit new points after others, from both neighbours; the lower fit counts."""
+        if not len(left):
+            return
+        profile, right = self.profile[left], left + 1
+        rises, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
+        self.profile = np.insert(self.profile, right, profile)
+        self.values = np.insert(self.values, right, values)
+        self.rises = np.insert(self.rises, right, np.min(rises, axis=0))
+        self.x = np.insert(self.x, right, x, axis=0)
