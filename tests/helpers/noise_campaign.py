@@ -128,7 +128,7 @@ def seen(kind: Kind, seed: int) -> Seen:
     ignored = _likelihood(plain, find(plain))
     more = replace(posed, offset=True, drift=True).of(time_s, trace)
     fall = fall_of(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
-    doubts = doubts_about_noise(plain.residuals(ignored.best)[0])
+    doubts = list(doubts_about_noise(plain.residuals(ignored.best)[0]))
     assumed = replace(posed, coloured=True)
     if kind.gripper:
         known = {"stiffness_Nm_per_rad": kind.gripper * posed.gripper.left.stiffness_Nm_per_rad}

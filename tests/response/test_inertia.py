@@ -106,8 +106,8 @@ def test_a_change_is_weighed_against_the_noise() -> None:
     assert inertia_shows(0.02, trace, 1.9e-6 / VISIBLE)
     assert not inertia_shows(0.02, trace, 2.1e-6 / VISIBLE)
     # No instrument has none at all: one of 14 bits is as good as those are.
-    assert inertia_shows(1.1 * VISIBLE / 2**14, trace, 0.0)
-    assert not inertia_shows(0.9 * VISIBLE / 2**14, trace, 0.0)
+    assert inertia_shows(1.1 * VISIBLE / 2**10, trace, 0.0)
+    assert not inertia_shows(0.9 * VISIBLE / 2**10, trace, 0.0)
 
 
 @pytest.mark.parametrize("case", SAMPLES)

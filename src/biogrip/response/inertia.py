@@ -77,7 +77,8 @@ def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) ->
     some_s = time_s[np.linspace(0, len(time_s) - 1, min(_SOME, len(time_s))).astype(np.int64)]
     without = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     size = np.sqrt(np.mean(rotation(without, torque, some_s) ** 2, axis=1))
-    return float(np.max(change / size))
+    # Where no torque ever changes, nothing rings.
+    return float(np.max(change / size)) if np.all(size > 0) else 0.0
 
 
 def inertia_shows(change: float, rotation_rad: Array, noise_rad: float) -> bool:
