@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -45,15 +46,19 @@ def bounds_percent(
     if noise.absent:
         return [(q, math.nan) for q in quantities]
     values = np.array([parameters[name] for name in model.names])
-    torque, nonlinear, inertia = problem.torque, problem.nonlinear, False
-    for _ in range(2):
-        rotation, sensitivity = rotation_and_sensitivity(
-            problem.gripper, model, torque, time_s, values, nonlinear=nonlinear, inertia=inertia
-        )
-        sigma = standard_deviation(rotation, noise)
-        inertia = problem.shows_inertia(time_s, rotation, rms(sigma))
-        if not inertia:
-            break
+    simulated = partial(
+        rotation_and_sensitivity,
+        problem.gripper,
+        model,
+        problem.torque,
+        time_s,
+        values,
+        nonlinear=problem.nonlinear,
+    )
+    rotation, sensitivity = simulated()
+    if problem.shows_inertia(time_s, rotation, rms(standard_deviation(rotation, noise))):
+        rotation, sensitivity = simulated(inertia=True)
+    sigma = standard_deviation(rotation, noise)
     with np.errstate(divide="ignore"):
         logarithms = np.log(values)
     return [(q, 100 * bound(sensitivity, sigma, logarithms, q)) for q in quantities]

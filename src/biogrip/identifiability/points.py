@@ -14,8 +14,8 @@ HIGHEST = 16.0
 # Between neighbours the square root of the rise, nearly linear, changes by so much at most.
 _STEP = 0.3
 _MOST_ROUNDS = 8
-# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
-_NEWS = 1e-3
+NEWS = 1e-3
+"""Share of one more than the rise by which a fit becomes better, to be news to its neighbours."""
 
 
 class Points:
@@ -70,7 +70,7 @@ class Points:
         # A point may be fitted from both sides, so one side after the other.
         for side in (point <= start, point > start):
             before, after = self.rises[point[side]], rises[side]
-            news[point[side]] |= after < before - _NEWS * (1 + np.abs(after))
+            news[point[side]] |= after < before - NEWS * (1 + np.abs(after))
             better = after < before
             at = point[side][better]
             self.rises[at], self.x[at] = after[better], x[side][better]

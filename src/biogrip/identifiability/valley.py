@@ -10,14 +10,13 @@ from biogrip.digits import rounded, rounded_rise
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.likelihood import Likelihood
+from biogrip.identifiability.points import NEWS
 from biogrip.identify.local_fits import FAIR
 
 # Shares of the first in the sum, fine where either is next to nothing, and sums over the best sum,
 # fine where the valley is.
 _SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
 _BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
-# Share of one more than the rise by which a fit has to become better to be news to its neighbours.
-_NEWS = 1e-3
 _SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
 # A branch too weak and slow to be seen leaves the second alone with the sum, whatever the first.
 _FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
@@ -93,7 +92,7 @@ def _rises(
         news = np.zeros(len(x), dtype=bool)
         for point, rise, parameters in zip(points, found, fitted, strict=True):
             if rise < rises[point]:
-                news[point] |= rise < rises[point] - _NEWS * (1 + abs(rise))
+                news[point] |= rise < rises[point] - NEWS * (1 + abs(rise))
                 rises[point], x[point] = rise, parameters
         origin = np.repeat(np.flatnonzero(news), 4)
         points = neighbours[:, news].T.ravel()

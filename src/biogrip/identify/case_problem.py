@@ -144,8 +144,12 @@ class CaseProblem:
         sampled = time_s.tobytes()
         if sampled not in self._changes:
             self._changes[sampled] = change_by_inertia(self.gripper, self.torque, time_s)
+        change = self._changes[sampled]
+        # What would not show without noise needs no estimate of it.
+        if not inertia_shows(change, rotation_rad, 0.0):
+            return False
         noise_rad = noise_rad or self.noise_rad or noise_of(rotation_rad)
-        return inertia_shows(self._changes[sampled], rotation_rad, noise_rad)
+        return inertia_shows(change, rotation_rad, noise_rad)
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
         """Pose one of its problems for another model; what is tabulated of the trace is shared."""

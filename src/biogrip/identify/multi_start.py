@@ -116,8 +116,7 @@ def _started_quietly(
     more, rows = [], []
     for own, (own_starts, row) in enumerate(zip(starts, before, strict=True)):
         here = trace_of_fine == own
-        best = fine.x[here][np.argmin(fine.misfit_rad[here].astype(np.float32))]
-        around = best + beside[:, None] * np.array(springs, dtype=float)
+        around = fine.x[_best(fine, here, 1)] + beside[:, None] * np.array(springs, dtype=float)
         more.append(np.concatenate((fine.x[here], around, own_starts[:most])))
         spent = rough.evaluations[trace == own].sum() + fine.evaluations[here].sum()
         rows.append((*row[:3], row[3] + int(spent)))

@@ -89,7 +89,8 @@ class Residuals:
         """Return the same trace for arms that do not ring."""
         other = copy(self)
         other._condensed = self._condensed.without_ringing
-        other.__dict__.pop("condensed_trace", None)
+        for kept in ("condensed_trace", "_trace_at_nodes"):
+            other.__dict__.pop(kept, None)
         return other
 
     def with_freedom(self, freedom: float) -> "Residuals":
