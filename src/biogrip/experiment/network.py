@@ -33,7 +33,8 @@ _RIGID = 1e18
 def columns_of(parameters: ArrayLike) -> Array:
     """Columns of parameters, (n, n_parameters), those that are infinite as good as rigid."""
     columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
-    return np.where(np.isinf(columns), _RIGID, columns)
+    rigid = np.isinf(columns)
+    return np.where(rigid, _RIGID, columns) if np.any(rigid) else columns
 
 
 MOST_BRANCHES = 8

@@ -183,8 +183,10 @@ def _branches(springs: Array, dampers: Array) -> tuple[Array, Array]:
 
     Of several that are gone none relaxes with another: equal rates cost digits.
     """
-    weak = _GONE * 10.0 ** np.arange(len(dampers))[:, None]
-    return np.where(springs == 0, _GONE, springs).T, np.where(dampers == 0, weak, dampers).T
+    if not (np.all(springs) and np.all(dampers)):
+        weak = _GONE * 10.0 ** np.arange(len(dampers))[:, None]
+        springs, dampers = np.where(springs, springs, _GONE), np.where(dampers, dampers, weak)
+    return springs.T, dampers.T
 
 
 def generalized_maxwell(parameters: ArrayLike) -> Network:

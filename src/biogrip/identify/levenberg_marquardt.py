@@ -200,8 +200,7 @@ def _advance(
     if constraint is not None:
         tried = constraint.restored(tried, problem, basic)
         possible = np.isfinite(tried[:, 0])
-        tried = np.where(possible[:, None], tried, x)
-    tried = np.clip(tried, state.low, state.high)
+        tried = np.clip(np.where(possible[:, None], tried, x), state.low, state.high)
     found = objective(tried, problem)
     predicted = -np.sum(step * (2 * reduced.gradient + _times(reduced.information, step)), axis=1)
     gained = np.where(possible, normal.square_sum - found.square_sum, -np.inf)
@@ -222,10 +221,9 @@ def _on_grid(x: Array, state: _State) -> Array:
     # A power of two, so that points of a finer grid stay where they are.
     spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(size))[1])
     spacing = np.minimum(spacing, _WIDEST)
-    inside = np.clip(x, state.low, state.high)
-    at_bound = (inside == state.low) | (inside == state.high)
-    rounded = np.clip(np.rint(x / spacing) * spacing, state.low, state.high)
-    return np.where(at_bound, inside, rounded)
+    inside = (x > state.low) & (x < state.high)
+    rounded = np.where(inside, np.rint(x / spacing) * spacing, x)
+    return np.minimum(np.maximum(rounded, state.low), state.high)
 
 
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
@@ -295,7 +293,7 @@ def _damp(state: _State, gained: Array, predicted: Array) -> None:
     hopeful = predicted > 0
     ratio = np.where(hopeful, gained / np.where(hopeful, predicted, 1.0), -1.0)
     # Of a gain that is next to nothing, last bits are a large share.
-    ratio = np.rint(np.clip(ratio, -1.0, 2.0) * _RATIOS) / _RATIOS
+    ratio = np.rint(np.minimum(np.maximum(ratio, -1.0), 2.0) * _RATIOS) / _RATIOS
     better = ratio > 0
     less = np.maximum(1 / 3, 1 - (2 * np.where(better, ratio, 0.5) - 1) ** 3)
     state.damping = np.where(
