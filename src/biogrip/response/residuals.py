@@ -68,6 +68,8 @@ class Residuals:
             noise_rad = noise_of(self._rotation_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
+        # Rows of the trace without arms that ring, and with: of all models the same.
+        self._trace_rows: dict[bool, Array] = {}
 
     @property
     def free(self) -> int:
@@ -89,8 +91,7 @@ class Residuals:
         """Return the same trace for arms that do not ring."""
         other = copy(self)
         other._condensed = self._condensed.without_ringing
-        for kept in ("condensed_trace", "_trace_at_nodes"):
-            other.__dict__.pop(kept, None)
+        other.__dict__.pop("_trace_at_nodes", None)
         return other
 
     def with_freedom(self, freedom: float) -> "Residuals":
@@ -157,10 +158,12 @@ class Residuals:
         """Whether noise was not white, and has been made so."""
         return self._condensed.coloured
 
-    @cached_property
+    @property
     def condensed_trace(self) -> Array:
         """Rows of the trace, (n_rows,) in rad."""
-        return self._condensed.of_trace(self._rotation_rad)
+        if self.inertia not in self._trace_rows:
+            self._trace_rows[self.inertia] = self._condensed.of_trace(self._rotation_rad)
+        return self._trace_rows[self.inertia]
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
         """Rows of the responses of many samples.
