@@ -5,14 +5,13 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
 from biogrip.files import watched
-from biogrip.running.journal import recorded_in
 
 if TYPE_CHECKING:
     from biogrip.own_traces.read_as import ReadAs
@@ -36,11 +35,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # What the workflow makes is recorded; what a person writes elsewhere is theirs.
-        with ExitStack() as stack:
-            if options.recorded:
-                stack.enter_context(watched(_refuse_others))
-                stack.enter_context(recorded_in(RESULTS))
+        # What a person writes elsewhere is theirs to replace.
+        with watched(_refuse_others) if options.recorded else nullcontext():
             options.command(options)
             sys.stdout.flush()
     except BiogripError as error:
@@ -99,6 +95,7 @@ def _parser() -> argparse.ArgumentParser:
         ("seed", "of which seed"),
     ):
         make.add_argument(f"--{name}", help=text)
+    make.add_argument("--made-for", help=argparse.SUPPRESS)
 
     for name, command, text in (
         ("verify", _verify, "read all results and hold them against their record"),
@@ -226,7 +223,8 @@ def _make(options: argparse.Namespace) -> None:
 
     names = ("case", "method", "batch", "sweep", "seed")
     given = {name: getattr(options, name) for name in names}
-    make(options.products, {name: text for name, text in given.items() if text}, RESULTS)
+    job = {name: text for name, text in given.items() if text}
+    make(options.products, job, RESULTS, options.made_for)
 
 
 def _identify(options: argparse.Namespace) -> None:
@@ -286,21 +284,24 @@ def _run(options: argparse.Namespace) -> None:
 
 
 def _verify(options: argparse.Namespace) -> None:
-    from biogrip.running.manifest import verify
+    from biogrip.running.verify import verify
 
     print(verify(options.results))
 
 
 def _clean(options: argparse.Namespace) -> None:
-    from biogrip.running.manifest import clean
+    from biogrip.running.clean import clean
 
     print(clean(options.results))
 
 
 def _crate(options: argparse.Namespace) -> None:
     from biogrip.running.crate import write_crate
+    from biogrip.running.journal import recorded_in
 
-    print(write_crate(RESULTS, options.output))
+    with recorded_in(RESULTS):
+        said = write_crate(RESULTS, options.output)
+    print(said)
 
 
 def _publish(options: argparse.Namespace) -> None:

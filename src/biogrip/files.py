@@ -11,17 +11,21 @@ from biogrip.stopping import unfinished
 Watch = Callable[[Path, Path], None]
 """Is told of a file, and of the scratch file with its contents, just before it is in place."""
 
-_watches: list[Watch] = []
+Begin = Callable[[Path], None]
+"""Is told of a scratch file before it is written."""
+
+_watches: list[tuple[Watch, Begin | None]] = []
 
 
 @contextmanager
-def watched(watch: Watch) -> Iterator[None]:
-    """Have every file told to `watch` that is written whole meanwhile."""
-    _watches.append(watch)
+def watched(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
+    """Have every file told to `watch` that is written whole meanwhile, and before to `begin`."""
+    both = watch, begin
+    _watches.append(both)
     try:
         yield
     finally:
-        _watches.remove(watch)
+        _watches.remove(both)
 
 
 @contextmanager
@@ -36,9 +40,12 @@ def written_whole(path: Path) -> Iterator[Path]:
     scratch = scratch_of(path)
     unfinished.add(str(scratch))
     try:
+        for _, begin in _watches:
+            if begin is not None:
+                begin(scratch)
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
-        for watch in _watches:
+        for watch, _ in _watches:
             watch(path, scratch)
         os.replace(scratch, path)
     except OSError as error:

@@ -10,8 +10,10 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
+from biogrip.running.clean import clean
 from biogrip.running.journal import JOURNALS, Journal, recorded_in
-from biogrip.running.manifest import NAME, Manifest, clean, set_aside, verify
+from biogrip.running.manifest import NAME, Manifest, set_aside
+from biogrip.running.verify import verify
 
 
 @pytest.fixture
@@ -70,7 +72,7 @@ def test_saving_merges_the_journals_and_keeps_what_they_said(results: Path) -> N
 def test_the_journal_of_a_living_process_stays(results: Path) -> None:
     code = (
         "from pathlib import Path; from biogrip.running.journal import Journal; "
-        f"Journal(Path({str(results)!r})).note_logs([Path({str(results)!r}) / 'x.log']); "
+        f"Journal(Path({str(results)!r})).note_begun([Path({str(results)!r}) / 'logs' / 'x.log']); "
         "print(flush=True); input()"
     )
     command = [sys.executable, "-c", code]
@@ -83,7 +85,7 @@ def test_the_journal_of_a_living_process_stays(results: Path) -> None:
         job.communicate(b"\n")
     Manifest(results).save()
     assert not left.exists()
-    assert Manifest(results).knows("x.log")
+    assert Manifest(results).knows("logs/x.log")
 
 
 @pytest.mark.parametrize("cut", [0, 1, 60, -2, -70])
@@ -133,7 +135,7 @@ def test_nothing_is_replaced_when_a_file_is_set_aside(tmp_path: Path) -> None:
 def test_cleaning_removes_what_was_written_and_nothing_else(results: Path) -> None:
     (results / "tables" / "paper.tex").write_text("mine")
     (results / "b.json").write_text("edited")
-    Journal(results).note_logs([results / "logs" / "a.log"])
+    Journal(results).note_begun([results / "logs" / "a.log"])
     (results / "logs").mkdir()
     (results / "logs" / "a.log").write_text("")
     assert "b.json" in clean(results)
@@ -144,11 +146,13 @@ def test_cleaning_removes_what_was_written_and_nothing_else(results: Path) -> No
 def test_cleaning_counts_what_it_removes(results: Path, tmp_path: Path) -> None:
     """Neither what is gone already, nor a link, which is nobody's to remove."""
     write_text(tmp_path / "mine.log", "")
-    Journal(results).note_logs([results / "a.log"])
-    (results / "a.log").symlink_to(tmp_path / "mine.log")
+    log = results / "logs" / "a.log"
+    Journal(results).note_begun([log])
+    log.parent.mkdir()
+    log.symlink_to(tmp_path / "mine.log")
     (results / "b.json").unlink()
     assert clean(results) == f"1 files of {results} removed."
-    assert (results / "a.log").is_symlink()
+    assert log.is_symlink()
 
 
 def test_verifying_names_what_is_missing(results: Path) -> None:

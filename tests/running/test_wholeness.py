@@ -6,7 +6,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
-from biogrip.running.wholeness import check_results, claim
+from biogrip.running.wholeness import Claim, check_results
 
 
 @pytest.fixture
@@ -69,7 +69,7 @@ def test_files_of_the_users_are_never_opened(results: Path) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text("no line end")
     check(results)
-    claim(results, [results / "tables" / "new.csv"], [results / "logs" / "new.log"])
+    Claim(results).begin([results / "tables" / "new.csv"], [results / "logs" / "new.log"])
     assert {file.read_text() for file in mine} == {"no line end"}
 
 
@@ -85,7 +85,7 @@ def test_what_is_in_the_way_is_refused(results: Path, tmp_path: Path, kind: str)
     with pytest.raises(BiogripError, match=r"new.csv: (in the way|is a link)"):
         check(results)
     with pytest.raises(BiogripError, match=r"new.csv: (in the way|is a link)"):
-        claim(results, [other], [])
+        Claim(results).begin([other], [])
     assert not (tmp_path / "nowhere").exists()
 
 
@@ -97,7 +97,7 @@ def test_no_link_is_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pl
     link.parent.mkdir(exist_ok=True)
     link.symlink_to(tmp_path / "thesis")
     with pytest.raises(BiogripError, match=f"{place}: is a link"):
-        claim(Path("results"), [Path("results/figures/a.png")], [Path("results/logs/a.log")])
+        Claim(Path("results")).begin([Path("results/figures/a.png")], [Path("results/logs/a.log")])
     if place == "results":
         with pytest.raises(BiogripError, match="results: is a link"):
             check(Path("results"))
@@ -106,20 +106,20 @@ def test_no_link_is_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pl
 
 def test_logs_are_claimed_once_and_for_all(results: Path) -> None:
     log = results / "logs" / "a.log"
-    claim(results, [], [log])
+    Claim(results).begin([], [log])
     log.parent.mkdir()
     log.write_text("said")
-    claim(results, [], [log])
+    Claim(results).begin([], [log])
     other = results / "logs" / "mine.log"
     other.write_text("mine")
     with pytest.raises(BiogripError, match=r"mine.log: in the way"):
-        claim(results, [], [other])
+        Claim(results).begin([], [other])
 
 
 def test_results_folder_must_be_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("results").write_text("")
-    with pytest.raises(BiogripError, match="results: results cannot be written here"):
+    with pytest.raises(BiogripError, match="results: found a file, allowed is a folder"):
         check(Path("results"))
 
 

@@ -11,10 +11,10 @@ from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
 from biogrip.running.locks import sign_locks
-from biogrip.running.manifest import Manifest
-from biogrip.running.wholeness import claim, held_against_record
+from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
 from biogrip.running.sheet import files_of, sheets_of
+from biogrip.running.wholeness import Claim, hold_against_record
 from biogrip.study.load import load_study
 from biogrip.study.source import read_places
 
@@ -49,21 +49,24 @@ except BiogripError as error:
 RESULTS = Path("results")
 
 if workflow.exec_mode == ExecMode.DEFAULT:
-    workflow.execute = held_against_record(
-        workflow.execute,
+    hold_against_record(
+        workflow,
         RESULTS,
         asked=lambda: ALL_FILES,
-        may_make=lambda file: any(rule.is_producer(file) for rule in workflow.rules),
+        made_otherwise=lambda manifest: Provenance(RESULTS, manifest).made_otherwise(
+            SHEETS
+        ),
         begin=lambda: write_study(STUDY, RESULTS),
     )
+
+CLAIM = Claim(RESULTS)
 
 
 onstart:
     sign_locks(Path(".snakemake"))
     try:
         jobs = list(workflow.dag.needrun_jobs())
-        claim(
-            RESULTS,
+        CLAIM.begin(
             [Path(file) for job in jobs for file in job.output],
             [Path(file) for job in jobs for file in job.log],
         )
@@ -72,11 +75,11 @@ onstart:
 
 
 onsuccess:
-    Manifest(RESULTS).save()
+    CLAIM.end()
 
 
 onerror:
-    Manifest(RESULTS).save()
+    CLAIM.end()
     print(
         "biogrip: not finished. Nothing that is done is lost: the same command goes on."
     )

@@ -44,8 +44,8 @@ for sheet in SHEETS:
             mem_mb=sheet.megabytes,
         params:
             job=sheet.command,
-            made_of=sheet.digest,
+            made_for=sheet.digest,
         message:
             sheet.message
         shell:
-            "biogrip make {params.job} 2> {log:q}"
+            "biogrip make {params.job} --made-for {params.made_for} 2> {log:q}"

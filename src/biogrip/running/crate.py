@@ -13,15 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
-from biogrip.errors import BiogripError
 from biogrip.files import written_whole
-from biogrip.products.catalogue import products
-from biogrip.products.plan import Plan
-from biogrip.running.journal import Record
 from biogrip.running.manifest import Manifest
+from biogrip.running.provenance import finished
+from biogrip.running.records import Record
 from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
-from biogrip.running.sheet import sheets_of
 from biogrip.study.defaults import default_config, snakefile
 
 if TYPE_CHECKING:
@@ -68,14 +65,14 @@ def write_crate(results: Path, output: Path) -> str:
     Raises
     ------
     BiogripError
-        If the study is not finished, or a result is not what was written.
+        If the study is not finished, or a result is not what was written or not of the study.
     """
     from rocrate.rocrate import ROCrate
 
     study = read_study(results)
     manifest = Manifest(results)
-    wanted = [STUDY, *_finished(Plan(study, results))]
-    records = {name: _whole(manifest, results, name) for name in wanted}
+    wanted = [STUDY, *finished(results, manifest)]
+    records = {name: manifest.last(name) for name in wanted}
     times = [_time(records[name]) for name in wanted]
     begun, ended = min(times), max(times)
 
@@ -120,40 +117,6 @@ def write_crate(results: Path, output: Path) -> str:
     with written_whole(output) as scratch:
         crate.write_zip(scratch)
     return f"{len(made)} results of {results} packed in {output}."
-
-
-def _finished(plan: Plan) -> list[str]:
-    """What a study has made, from the results folder on, but for batches, which are put together.
-
-    Raises
-    ------
-    BiogripError
-        If something is missing.
-    """
-    found = [
-        Path(file).relative_to("results").as_posix()
-        for sheet in sheets_of(products().values(), plan)
-        for product in sheet.products
-        for job in sheet.jobs
-        if "batch" not in job
-        for file in product.outputs(job).values()
-    ]
-    missing = [name for name in found if not (plan.results / name).is_file()]
-    if missing:
-        raise BiogripError(
-            f"{plan.results}: found a study that is not finished ({missing[0]} is missing); "
-            "allowed is one that is. To go on: biogrip run."
-        )
-    return list(dict.fromkeys(found))
-
-
-def _whole(manifest: Manifest, results: Path, name: str) -> Record:
-    if not manifest.knows(name) or not manifest.is_whole(name, thoroughly=True):
-        raise BiogripError(
-            f"{results / name}: is not what was written (edited, or damaged). "
-            "The next run makes it again."
-        )
-    return manifest.last(name)
 
 
 def _time(record: Record) -> str:

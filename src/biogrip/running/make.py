@@ -1,17 +1,21 @@
 """One job of the study that was last run here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from biogrip.errors import BiogripError, nearest
-from biogrip.products.catalogue import chosen
+from biogrip.products.catalogue import chosen, products
 from biogrip.products.plan import Plan
+from biogrip.products.product import Product
+from biogrip.running.journal import digest_of_files, recorded_in, sha256_of
 from biogrip.running.resolved import read_study
-from biogrip.running.sheet import Sheet
+from biogrip.running.sheet import Sheet, inputs_of, sheets_of
 
 
-def make(names: Sequence[str], job: Mapping[str, str], results: Path) -> None:
-    """Make some products.
+def make(
+    names: Sequence[str], job: Mapping[str, str], results: Path, made_for: str | None = None
+) -> None:
+    """Make some products, and put them on record.
 
     Parameters
     ----------
@@ -21,6 +25,8 @@ def make(names: Sequence[str], job: Mapping[str, str], results: Path) -> None:
         Of which case, method, batch, sweep, seed.
     results
         Where the study stands that was last run.
+    made_for
+        Digest of the settings and the code, as the rule of the job has it.
 
     Raises
     ------
@@ -28,9 +34,33 @@ def make(names: Sequence[str], job: Mapping[str, str], results: Path) -> None:
         If there is no such product or job, or it cannot be made.
     """
     plan = Plan(read_study(results), results)
-    for product in chosen(names):
+    asked = chosen(names)
+    for product in asked:
         _check(Sheet(product.name, (product,), plan), job)
-        product.run(plan, job)
+    if made_for is not None:
+        _make(Sheet("", tuple(asked), plan), asked, job, made_for)
+        return
+    sheets = sheets_of(products().values(), plan)
+    for product in asked:
+        sheet = _planned(sheets, product, job)
+        _make(sheet, [product], job, sheet.digest(job))
+
+
+def _make(sheet: Sheet, asked: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
+    files = [Path(file) for file in inputs_of(sheet, job)]
+    # What is missing is named by who reads it.
+    there = all(file.is_file() for file in files)
+    inputs = digest_of_files(map(sha256_of, files)) if there else ""
+    with recorded_in(sheet.plan.results, made_for, inputs):
+        for product in asked:
+            product.run(sheet.plan, job)
+
+
+def _planned(sheets: Iterable[Sheet], product: Product, job: Mapping[str, str]) -> Sheet:
+    """Return the sheet of the rule that makes a product, or one of its own if none is planned."""
+    found = [sheet for sheet in sheets if product.name in {p.name for p in sheet.products}]
+    with_job = [sheet for sheet in found if job in sheet.jobs or not sheet.jobs]
+    return (with_job or [Sheet(product.name, (product,), found[0].plan)])[0]
 
 
 def _check(sheet: Sheet, job: Mapping[str, str]) -> None:

@@ -4,24 +4,30 @@ A run merges what its jobs noted in their journals into ``manifest.jsonl``, of
 which a second copy lies beside the journals.
 """
 
-import hashlib
-import json
 import os
-import time
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_of
-from biogrip.running.journal import JOURNALS, Record, sha256_of
+from biogrip.running.journal import JOURNALS, Journal, is_closed, is_running, journals_in, sha256_of
+from biogrip.running.records import (
+    Record,
+    read_journal,
+    read_manifest,
+    refuse_links,
+    sum_of_lines,
+)
 
 NAME = "manifest.jsonl"
 """Name of the manifest, in the results and beside the journals."""
 
+OF_NO_RULE = "study.json", "crate.zip"
+"""Results that no rule makes: what the study is, and all of it packed."""
+
 # A file may be found as it was before a write that was killed in its last instant.
 _KEPT = 2
-_DAY_S = 86_400.0
 
 
 class Manifest:
@@ -35,31 +41,42 @@ class Manifest:
     Raises
     ------
     BiogripError
-        If a file that is none of ours is in the manifest's place.
+        If a file that is none of ours is in the place of a record, or a record names a file
+        outside the folder or behind a link.
     """
 
     def __init__(self, results: Path) -> None:
         self._results = results
         self._records: dict[str, list[Record]] = {}
-        journals = sorted((results / JOURNALS).glob("*--*.jsonl"))
+        refuse_other_than_folder(results / JOURNALS)
+        journals = journals_in(results)
         # Before they are read: what is added to one later must not go with it.
-        self._closed = [journal for journal in journals if _is_closed(journal)]
-        copies = [results / NAME, results / JOURNALS / NAME]
-        readings = [_read(copy) for copy in copies]
-        self._damaged = [c for c, r in zip(copies, readings, strict=True) if r is None]
+        self._closed = [journal for journal in journals if is_closed(journal)]
+        self._copies = results / NAME, results / JOURNALS / NAME
+        readings = [read_manifest(copy) for copy in self._copies]
+        self._damaged = [c for c, r in zip(self._copies, readings, strict=True) if r is None]
         intact = [reading for reading in readings if reading]
-        if not intact and copies[0] in self._damaged and not journals:
+        if not intact and self._copies[0] in self._damaged and not journals:
             raise BiogripError(
-                f"{copies[0]}: is no record that biogrip wrote, and in the place of one. "
+                f"{self._copies[0]}: is no record that biogrip wrote, and in the place of one. "
                 "Move it away and run again."
             )
         for reading in intact:
             self._add(reading)
+        scratch = []
         for journal in journals:
-            self._add(_lines(journal.read_text(encoding="utf-8", errors="replace")))
+            records = read_journal(journal)
+            self._add(records)
+            if journal in self._closed:
+                scratch += [record.path for record in records if record.is_scratch]
+        self.is_written_to = any(map(is_running, journals))
+        self._leftovers = [results / path for path in scratch]
+        refuse_links(results, [*self.paths, *scratch])
 
     def _add(self, records: Iterable[Record]) -> None:
         for record in records:
+            if record.is_scratch:
+                continue
             known = self._records.setdefault(record.path, [])
             if record not in known:
                 known.append(record)
@@ -73,8 +90,12 @@ class Manifest:
 
     @property
     def files(self) -> list[str]:
-        """What is recorded with its contents: all but the logs."""
-        return [path for path in self.paths if self._records[path][-1].sha256]
+        """What is recorded but for the logs."""
+        return [path for path in self.paths if not self.last(path).is_log]
+
+    def others(self, names: Iterable[str]) -> list[str]:
+        """What is recorded but for the logs and some names."""
+        return sorted({*self.files}.difference(names))
 
     def knows(self, path: str) -> bool:
         """Whether the study wrote a file of this path."""
@@ -90,11 +111,19 @@ class Manifest:
         Parameters
         ----------
         path
-            One of `files`, which is there.
+            One of `paths`, which is there.
         thoroughly
             Whether to read it even if size and time are the recorded ones.
         """
-        return self._is(path, self._records[path][-1], thoroughly=thoroughly)
+        return self._is(path, self.last(path), thoroughly=thoroughly)
+
+    def restore_time(self, path: str) -> None:
+        """Give a file the time at which it was written: Snakemake goes by the order of times."""
+        file, modified_ns = self._results / path, self.last(path).modified_ns
+        stat = file.stat()
+        if stat.st_mtime_ns != modified_ns:
+            with suppress(OSError):
+                os.utime(file, ns=(stat.st_atime_ns, modified_ns))
 
     def was_written(self, path: str) -> bool:
         """Whether a file is what was written last or before."""
@@ -102,10 +131,13 @@ class Manifest:
 
     def _is(self, path: str, record: Record, *, thoroughly: bool) -> bool:
         file = self._results / path
-        stat = file.stat(follow_symlinks=False)
-        if stat.st_size != record.size or file.is_symlink():
+        if file.is_symlink() or not file.is_file():
             return False
-        if stat.st_mtime_ns == record.modified_ns and not thoroughly:
+        stat = file.stat()
+        if stat.st_size != record.size:
+            return False
+        # Of a log whose job was killed, nobody knows more than that it was empty at first.
+        if stat.st_size == 0 or (stat.st_mtime_ns == record.modified_ns and not thoroughly):
             return True
         return sha256_of(file) == record.sha256
 
@@ -114,78 +146,59 @@ class Manifest:
         for path in paths:
             del self._records[path]
 
+    def note(self, logs: Iterable[Path]) -> None:
+        """Add logs as they are, now that their jobs have ended."""
+        journal = Journal(self._results)
+        self._add(journal.record(log, log) for log in logs if log.is_file())
+
+    def discard_leftovers(self) -> None:
+        """Remove files that a job was writing when it was killed."""
+        for file in self._leftovers:
+            if file.is_file() and not file.is_symlink():
+                file.unlink()
+
     def save(self) -> None:
         """Write both copies, and remove the journals that nobody adds to any more."""
+        self.discard_leftovers()
         for copy in self._damaged:
             set_aside(copy)
         self._damaged = []
-        lines = [json.dumps(asdict(r)) for path in self.paths for r in self._records[path]]
-        text = "".join(f"{line}\n" for line in lines)
-        text += json.dumps({"sha256_of_the_lines_above": _digest(text)}) + "\n"
-        for copy in (self._results / NAME, self._results / JOURNALS / NAME):
+        text = "".join(record.line for path in self.paths for record in self._records[path])
+        text += sum_of_lines(text.encode())
+        for copy in self._copies:
             copy.parent.mkdir(parents=True, exist_ok=True)
             scratch = scratch_of(copy)
             scratch.write_text(text, encoding="utf-8", newline="\n")
             os.replace(scratch, copy)
+        self._discard_journals()
+
+    def discard(self) -> None:
+        """Remove the record itself, but for what of it is damaged or still written."""
+        self.discard_leftovers()
+        for copy in self._copies:
+            if copy not in self._damaged:
+                copy.unlink(missing_ok=True)
+        self._discard_journals()
+
+    def _discard_journals(self) -> None:
         for journal in self._closed:
             journal.unlink(missing_ok=True)
 
 
-def verify(results: Path) -> str:
-    """Read every recorded file of a results folder, and hold it against its record.
-
-    Returns
-    -------
-    str
-        How many there are.
+def refuse_other_than_folder(place: Path) -> None:
+    """Refuse what is in the place of a folder of ours.
 
     Raises
     ------
     BiogripError
-        Names every file that is missing or is not what was written.
+        If it is a link, or anything but a folder.
     """
-    manifest = Manifest(results)
-    if not manifest.files:
-        raise BiogripError(f"{results}: holds no record of a study.")
-    problems = []
-    for path in manifest.files:
-        if not os.path.lexists(results / path):
-            problems.append(f"{results / path}: is missing.")
-        elif not manifest.is_whole(path, thoroughly=True):
-            problems.append(f"{results / path}: is not what was written (edited, or damaged).")
-    if problems:
-        raise BiogripError("\n".join([*problems, "The next run makes them again."]))
-    return f"{len(manifest.files)} files of {results} are what was written."
-
-
-def clean(results: Path) -> str:
-    """Remove what a study wrote, and nothing else; folders that are then empty go, too.
-
-    Returns
-    -------
-    str
-        What was done, and what was left.
-    """
-    manifest = Manifest(results)
-    removed, left = 0, []
-    for path in manifest.paths:
-        file = results / path
-        if file.is_symlink() or not file.is_file():
-            continue
-        if path in manifest.files and not manifest.was_written(path):
-            left.append(str(file))
-        else:
-            file.unlink()
-            removed += 1
-    own = [results / JOURNALS, results / NAME]
-    for file in [*(results / JOURNALS).glob("*.jsonl"), *own[1:]]:
-        file.unlink(missing_ok=True)
-    folders = {parent for path in manifest.paths for parent in (results / path).parents}
-    for folder in sorted({*folders, own[0]}, key=lambda f: len(f.parts), reverse=True):
-        if folder.is_dir() and results in (folder, *folder.parents) and not any(folder.iterdir()):
-            folder.rmdir()
-    kept = f" Kept, for they were edited: {', '.join(left)}." if left else ""
-    return f"{removed} files of {results} removed.{kept}"
+    found = "a link" if place.is_symlink() else "a file"
+    if os.path.lexists(place) and (place.is_symlink() or not place.is_dir()):
+        raise BiogripError(
+            f"{place}: found {found}, allowed is a folder or nothing. Nothing was touched. "
+            "Move it away and try again."
+        )
 
 
 def set_aside(path: Path) -> Path:
@@ -197,39 +210,3 @@ def set_aside(path: Path) -> Path:
             path.rename(beside)
             return beside
         count += 1
-
-
-def _read(path: Path) -> list[Record] | None:
-    """Read one copy of the manifest: nothing if there is none, None if it is damaged."""
-    if not os.path.lexists(path):
-        return []
-    try:
-        text = path.read_text(encoding="utf-8")
-        *above, last = text.splitlines(keepends=True)
-        intact = json.loads(last)["sha256_of_the_lines_above"] == _digest("".join(above))
-        return [Record(**json.loads(line)) for line in above] if intact else None
-    except (OSError, ValueError, TypeError, KeyError):
-        return None
-
-
-def _lines(text: str) -> Iterator[Record]:
-    """Records of a journal, whose last line a kill may have cut."""
-    for line in text.splitlines():
-        try:
-            yield Record(**json.loads(line))
-        except (ValueError, TypeError):
-            continue
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _is_closed(journal: Path) -> bool:
-    """Whether its process is gone: known here, taken for granted elsewhere after a day."""
-    host, pid, _ = journal.stem.rsplit("--", 2)
-    if host == os.uname().nodename and pid.isdigit():
-        import psutil
-
-        return not psutil.pid_exists(int(pid)) or int(pid) == os.getpid()
-    return time.time() - journal.stat().st_mtime > _DAY_S

@@ -2,14 +2,17 @@
 
 import os
 import shutil
-from fnmatch import fnmatch
+from collections.abc import Container, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.products.product import FIGURE_KINDS, PUBLISHED_TABLE_KINDS
 from biogrip.running.journal import sha256_of
-from biogrip.running.manifest import set_aside
+from biogrip.running.manifest import Manifest, refuse_other_than_folder, set_aside
+from biogrip.running.provenance import finished
+from biogrip.running.records import read_sums, refuse_links
 
 SUMS = "SHA256SUMS"
 """Names of what was published and its hashes; ``sha256sum --check`` reads it."""
@@ -20,7 +23,8 @@ FOLDERS = {"tables": PUBLISHED_TABLE_KINDS, "figures": FIGURE_KINDS}
 def publish(results: Path, published: Path, only: str = "*") -> str:
     """Replace published tables and figures by those of a finished study.
 
-    Only what was published before, and is still as it was, is replaced or removed.
+    Only what was published before, and is still as it was, is replaced or removed. All files
+    are copied beside their places before the first is put into its own.
 
     Parameters
     ----------
@@ -39,40 +43,79 @@ def publish(results: Path, published: Path, only: str = "*") -> str:
     Raises
     ------
     BiogripError
-        If there is nothing to publish, or a file in the way that was not published.
+        If the study is not finished, a file in the way was not published, or a link would be
+        followed. Nothing is changed then.
     """
-    new = [
-        file.relative_to(results)
-        for folder, kinds in FOLDERS.items()
-        for file in sorted((results / folder).glob("*.*"))
-        if file.suffix in kinds and fnmatch(file.stem, only)
-    ]
+    manifest = Manifest(results)
+    new = {
+        name: manifest.last(name).sha256
+        for name in finished(results, manifest, only)
+        if Path(name).suffix in FOLDERS.get(Path(name).parts[0], ())
+    }
     if not new:
         raise BiogripError(f"{results}: holds no tables and figures to publish.")
-    old = _sums(published / SUMS)
+    old = read_sums(published / SUMS)
+    _check_places(published, [*new, *old], old)
+    _copy(results, published, [*new])
+    # With the old and the new hashes on record, publishing again makes a kill good.
+    both = [(name, digest) for name, digests in old.items() for digest in digests]
+    _write_sums(published, [*both, *(item for item in new.items() if item not in both)])
+    for name, digests in old.items():
+        _clear(published / name, [*digests, new.get(name, "")], replaced=name in new)
     for name in new:
-        if os.path.lexists(published / name) and str(name) not in old:
-            raise BiogripError(
-                f"{published / name}: in the way, and not in {SUMS}. Move it away and try again."
-            )
-    for known, digest in old.items():
-        file = published / known
-        if os.path.lexists(file):
-            if file.is_symlink() or sha256_of(file) != digest:
-                set_aside(file)
-            else:
-                file.unlink()
-    sums = []
-    for name in new:
-        (published / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(results / name, published / name)
-        sums.append(f"{sha256_of(published / name)}  {name}\n")
-    write_text(published / SUMS, "".join(sums))
+        os.replace(_beside(published / name), published / name)
+    _write_sums(published, new.items())
     return f"{len(new)} files published in {published}."
 
 
-def _sums(path: Path) -> dict[str, str]:
-    if not path.exists():
-        return {}
-    lines = (line.split("  ", 1) for line in path.read_text(encoding="utf-8").splitlines())
-    return {name: digest for digest, name in lines}
+def _check_places(published: Path, names: list[str], old: Container[str]) -> None:
+    """Refuse places where something would be replaced that was not published, or behind a link.
+
+    Raises
+    ------
+    BiogripError
+        Names the first.
+    """
+    refuse_other_than_folder(published)
+    refuse_links(published, names)
+    for name in names:
+        for parent in (published / name).parents:
+            if parent != published and published in parent.parents:
+                refuse_other_than_folder(parent)
+        file = published / name
+        if os.path.lexists(file) and (name not in old or file.is_dir()):
+            raise BiogripError(
+                f"{file}: in the way, and not in {SUMS}. Move it away and try again."
+            )
+
+
+def _copy(results: Path, published: Path, names: list[str]) -> None:
+    """Copy files beside the places that they are to take, all of them or none."""
+    copies = [_beside(published / name) for name in names]
+    try:
+        for name, copy in zip(names, copies, strict=True):
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.unlink(missing_ok=True)
+            shutil.copyfile(results / name, copy)
+    except OSError:
+        for copy in copies:
+            with suppress(OSError):
+                copy.unlink(missing_ok=True)
+        raise
+
+
+def _clear(file: Path, digests: list[str], *, replaced: bool) -> None:
+    """Set aside what was edited since it was published; remove what is not to be replaced."""
+    if os.path.lexists(file):
+        if file.is_symlink() or sha256_of(file) not in digests:
+            set_aside(file)
+        elif not replaced:
+            file.unlink()
+
+
+def _beside(file: Path) -> Path:
+    return file.with_name(f".{file.name}.published.part")
+
+
+def _write_sums(published: Path, sums: Iterable[tuple[str, str]]) -> None:
+    write_text(published / SUMS, "".join(f"{digest}  {name}\n" for name, digest in sums))

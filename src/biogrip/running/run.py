@@ -57,8 +57,10 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
     _check_folder(folder)
     configs = [Path(name).absolute() for name in overlays]
     _check([default_config(), *configs], folder)
+    # After the options come, if they are set off, files and rules to make.
+    cut = rest.index("--") if "--" in rest else len(rest)
     command = [sys.executable, "-m", "biogrip.running.snakemake_process"]
-    command += ["--snakefile", str(snakefile()), *rest]
+    command += ["--snakefile", str(snakefile()), *rest[:cut]]
     if not known.cores and not known.profile:
         command += ["--cores", "all"]
     if not known.dry_run and known.quiet is None:
@@ -66,7 +68,7 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
         command += ["--quiet", "host", "reason"]
     if configs:
         command += ["--configfile", *map(str, configs)]
-    status = signals.supervise(command)
+    status = signals.supervise([*command, *rest[cut:]])
     if status == 0 and signals.first is None and not known.dry_run:
         print(_to_open(folder, rest))
     return status
@@ -74,6 +76,8 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
 
 def _check_folder(folder: Path) -> None:
     """Refuse a place that Snakemake could not run in; it would make one that is not there."""
+    from biogrip.running.manifest import refuse_other_than_folder
+
     try:
         found = None if stat.S_ISDIR(folder.stat().st_mode) else "found a file"
     except FileNotFoundError:
@@ -83,6 +87,8 @@ def _check_folder(folder: Path) -> None:
     if found:
         shown = str(folder)[:_LONGEST]
         raise BiogripError(f"--directory: {shown}: {found}, allowed is a folder.")
+    # Snakemake would write through a link, and end in a traceback where there is a file.
+    refuse_other_than_folder(folder / ".snakemake")
 
 
 def _check(configs: list[Path], folder: Path) -> None:
@@ -128,7 +134,7 @@ class _Signals:
     """The signals that stop a run, handed to Snakemake once it is there."""
 
     def __init__(self, again: str) -> None:
-        self._again = again
+        self._to_go_on = f"Nothing that is done is lost; to go on: {again}"
         self.first: signal.Signals | None = None
         self._starting = False
         self._child: subprocess.Popen[bytes] | None = None
@@ -158,7 +164,13 @@ class _Signals:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
         if self.first is not None:
             self._pass_on(self._child)
-        return self._child.wait()
+        status = self._child.wait()
+        if status < 0 and self.first is None:
+            ended = f"Snakemake was ended by signal {-status}"
+            with suppress(ValueError):
+                ended = f"Snakemake was ended by {signal.Signals(-status).name}"
+            print(f"biogrip: {ended}. {self._to_go_on}", file=sys.stderr)
+        return status if status >= 0 else 128 - status
 
     def _got(self, number: int, _: FrameType | None) -> None:
         self.first = self.first or signal.Signals(number)
@@ -173,10 +185,7 @@ class _Signals:
             # It may have ended in the middle of a line.
             with suppress(OSError):
                 os.write(sys.stderr.fileno(), b"\n")
-        end_at_once(
-            number,
-            f"stopped by {number.name}. Nothing that is done is lost; to go on: {self._again}",
-        )
+        end_at_once(number, f"stopped by {number.name}. {self._to_go_on}")
 
     def _pass_on(self, child: "subprocess.Popen[bytes]") -> None:
         # It may have ended just now.
@@ -187,8 +196,13 @@ class _Signals:
 
 def _to_open(folder: Path, arguments: list[str]) -> str:
     """Name what a reader should look at first: the files that were asked for, else the pages."""
+    from biogrip.running.resolved import read_study
+
     results = folder / "results"
-    pages = sorted((results / "summaries").glob("*.html"))
+    pages: list[Path] = []
+    # What Snakemake was called for need not be a run.
+    with suppress(BiogripError):
+        pages = [results / "summaries" / f"{case}.html" for case in read_study(results).cases]
     asked = [folder / word for word in arguments]
     there = _files(asked) or _files([results / "report.html", *pages])
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""

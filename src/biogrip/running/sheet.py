@@ -132,6 +132,11 @@ class Sheet:
         return "\n\n".join(f"{p.item}: {p.caption}" for p in self.products if p.caption)
 
 
+def inputs_of(sheet: Sheet, job: Wildcards) -> list[str]:
+    """Files that a job reads, in one order."""
+    return sorted({file for files in sheet.inputs(job).values() for file in files})
+
+
 def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
     """Put products together that are made by one job."""
     return [Sheet(each.rule, each.products, plan, each.jobs) for each in together(products, plan)]

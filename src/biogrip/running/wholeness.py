@@ -1,4 +1,4 @@
-"""What a run does before its jobs: see what is whole, and touch nothing but what is the study's."""
+"""What a run does before its jobs and after: touch nothing but what is the study's own."""
 
 import functools
 import os
@@ -11,36 +11,40 @@ from typing import Any
 from biogrip.errors import BiogripError
 from biogrip.running.journal import Journal
 from biogrip.running.locks import release_dead_locks
-from biogrip.running.manifest import Manifest, set_aside
+from biogrip.running.manifest import OF_NO_RULE, Manifest, refuse_other_than_folder, set_aside
 
 _SHOWN = 6
 _ROOM_BYTES = 256 * 1024
 
 
-def held_against_record(
-    execute: Callable[..., Any],
+def hold_against_record(
+    workflow: Any,
     results: Path,
     asked: Callable[[], Iterable[str]],
-    may_make: Callable[[str], bool],
+    made_otherwise: Callable[[Manifest], Iterable[str]],
     begin: Callable[[], None],
-) -> Callable[..., Any]:
-    """Wrap what Snakemake calls once it is to run a study, and before it plans the jobs.
+) -> None:
+    """Have Snakemake check the results once it is to run a study, and before it plans the jobs.
 
     Of all commands only a run changes anything; a dry run says what a run would do.
 
     Parameters
     ----------
-    execute
-        ``workflow.execute``.
+    workflow
+        Snakemake's.
     results
         The results folder.
     asked
         Tells which files a run makes if nothing else is asked for.
-    may_make
-        Whether a rule of the study makes a file.
+    made_otherwise
+        Tells which of them, from the results folder on, were made for other settings.
     begin
         What a run does then, before its jobs are planned.
     """
+    execute, build = workflow.execute, workflow._build_dag
+
+    def may_make(file: str) -> bool:
+        return any(rule.is_producer(file) for rule in workflow.rules)
 
     @functools.wraps(execute)
     def checked(*args: Any, **kwargs: Any) -> Any:
@@ -53,9 +57,33 @@ def held_against_record(
                     begin()
             except BiogripError as error:
                 sys.exit(f"biogrip: {error}")
-        return execute(*args, **kwargs)
+        ended = execute(*args, **kwargs)
+        if not kind.dryrun_exec:
+            _say_what_else_is_there(results, asked())
+        return ended
 
-    return checked
+    def forced() -> Any:
+        """Plan the jobs: those of results that were made for other settings run again.
+
+        Snakemake knows of settings what it has noted itself, beside the results.
+        """
+        stale = made_otherwise(Manifest(results))
+        workflow.dag.forcefiles.update(f"{results}/{name}" for name in stale)
+        return build()
+
+    workflow.execute, workflow._build_dag = checked, forced
+
+
+def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
+    """Say how many results are of other studies."""
+    own = [_name(results, Path(file)) for file in asked]
+    others = Manifest(results).others([*own, *OF_NO_RULE])
+    if others:
+        print(
+            f"biogrip: {results} also holds results of other studies ({len(others)}, the first "
+            f"{others[0]}). To keep studies apart: --directory FOLDER.",
+            file=sys.stderr,
+        )
 
 
 def check_results(
@@ -69,10 +97,12 @@ def check_results(
 
     Parameters
     ----------
-    results, may_make
-        As of `held_against_record`.
+    results
+        The results folder.
     asked
         Files that a run makes if nothing else is asked for.
+    may_make
+        Whether a rule of the study makes a file.
     changing
         Whether to do it, or only say what would be done.
 
@@ -84,6 +114,7 @@ def check_results(
     """
     wanted = [Path(file) for file in asked]
     refuse_links(results, wanted)
+    refuse_files_as_folders(results, wanted)
     if changing:
         _check_writable(results)
     manifest = Manifest(results)
@@ -93,34 +124,61 @@ def check_results(
         file = results / path
         if not os.path.lexists(file):
             gone.append(path)
-        elif not manifest.is_whole(path) and may_make(str(file)):
+        elif manifest.is_whole(path):
+            if changing:
+                manifest.restore_time(path)
+        elif may_make(str(file)):
             refuse_links(results, [file])
             make_room(manifest, results, path, changing=changing)
             gone.append(path)
+    if changing:
+        manifest.discard_leftovers()
     if changing and manifest.paths:
         manifest.forget(gone)
         manifest.save()
 
 
-def claim(results: Path, files: Iterable[Path], logs: Iterable[Path]) -> None:
-    """Make sure, before jobs run, that what they write is the study's or not there.
+class Claim:
+    """What the jobs of a run write.
 
     Parameters
     ----------
     results
         The results folder.
-    files, logs
-        What the jobs will write.
-
-    Raises
-    ------
-    BiogripError
-        If a file is in the way that the study did not write, or is a link.
     """
-    manifest, files, logs = Manifest(results), list(files), list(logs)
-    refuse_links(results, [*files, *logs])
-    refuse_others(manifest, results, [*files, *logs])
-    Journal(results).note_logs(log for log in logs if not manifest.knows(_name(results, log)))
+
+    def __init__(self, results: Path) -> None:
+        self._results = results
+        self._logs: list[Path] = []
+
+    def begin(self, files: Iterable[Path], logs: Iterable[Path]) -> None:
+        """Make sure, before jobs run, that what they write is the study's or not there.
+
+        Parameters
+        ----------
+        files, logs
+            What the jobs will write. A log with other contents than a job's is kept beside.
+
+        Raises
+        ------
+        BiogripError
+            If a file is in the way that the study did not write, or is a link.
+        """
+        results, files, self._logs = self._results, list(files), list(logs)
+        manifest, both = Manifest(results), [*files, *self._logs]
+        refuse_links(results, both)
+        refuse_files_as_folders(results, both)
+        refuse_others(manifest, results, both)
+        for log in filter(Path.exists, self._logs):
+            if not manifest.was_written(_name(results, log)):
+                make_room(manifest, results, _name(results, log), changing=True)
+        Journal(results).note_begun(self._logs)
+
+    def end(self) -> None:
+        """Put on record what the jobs have written, logs included."""
+        manifest = Manifest(self._results)
+        manifest.note(self._logs)
+        manifest.save()
 
 
 def refuse_others(manifest: Manifest, results: Path, files: Iterable[Path]) -> None:
@@ -162,6 +220,19 @@ def refuse_links(results: Path, files: Iterable[Path]) -> None:
                 f"{place}: is a link, and nothing is written through links. Put a folder or "
                 "nothing in its place; a study elsewhere is run with --directory."
             )
+
+
+def refuse_files_as_folders(results: Path, files: Iterable[Path]) -> None:
+    """Refuse to go on where a file is in the place of a folder that files are written to.
+
+    Raises
+    ------
+    BiogripError
+        Names the first.
+    """
+    folders = {parent for file in files for parent in file.parents}
+    for folder in sorted(f for f in folders if f == results or results in f.parents):
+        refuse_other_than_folder(folder)
 
 
 def _check_writable(results: Path) -> None:

@@ -1,0 +1,54 @@
+"""Removes what a study wrote, and nothing else."""
+
+from pathlib import Path
+
+from biogrip.errors import BiogripError
+from biogrip.running.journal import JOURNALS
+from biogrip.running.locks import is_locked, release_dead_locks
+from biogrip.running.manifest import Manifest
+
+
+def clean(results: Path) -> str:
+    """Remove what a study wrote, and nothing else; folders that are then empty go, too.
+
+    Parameters
+    ----------
+    results
+        The results folder, in the folder that Snakemake ran in.
+
+    Returns
+    -------
+    str
+        What was done, and what was left.
+
+    Raises
+    ------
+    BiogripError
+        If a run is going on, or the record cannot be trusted. Nothing is removed then.
+    """
+    if results.is_symlink():
+        raise BiogripError(f"{results}: is a link, and nothing is removed through links.")
+    manifest = Manifest(results)
+    snakemake = results.absolute().parent / ".snakemake"
+    release_dead_locks(snakemake)
+    if is_locked(snakemake) or manifest.is_written_to:
+        raise BiogripError(
+            f"{results}: a run is going on, or was killed on another computer; allowed is to clean "
+            "after its end. Its locks are taken away by snakemake --unlock."
+        )
+    written: list[Path] = []
+    left: list[Path] = []
+    for path in manifest.paths:
+        file = results / path
+        if file.is_file() and not file.is_symlink():
+            (written if manifest.was_written(path) else left).append(file)
+    for file in written:
+        file.unlink()
+    manifest.discard()
+    folders = {parent for path in manifest.paths for parent in (results / path).parents}
+    folders &= {results, *(folder for folder in folders if results in folder.parents)}
+    for folder in sorted({*folders, results / JOURNALS}, key=lambda f: -len(f.parts)):
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()
+    kept = f" Kept, for they were edited: {', '.join(map(str, left))}." if left else ""
+    return f"{len(written)} files of {results} removed.{kept}"

@@ -1,0 +1,142 @@
+"""Whether results are of the study that stands beside them, as far as their record knows."""
+
+from collections.abc import Iterable
+from fnmatch import fnmatch
+from pathlib import Path, PurePosixPath
+
+from biogrip.errors import BiogripError
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan, Wildcards
+from biogrip.running.journal import digest_of_files, sha256_of
+from biogrip.running.manifest import Manifest
+from biogrip.running.resolved import NAME as STUDY
+from biogrip.running.resolved import read_study
+from biogrip.running.sheet import Sheet, inputs_of, sheets_of
+
+_RESULTS = "results"
+
+
+class Provenance:
+    """What the results of a folder were made for and of.
+
+    Parameters
+    ----------
+    results
+        The folder.
+    manifest
+        Its record.
+    """
+
+    def __init__(self, results: Path, manifest: Manifest) -> None:
+        self._results = results
+        self._manifest = manifest
+        self._hashes: dict[str, str | None] = {}
+
+    def made_otherwise(self, sheets: Iterable[Sheet]) -> list[str]:
+        """List results that were made for other settings, by other code, or of other files.
+
+        Parameters
+        ----------
+        sheets
+            What the study makes.
+
+        Returns
+        -------
+        list of str
+            Files that are there and on record, from the results folder on.
+        """
+        return [name for sheet in sheets for job in sheet.jobs for name in self._of_job(sheet, job)]
+
+    def _of_job(self, sheet: Sheet, job: Wildcards) -> list[str]:
+        outputs = [file for product in sheet.products for file in product.outputs(job).values()]
+        recorded = [name for name in map(name_of, outputs) if self._is_there(name)]
+        if not recorded:
+            return []
+        settings, inputs = sheet.digest(job), self._digest_of_inputs(sheet, job)
+        return [
+            name
+            for name in recorded
+            if (last := self._manifest.last(name)).settings != settings
+            or (inputs is not None and last.inputs != inputs)
+        ]
+
+    def _is_there(self, name: str) -> bool:
+        return self._manifest.knows(name) and (self._results / name).exists()
+
+    def _digest_of_inputs(self, sheet: Sheet, job: Wildcards) -> str | None:
+        """Digest of what a job reads, as it is on record; None where something is not known."""
+        hashes = [self._hash_of(file) for file in inputs_of(sheet, job)]
+        return None if None in hashes else digest_of_files(hash_ for hash_ in hashes if hash_)
+
+    def _hash_of(self, file: str) -> str | None:
+        if file not in self._hashes:
+            name = name_of(file) if is_result(file) else ""
+            if self._manifest.knows(name):
+                self._hashes[file] = self._manifest.last(name).sha256
+            else:
+                place = self._results.parent / file
+                self._hashes[file] = sha256_of(place) if place.is_file() else None
+        return self._hashes[file]
+
+
+def is_result(file: str) -> bool:
+    """Whether a file that a rule names is among the results."""
+    return PurePosixPath(file).parts[0] == _RESULTS
+
+
+def name_of(file: str) -> str:
+    """Path of a result, as a rule names it, from the results folder on."""
+    return PurePosixPath(file).relative_to(_RESULTS).as_posix()
+
+
+def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
+    """What a study has made, but for batches, which are put together.
+
+    Parameters
+    ----------
+    results, manifest
+        The folder, and its record.
+    only
+        Which of it, as a pattern of names without ending.
+
+    Returns
+    -------
+    list of str
+        Files from the results folder on: all there, whole, and made for the study that stands
+        beside them.
+
+    Raises
+    ------
+    BiogripError
+        Names the first that is not.
+    """
+    sheets = sheets_of(products().values(), Plan(read_study(results), results))
+    found = [
+        name
+        for sheet in sheets
+        for product in sheet.products
+        for job in sheet.jobs
+        if "batch" not in job
+        for name in map(name_of, product.outputs(job).values())
+        if fnmatch(PurePosixPath(name).stem, only)
+    ]
+    names = list(dict.fromkeys(found))
+    for name in names:
+        if not (results / name).is_file():
+            raise BiogripError(
+                f"{results}: found a study that is not finished ({name} is missing); "
+                "allowed is one that is. To go on: biogrip run."
+            )
+    for name in (STUDY, *names):
+        if not manifest.knows(name) or not manifest.is_whole(name, thoroughly=True):
+            raise BiogripError(
+                f"{results / name}: is not what was written (edited, or damaged). "
+                "The next run makes it again."
+            )
+    for name in Provenance(results, manifest).made_otherwise(sheets):
+        if fnmatch(PurePosixPath(name).stem, only):
+            raise BiogripError(
+                f"{results / name}: was made for other settings, by other code or of other files "
+                f"than {results / STUDY} says. The next run makes it again."
+            )
+    return names

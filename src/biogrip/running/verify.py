@@ -1,0 +1,52 @@
+"""Reads every result again, and holds it against its record and the study beside it."""
+
+import os
+from pathlib import Path
+
+from biogrip.errors import BiogripError
+from biogrip.products.catalogue import products
+from biogrip.products.plan import Plan
+from biogrip.running.manifest import OF_NO_RULE, Manifest
+from biogrip.running.provenance import Provenance, name_of
+from biogrip.running.resolved import NAME as STUDY
+from biogrip.running.resolved import read_study
+from biogrip.running.sheet import files_of, sheets_of
+
+
+def verify(results: Path) -> str:
+    """Read every recorded file of a results folder, and hold it against its record.
+
+    Where the study stands beside them, results have to be made for it.
+
+    Returns
+    -------
+    str
+        How many there are.
+
+    Raises
+    ------
+    BiogripError
+        Names every file that is missing, is not what was written, or was not made for the study.
+    """
+    manifest = Manifest(results)
+    if not manifest.files:
+        raise BiogripError(f"{results}: holds no record of a study.")
+    problems = []
+    for path in manifest.files:
+        if not os.path.lexists(results / path):
+            problems.append(f"{results / path}: is missing.")
+        elif not manifest.is_whole(path, thoroughly=True):
+            problems.append(f"{results / path}: is not what was written (edited, or damaged).")
+    others = 0
+    if not problems and manifest.knows(STUDY):
+        sheets = sheets_of(products().values(), Plan(read_study(results), results))
+        problems = [
+            f"{results / name}: was made for other settings, by other code or of other files "
+            f"than {results / STUDY} says."
+            for name in Provenance(results, manifest).made_otherwise(sheets)
+        ]
+        others = len(manifest.others([*map(name_of, files_of(sheets)), *OF_NO_RULE]))
+    if problems:
+        raise BiogripError("\n".join([*problems, "The next run makes them again."]))
+    also = f" {others} of them are of other studies than {results / STUDY}." if others else ""
+    return f"{len(manifest.files)} files of {results} are what was written.{also}"
