@@ -69,4 +69,5 @@ def _make(file: str, makers: dict[str, tuple[Sheet, Wildcards]]) -> None:
     sheet, job = makers[file]
     for needed in {file for files in sheet.inputs(job).values() for file in files}:
         _make(needed, makers)
-    assert main(["make", *shlex.split(sheet.command(job))]) == 0, file
+    made_for = ["--made-for", sheet.digest(job)]
+    assert main(["make", *shlex.split(sheet.command(job)), *made_for]) == 0, file

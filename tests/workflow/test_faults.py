@@ -69,7 +69,7 @@ def test_results_folder_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "results").write_text("in the way")
     run = snakemake(tmp_path)
     assert run.status != 0
-    assert "results: results cannot be written here" in run.output
+    assert "results: found a file, allowed is a folder" in run.output
     assert "Traceback" not in run.output
     assert run.output.count("\n") <= 25
 

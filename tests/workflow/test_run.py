@@ -150,6 +150,58 @@ def loads(pid: int) -> list[str]:
     return found
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=lambda s: s.name)
+def test_what_became_of_snakemake_is_said(tmp_path: Path, number: signal.Signals) -> None:
+    """Somebody, or the system that is out of memory, ends it and not the command."""
+    (tmp_path / "my.yaml").write_text(TINY)
+    with started(tmp_path, "run", "my.yaml", "-j2") as run:
+        give_up = time.monotonic() + 60
+        while not any("matplotlib" in line for line in loads(run.pid)):
+            assert time.monotonic() < give_up
+            time.sleep(0.01)
+        (snakemake,) = psutil.Process(run.pid).children()
+        snakemake.send_signal(number)
+        output, _ = run.communicate(timeout=60)
+    assert run.returncode == 128 + number
+    assert output.splitlines()[-1] == (
+        f"biogrip: Snakemake was ended by {number.name}. Nothing that is done is lost; "
+        "to go on: biogrip run my.yaml -j2"
+    )
+
+
+@pytest.mark.parametrize("options", [["-n"], ["-j1"], ["-n", "--quiet"]], ids=" ".join)
+def test_what_is_to_be_made_may_stand_behind_two_dashes(
+    tiny_copy: Path, options: list[str]
+) -> None:
+    (tiny_copy / "results" / "tables" / "errors.csv").unlink()
+    target = "results/targets/liquid_drop_2.csv"
+    run = called(tiny_copy, "run", "overlay.yaml", *options, "--", target)
+    assert run.status == 0, run.output
+    assert "No rule to produce" not in run.output
+    assert run.jobs("tables") == 0
+
+
+@pytest.mark.parametrize("kind", ["file", "link"])
+def test_what_is_in_the_place_of_a_folder_is_named(tmp_path: Path, kind: str) -> None:
+    """Of Snakemake's, before it is started, and of ours, before a job is."""
+    (tmp_path / "my.yaml").write_text(TINY)
+    (tmp_path / "elsewhere").mkdir()
+    for name in (".snakemake", "results", "results/targets", "results/.manifest"):
+        place = tmp_path / name
+        place.parent.mkdir(exist_ok=True)
+        if kind == "file":
+            place.write_text("mine")
+        else:
+            place.symlink_to(tmp_path / "elsewhere")
+        for more in (["-n"], ["-j1"]):
+            run = called(tmp_path, "run", "my.yaml", *more)
+            assert run.status == 1
+            assert f"biogrip: {name}: " in run.output
+            assert "Traceback" not in run.output
+        assert not list((tmp_path / "elsewhere").iterdir())
+        place.unlink()
+
+
 def test_a_run_in_the_background_of_a_script_is_stopped_too(tmp_path: Path) -> None:
     """There SIGINT is ignored, which programs that are started go on doing."""
     (tmp_path / "my.yaml").write_text(TINY)

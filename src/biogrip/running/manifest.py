@@ -7,6 +7,7 @@ which a second copy lies beside the journals.
 import os
 from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 from biogrip.errors import BiogripError
@@ -116,6 +117,13 @@ class Manifest:
             Whether to read it even if size and time are the recorded ones.
         """
         return self._is(path, self.last(path), thoroughly=thoroughly)
+
+    def note_times(self, paths: Iterable[str]) -> None:
+        """Take over the times that Snakemake has given to files after their jobs."""
+        for path in paths:
+            if self.knows(path) and (self._results / path).is_file() and self.is_whole(path):
+                modified_ns = (self._results / path).stat().st_mtime_ns
+                self._records[path][-1] = replace(self.last(path), modified_ns=modified_ns)
 
     def restore_time(self, path: str) -> None:
         """Give a file the time at which it was written: Snakemake goes by the order of times."""

@@ -149,6 +149,7 @@ class Claim:
 
     def __init__(self, results: Path) -> None:
         self._results = results
+        self._files: list[Path] = []
         self._logs: list[Path] = []
 
     def begin(self, files: Iterable[Path], logs: Iterable[Path]) -> None:
@@ -164,8 +165,8 @@ class Claim:
         BiogripError
             If a file is in the way that the study did not write, or is a link.
         """
-        results, files, self._logs = self._results, list(files), list(logs)
-        manifest, both = Manifest(results), [*files, *self._logs]
+        results, self._files, self._logs = self._results, list(files), list(logs)
+        manifest, both = Manifest(results), [*self._files, *self._logs]
         refuse_links(results, both)
         refuse_files_as_folders(results, both)
         refuse_others(manifest, results, both)
@@ -178,6 +179,7 @@ class Claim:
         """Put on record what the jobs have written, logs included."""
         manifest = Manifest(self._results)
         manifest.note(self._logs)
+        manifest.note_times(_name(self._results, file) for file in self._files)
         manifest.save()
 
 

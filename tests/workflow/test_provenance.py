@@ -1,0 +1,103 @@
+"""Results without Snakemake's notes: their own record says for what and of what they were made."""
+
+import json
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+
+from biogrip.cli import main
+from biogrip.files import write_text
+from biogrip.running.journal import recorded_in
+from tests.helpers.runs import RECORDED, TINY, results_of, snakemake
+
+
+@pytest.fixture
+def copied(tiny: Path, tmp_path: Path) -> Path:
+    """Results alone, copied with new times."""
+    folder = tmp_path / "copied"
+    shutil.copytree(tiny / "results", folder / "results", copy_function=shutil.copyfile)
+    return folder
+
+
+def test_results_may_be_copied(copied: Path, tiny: Path) -> None:
+    run = snakemake(copied, config=TINY)
+    assert "Nothing to be done" in run.output
+    assert results_of(copied) == results_of(tiny)
+
+
+def test_results_of_other_settings_are_made_again(tiny: Path, tmp_path: Path) -> None:
+    """Exactly what Snakemake makes again where it has its notes."""
+    config = f"{TINY}  liquid_drop_2: {{sample: {{k: 21.0}}}}\n"
+    with_notes, without = tmp_path / "with_notes", tmp_path / "without"
+    shutil.copytree(tiny, with_notes)
+    shutil.copytree(tiny, without, ignore=shutil.ignore_patterns(".snakemake"))
+    known, unknown = (snakemake(folder, "-n", config=config) for folder in (with_notes, without))
+    assert known.all_jobs()["target"] == 1
+    assert unknown.all_jobs() == known.all_jobs()
+
+
+def test_a_target_alone_is_made_again(tiny: Path, tmp_path: Path) -> None:
+    """And nothing besides: what else is of other settings was not asked for."""
+    config = f"{TINY}  liquid_drop_2: {{sample: {{k: 21.0}}}}\n"
+    folder = tmp_path / "copied"
+    shutil.copytree(tiny, folder, ignore=shutil.ignore_patterns(".snakemake"))
+    target = "results/targets/liquid_drop_2.csv"
+    before = (folder / target).read_bytes()
+    run = snakemake(folder, target, config=config)
+    assert run.all_jobs() == {"target": 1}
+    assert (folder / target).read_bytes() != before
+    assert "Nothing to be done" in snakemake(folder, target, config=config).output
+
+
+def test_another_trace_is_identified_again(recorded: Path, tmp_path: Path) -> None:
+    """Of the same name, and older than the results."""
+    folder = tmp_path / "copied"
+    shutil.copytree(recorded, folder, ignore=shutil.ignore_patterns(".snakemake"))
+    assert "Nothing to be done" in snakemake(folder, "-n", config=RECORDED).output
+    trace = folder / "mine.csv"
+    lines = trace.read_text().splitlines()
+    trace.write_text("\n".join(lines[:-1]) + "\n")
+    os.utime(trace, ns=(0, 0))
+    assert snakemake(folder, "-n", config=RECORDED).all_jobs()["recording"] == 1
+
+
+@pytest.mark.parametrize("command", ["verify", "crate", "publish results published"])
+def test_tables_of_another_study_are_refused(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    """They are what was written, and the study beside them is another one."""
+    monkeypatch.chdir(copied)
+    assert main(["verify"]) == 0
+    study = json.loads(Path("results/study.json").read_text())
+    study["cases"]["liquid_drop_2"]["sample"]["k"] = 21.0
+    with recorded_in(Path("results")):
+        write_text(Path("results/study.json"), json.dumps(study))
+    capsys.readouterr()
+    assert main(command.split()) == 1
+    assert "was made for other settings, by other code or of other files" in capsys.readouterr().err
+    assert not Path("published").exists()
+
+
+def test_results_of_other_studies_are_told(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = snakemake(copied, "-n", config=TINY)
+    assert "other studies" not in run.output
+    other = "  liquid_drop_2: null\n  mine: {sample: {model: liquid_drop, k: 2, k_p: 0.1, c: 40}}\n"
+    run = snakemake(copied, config=f"{TINY}{other}")
+    assert run.status == 0, run.output
+    assert "results also holds results of other studies (" in run.output
+    assert "--directory" in run.output
+    monkeypatch.chdir(copied)
+    assert main(["publish", "results", "published"]) == 0
+    assert list(Path("published").rglob("*_mine.*"))
+    assert not list(Path("published").rglob("*liquid_drop_2*"))
+
+
+def test_what_a_person_made_is_known_as_what_a_job_made(
+    copied: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(copied)
+    Path("results/tables/errors.csv").unlink()
+    assert main(["make", "all_errors"]) == 0
+    assert main(["verify"]) == 0
