@@ -2,6 +2,7 @@
 
 import re
 from contextlib import redirect_stdout
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 
 from biogrip.cli import main
+from biogrip.design import within_reach
 from biogrip.design.experiment import Wanted
+from biogrip.design.schedule import presses
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.random_streams import stream
@@ -17,7 +20,6 @@ from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
-from biogrip.own_design import designed
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.asked_design import plausible, plausible_ends, wanted_of
 from biogrip.study.load import load_study, read_configs
@@ -32,6 +34,21 @@ design:
   {noise_rad: 3.0e-6, samples: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
    largest_torque_Nm: 8.0e-9, most_steps: 8, tried: 128}
 only: [liquid_drop_2]
+"""
+
+# A camera that reads nothing of c_p: its share is over some milliseconds after a step.
+SLOW = """
+design:
+  {noise_rad: 8.0e-7, samples: 2000, fastest_Hz: 20, longest_s: 300, largest_torque_Nm: 2.0e-9,
+   most_steps: 4, ranges: {k: [15, 50], c: [60, 250]}, drawn: 3, tried: 128}
+gripper:
+  arm_length_m: 1.6e-3
+  left: {stiffness_Nm_per_rad: 5.0e-7}
+  right: {stiffness_Nm_per_rad: 5.0e-7}
+only: [cell]
+cases:
+  cell:
+    sample: {model: generalized_maxwell, k: 25, k_p: 6, c: 100, c_p: 0.02}
 """
 
 
@@ -50,9 +67,9 @@ def design(place: Path, *more: str) -> int:
     return main(["design", str(place / "asked.yaml"), "--output", str(place / "out.yaml"), *more])
 
 
-def designed_case(place: Path) -> Case:
+def designed_case(place: Path, name: str = "liquid_drop_2") -> Case:
     files = [CONFIG, place / "asked.yaml", place / "out.yaml"]
-    return load_study(read_configs(files), files).cases["liquid_drop_2"]
+    return load_study(read_configs(files), files).cases[name]
 
 
 def test_a_study_takes_it_and_has_the_bounds_that_were_promised(folder: tuple[Path, str]) -> None:
@@ -134,6 +151,44 @@ def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
     assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
 
 
+@pytest.mark.parametrize(("shortest_s", "unit_s"), [(None, 0.5), (0.1, 0.1), (5.0, 5.0)])
+def test_a_slow_camera_is_asked_for_what_it_can_tell(
+    shortest_s: float | None, unit_s: float, tmp_path: Path
+) -> None:
+    """Of 20 Hz: a design within its limits, c_p left out, the others as if it were known."""
+    key = "" if shortest_s is None else f", shortest_step_s: {shortest_s}"
+    (tmp_path / "asked.yaml").write_text(SLOW.replace("tried: 128", f"tried: 128{key}"))
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path) == 0
+    case = designed_case(tmp_path, "cell")
+    assert len(case.phases) <= 4
+    lasting = np.array([phase.duration_s for phase in case.phases])
+    assert lasting.sum() == pytest.approx(300.0)
+    np.testing.assert_allclose(lasting / unit_s, np.round(lasting / unit_s), rtol=0, atol=1e-9)
+    assert 0.99 * 2e-9 < max(phase.left.value_Nm for phase in case.phases) <= 2e-9
+    times = case.sampling.over(case.problem.torque.end_s)
+    assert len(times) == 2000
+    assert np.diff(times).min() > 0.05 * (1 - 1e-9)
+    assert presses(wanted_of(case), case.phases)
+    lines = re.findall(r"^  (\w+) +(\S+) .*\| (\S+)", said.getvalue(), re.MULTILINE)
+    promised = {name: percent for name, _, percent in lines}
+    assert promised.pop("c_p") == "none"
+    for place in (said.getvalue(), (tmp_path / "out.html").read_text()):
+        assert "with readings at 20 Hz no torque that was tried tells it: c_p" in place
+    # That c_p may be anything costs them little, and of plausible samples theirs is the worst.
+    known = replace(case.problem, fixed={"c_p": 0.02})
+    for quantity, bound in bounds_percent(known, case.noise, case.parameters, times)[:3]:
+        assert 0.4 < bound / float(promised[quantity.label]) < 1.1
+        assert bound < 1
+
+
+def test_steps_are_by_default_as_long_as_ten_readings_of_a_slow_camera() -> None:
+    for rate_Hz, unit_s in ((1e5, 0.01), (1e3, 0.01), (100.0, 0.1), (20.0, 0.5)):
+        case = study_of(SLOW.replace("fastest_Hz: 20", f"fastest_Hz: {rate_Hz}")).cases["cell"]
+        assert wanted_of(case).limits.shortest_s == pytest.approx(unit_s)
+
+
 def seldom_sampled() -> Case:
     """The paper's protocol, with a tenth of its samples."""
     return study_of(f"{ASKED}measurement: {{rate_Hz: 1.0}}\n").cases["liquid_drop_2"]
@@ -182,7 +237,7 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
 
     Read by the protocol that it was not recorded with, the same file is refused.
     """
-    monkeypatch.setattr(designed, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
     first = write_trace(seldom_sampled(), tmp_path / "first.csv")
     second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
     over = str(folder[0] / "out.yaml")
@@ -217,6 +272,22 @@ def one_torque(wanted: Wanted) -> Torque:
             "at least four ramps, 80 s",
         ),
         (ASKED.replace("tried: 128", "shortest_step_s: 1.0e-6"), [], "at least two samples long"),
+        (
+            SLOW.replace("longest_s: 300", "longest_s: 0.8"),
+            [],
+            "at least two steps, 1 s, or a shortest_step_s of at most 0.4.",
+        ),
+        (
+            SLOW.replace("longest_s: 300", "longest_s: 0.08"),
+            [],
+            "at least two steps, 1 s, or a fastest_Hz of at least 50.",
+        ),
+        (
+            SLOW.replace("tried: 128", "tried: 128, quantities: [c_p]"),
+            [],
+            "no torque of steps with which readings at 20 Hz tell c_p, even to a factor of e to "
+            "the 10; allowed are a faster camera (`fastest_Hz`)",
+        ),
         (
             f"{ASKED}cases: {{liquid_drop_2: {{sample: {{c_p: 0.0}}}}}}\n",
             [],
