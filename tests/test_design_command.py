@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import within_reach
 from biogrip.design.experiment import Wanted
@@ -249,6 +250,61 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
     assert "second.csv" in capsys.readouterr().err
 
 
+def test_after_a_trace_with_columns_and_units_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same rotations in another file lead to the same design; what was added is allowed for."""
+    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
+    times, rotation = np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True)
+    bounds_after(tmp_path, "--after", str(trace))
+    design_of_plain = (tmp_path / "out.yaml").read_bytes()
+
+    def odd(rotation: Array) -> str:
+        file, columns = tmp_path / "odd.csv", np.column_stack((1e3 * times, 1e6 * rotation))
+        np.savetxt(file, columns, "%.12g", ";", header="t;phi_urad", comments="")
+        return str(file)
+
+    told = ["--time", "t", "--time-unit", "ms", "--rotation", "phi_urad"]
+    bounds_after(tmp_path, "--after", odd(rotation), *told)
+    assert (tmp_path / "out.yaml").read_bytes() == design_of_plain
+    # Of an offset of 30 times the noise, and of a noise that is not the next experiment's.
+    drifting = odd(rotation + 1e-4 + 1e-7 * times)
+    assert design(tmp_path, "--after", drifting, *told) == 1
+    bounds_after(tmp_path, "--after", drifting, *told, "--offset", "--drift")
+    noisy = odd(rotation + 1.2e-5 * np.random.default_rng(1).standard_normal(len(times)))
+    assert design(tmp_path, "--after", noisy, *told) == 1
+    bounds_after(tmp_path, "--after", noisy, *told, "--noise", "1.2e-5")
+    assert "level_rad: 3.0e-06" in (tmp_path / "out.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("header", "more", "said"),
+    [
+        ("t,phi", [], "column 'time_s': found no such column, allowed are t, phi"),
+        ("t,phi", ["--time", "t", "--rotation", "phi"], "column 't': found no unit, neither"),
+        ("time_s,rotation_rad", ["--time-unit", "ms"], "found the unit 'ms' where the name says"),
+        ("time_s,rotation_rad", ["--rotation-unit", "grad"], "--rotation-unit: found 'grad'"),
+        ("time_s,rotation_rad", ["--noise", "0"], "--noise: found 0.0"),
+        ("time_s,rotation_rad", ["--noise", "1.0e-7"], "2 times the noise of 1e-07 rad (--noise"),
+    ],
+)
+def test_messages_on_traces_name_options_that_there_are(
+    header: str, more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
+    trace.write_text(trace.read_text().replace("time_s,rotation_rad", header))
+    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    assert design(tmp_path, "--after", str(trace), *more) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "under measurement" not in error
+    with pytest.raises(SystemExit):
+        main(["design", "--help"])
+    options = re.findall(r"--[a-z][a-z-]*", capsys.readouterr().out)
+    assert set(re.findall(r"--[a-z][a-z-]*", error)) <= set(options)
+
+
 def one_torque(wanted: Wanted) -> Torque:
     """Any torque; a search takes seconds."""
     return TorqueSearch(wanted, SHAPES["steps"]).torque(
@@ -288,6 +344,7 @@ def one_torque(wanted: Wanted) -> Torque:
             "no torque of steps with which readings at 20 Hz tell c_p, even to a factor of e to "
             "the 10; allowed are a faster camera (`fastest_Hz`)",
         ),
+        (ASKED, ["--offset"], "found options of a trace, allowed are these with --after only"),
         (
             f"{ASKED}cases: {{liquid_drop_2: {{sample: {{c_p: 0.0}}}}}}\n",
             [],
