@@ -2,14 +2,18 @@
 
 import re
 from contextlib import redirect_stdout
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from biogrip.arrays import Array
 from biogrip.cli import main
+from biogrip.design import within_reach
 from biogrip.design.experiment import Wanted
+from biogrip.design.schedule import presses
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.random_streams import stream
@@ -17,7 +21,6 @@ from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
-from biogrip.own_design import designed
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.asked_design import plausible, plausible_ends, wanted_of
 from biogrip.study.load import load_study, read_configs
@@ -32,6 +35,21 @@ design:
   {noise_rad: 3.0e-6, samples: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
    largest_torque_Nm: 8.0e-9, most_steps: 8, tried: 128}
 only: [liquid_drop_2]
+"""
+
+# A camera that reads nothing of c_p: its share is over some milliseconds after a step.
+SLOW = """
+design:
+  {noise_rad: 8.0e-7, samples: 2000, fastest_Hz: 20, longest_s: 300, largest_torque_Nm: 2.0e-9,
+   most_steps: 4, ranges: {k: [15, 50], c: [60, 250]}, drawn: 3, tried: 128}
+gripper:
+  arm_length_m: 1.6e-3
+  left: {stiffness_Nm_per_rad: 5.0e-7}
+  right: {stiffness_Nm_per_rad: 5.0e-7}
+only: [cell]
+cases:
+  cell:
+    sample: {model: generalized_maxwell, k: 25, k_p: 6, c: 100, c_p: 0.02}
 """
 
 
@@ -50,9 +68,9 @@ def design(place: Path, *more: str) -> int:
     return main(["design", str(place / "asked.yaml"), "--output", str(place / "out.yaml"), *more])
 
 
-def designed_case(place: Path) -> Case:
+def designed_case(place: Path, name: str = "liquid_drop_2") -> Case:
     files = [CONFIG, place / "asked.yaml", place / "out.yaml"]
-    return load_study(read_configs(files), files).cases["liquid_drop_2"]
+    return load_study(read_configs(files), files).cases[name]
 
 
 def test_a_study_takes_it_and_has_the_bounds_that_were_promised(folder: tuple[Path, str]) -> None:
@@ -134,6 +152,44 @@ def test_the_same_again(folder: tuple[Path, str], tmp_path: Path) -> None:
     assert (tmp_path / "out.yaml").read_bytes() == (folder[0] / "out.yaml").read_bytes()
 
 
+@pytest.mark.parametrize(("shortest_s", "unit_s"), [(None, 0.5), (0.1, 0.1), (5.0, 5.0)])
+def test_a_slow_camera_is_asked_for_what_it_can_tell(
+    shortest_s: float | None, unit_s: float, tmp_path: Path
+) -> None:
+    """Of 20 Hz: a design within its limits, c_p left out, the others as if it were known."""
+    key = "" if shortest_s is None else f", shortest_step_s: {shortest_s}"
+    (tmp_path / "asked.yaml").write_text(SLOW.replace("tried: 128", f"tried: 128{key}"))
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path) == 0
+    case = designed_case(tmp_path, "cell")
+    assert len(case.phases) <= 4
+    lasting = np.array([phase.duration_s for phase in case.phases])
+    assert lasting.sum() == pytest.approx(300.0)
+    np.testing.assert_allclose(lasting / unit_s, np.round(lasting / unit_s), rtol=0, atol=1e-9)
+    assert 0.99 * 2e-9 < max(phase.left.value_Nm for phase in case.phases) <= 2e-9
+    times = case.sampling.over(case.problem.torque.end_s)
+    assert len(times) == 2000
+    assert np.diff(times).min() > 0.05 * (1 - 1e-9)
+    assert presses(wanted_of(case), case.phases)
+    lines = re.findall(r"^  (\w+) +(\S+) .*\| (\S+)", said.getvalue(), re.MULTILINE)
+    promised = {name: percent for name, _, percent in lines}
+    assert promised.pop("c_p") == "none"
+    for place in (said.getvalue(), (tmp_path / "out.html").read_text()):
+        assert "with readings at 20 Hz no torque that was tried tells it: c_p" in place
+    # That c_p may be anything costs them little, and of plausible samples theirs is the worst.
+    known = replace(case.problem, fixed={"c_p": 0.02})
+    for quantity, bound in bounds_percent(known, case.noise, case.parameters, times)[:3]:
+        assert 0.4 < bound / float(promised[quantity.label]) < 1.1
+        assert bound < 1
+
+
+def test_steps_are_by_default_as_long_as_ten_readings_of_a_slow_camera() -> None:
+    for rate_Hz, unit_s in ((1e5, 0.01), (1e3, 0.01), (100.0, 0.1), (20.0, 0.5)):
+        case = study_of(SLOW.replace("fastest_Hz: 20", f"fastest_Hz: {rate_Hz}")).cases["cell"]
+        assert wanted_of(case).limits.shortest_s == pytest.approx(unit_s)
+
+
 def seldom_sampled() -> Case:
     """The paper's protocol, with a tenth of its samples."""
     return study_of(f"{ASKED}measurement: {{rate_Hz: 1.0}}\n").cases["liquid_drop_2"]
@@ -182,7 +238,7 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
 
     Read by the protocol that it was not recorded with, the same file is refused.
     """
-    monkeypatch.setattr(designed, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
     first = write_trace(seldom_sampled(), tmp_path / "first.csv")
     second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
     over = str(folder[0] / "out.yaml")
@@ -192,6 +248,61 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
         assert float(bounds[name][0]) < 1.5 * float(bound)
     assert design(tmp_path, "--force", "--after", str(second)) == 1
     assert "second.csv" in capsys.readouterr().err
+
+
+def test_after_a_trace_with_columns_and_units_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same rotations in another file lead to the same design; what was added is allowed for."""
+    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
+    times, rotation = np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True)
+    bounds_after(tmp_path, "--after", str(trace))
+    design_of_plain = (tmp_path / "out.yaml").read_bytes()
+
+    def odd(rotation: Array) -> str:
+        file, columns = tmp_path / "odd.csv", np.column_stack((1e3 * times, 1e6 * rotation))
+        np.savetxt(file, columns, "%.12g", ";", header="t;phi_urad", comments="")
+        return str(file)
+
+    told = ["--time", "t", "--time-unit", "ms", "--rotation", "phi_urad"]
+    bounds_after(tmp_path, "--after", odd(rotation), *told)
+    assert (tmp_path / "out.yaml").read_bytes() == design_of_plain
+    # Of an offset of 30 times the noise, and of a noise that is not the next experiment's.
+    drifting = odd(rotation + 1e-4 + 1e-7 * times)
+    assert design(tmp_path, "--after", drifting, *told) == 1
+    bounds_after(tmp_path, "--after", drifting, *told, "--offset", "--drift")
+    noisy = odd(rotation + 1.2e-5 * np.random.default_rng(1).standard_normal(len(times)))
+    assert design(tmp_path, "--after", noisy, *told) == 1
+    bounds_after(tmp_path, "--after", noisy, *told, "--noise", "1.2e-5")
+    assert "level_rad: 3.0e-06" in (tmp_path / "out.yaml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("header", "more", "said"),
+    [
+        ("t,phi", [], "column 'time_s': found no such column, allowed are t, phi"),
+        ("t,phi", ["--time", "t", "--rotation", "phi"], "column 't': found no unit, neither"),
+        ("time_s,rotation_rad", ["--time-unit", "ms"], "found the unit 'ms' where the name says"),
+        ("time_s,rotation_rad", ["--rotation-unit", "grad"], "--rotation-unit: found 'grad'"),
+        ("time_s,rotation_rad", ["--noise", "0"], "--noise: found 0.0"),
+        ("time_s,rotation_rad", ["--noise", "1.0e-7"], "2 times the noise of 1e-07 rad (--noise"),
+    ],
+)
+def test_messages_on_traces_name_options_that_there_are(
+    header: str, more: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
+    trace.write_text(trace.read_text().replace("time_s,rotation_rad", header))
+    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    assert design(tmp_path, "--after", str(trace), *more) == 1
+    error = capsys.readouterr().err
+    assert said in error
+    assert "under measurement" not in error
+    with pytest.raises(SystemExit):
+        main(["design", "--help"])
+    options = re.findall(r"--[a-z][a-z-]*", capsys.readouterr().out)
+    assert set(re.findall(r"--[a-z][a-z-]*", error)) <= set(options)
 
 
 def one_torque(wanted: Wanted) -> Torque:
@@ -217,6 +328,23 @@ def one_torque(wanted: Wanted) -> Torque:
             "at least four ramps, 80 s",
         ),
         (ASKED.replace("tried: 128", "shortest_step_s: 1.0e-6"), [], "at least two samples long"),
+        (
+            SLOW.replace("longest_s: 300", "longest_s: 0.8"),
+            [],
+            "at least two steps, 1 s, or a shortest_step_s of at most 0.4.",
+        ),
+        (
+            SLOW.replace("longest_s: 300", "longest_s: 0.08"),
+            [],
+            "at least two steps, 1 s, or a fastest_Hz of at least 50.",
+        ),
+        (
+            SLOW.replace("tried: 128", "tried: 128, quantities: [c_p]"),
+            [],
+            "no torque of steps with which readings at 20 Hz tell c_p, even to a factor of e to "
+            "the 10; allowed are a faster camera (`fastest_Hz`)",
+        ),
+        (ASKED, ["--offset"], "found options of a trace, allowed are these with --after only"),
         (
             f"{ASKED}cases: {{liquid_drop_2: {{sample: {{c_p: 0.0}}}}}}\n",
             [],

@@ -161,7 +161,7 @@ def _groups_parser(stages: Any) -> None:
 def _design_parser(stages: Any) -> None:
     text = "find the torque, and when to look, with which every parameter shows"
     design = stages.add_parser("design", help=text, description=text)
-    design.set_defaults(command=_design)
+    design.set_defaults(command=_design, noise_model=None)
     design.add_argument(
         "configs",
         type=Path,
@@ -179,9 +179,10 @@ def _design_parser(stages: Any) -> None:
         action="append",
         default=[],
         metavar=("TRACE", "CONFIG"),
-        help="CSV file with time_s and rotation_rad: what to do next; recorded as the config says, "
-        "or as YAML files say that are laid over it; again for every trace of the sample",
+        help="CSV file with a header: what to do next; recorded as the config says, or as YAML "
+        "files say that are laid over it; again for every trace of the sample",
     )
+    _reading_options(design)
     design.add_argument(
         "--output",
         type=Path,
@@ -193,23 +194,28 @@ def _design_parser(stages: Any) -> None:
     )
 
 
-def _trace_options(command: argparse.ArgumentParser) -> None:
-    """Add what tells how recorded traces are to be read and identified."""
+def _reading_options(command: argparse.ArgumentParser) -> None:
+    """Add what tells how recorded traces are to be read, and what the instrument added."""
     command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
     command.add_argument(
         "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
     )
     command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
     command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
+    command.add_argument("--offset", action="store_true", help="fit an offset along")
+    command.add_argument("--drift", action="store_true", help="fit a linear drift along")
+
+
+def _trace_options(command: argparse.ArgumentParser) -> None:
+    """Add what tells how recorded traces are to be read and identified."""
+    _reading_options(command)
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
     )
     command.add_argument(
         "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
     )
-    command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
-    command.add_argument("--offset", action="store_true", help="fit an offset along")
-    command.add_argument("--drift", action="store_true", help="fit a linear drift along")
     command.add_argument(
         "--noise-model", help="white, or coloured: intervals that allow for noise that remembers"
     )
@@ -259,7 +265,14 @@ def _groups(options: argparse.Namespace) -> None:
 def _design(options: argparse.Namespace) -> None:
     from biogrip.own_design.command import design
 
-    design(options.configs, options.case, options.output, after=options.after, force=options.force)
+    design(
+        options.configs,
+        options.case,
+        options.output,
+        after=options.after,
+        read_as=_read_as(options),
+        force=options.force,
+    )
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":

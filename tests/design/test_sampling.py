@@ -137,3 +137,19 @@ def test_in_few_cells_as_much_is_told() -> None:
         shares = np.linalg.eigvals(np.linalg.solve(one, other)).real
         # Each entry of the whitened information by 1e-3: three of them in a row.
         np.testing.assert_allclose(shares, 1.0, atol=4e-3)
+
+
+def test_in_few_cells_what_no_reading_tells_apart_is_left_alone() -> None:
+    """A parameter that only goes with another, and one that never shows."""
+    told, capacity = _random(4, 2)
+    apart = np.concatenate((told, 1e-3 * told[:, :1], np.zeros_like(told[:, :1])), axis=1)
+    found = best_sampling(told, capacity, 60, Criterion("D", "mean", ALL), gap=GAP, most=200)
+    cost = np.linspace(0, 1, 40)
+    few = in_few_cells(apart, found.samples, capacity, cost)
+    assert few.sum() == pytest.approx(60)
+    partly = (few > 1e-6) & (few < capacity - 1e-6)
+    assert np.count_nonzero(partly) <= 2 * 6 + 1
+    before, after = ((told * one) @ told.swapaxes(1, 2) for one in (found.samples, few))
+    for one, other in zip(before, after, strict=True):
+        shares = np.linalg.eigvals(np.linalg.solve(one, other)).real
+        np.testing.assert_allclose(shares, 1.0, atol=4e-3)

@@ -11,12 +11,11 @@ from functools import cache
 
 import pandas as pd
 
-from biogrip.design.experiment import relative_bounds
+from biogrip.design.experiment import NO_BOUND, relative_bounds
 from biogrip.design.schedule import planned
 from biogrip.design.search import best_torques
 from biogrip.experiment.random_streams import stream
 from biogrip.identify.answer import silent
-from biogrip.own_design.designed import NO_BOUND
 from biogrip.study.asked_design import wanted_of
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study

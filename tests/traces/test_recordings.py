@@ -312,13 +312,12 @@ def test_a_decimal_comma_among_commas_is_not_read_as_cells(tmp_path: Path) -> No
         (
             ["# x", "time_s,rotation", *ROWS],
             ", line 2, column 'rotation_rad': found no such column, allowed are time_s, rotation. "
-            "Did you mean 'rotation'? Say which is which by --time and --rotation, or time and "
-            "rotation under measurement.",
+            "Did you mean 'rotation'? Say which is which by time and rotation under measurement.",
         ),
         (
             [*ROWS],
             ", line 1, column 'time_s': found no such column, allowed are 0, 0e-6. Say which is "
-            "which by --time and --rotation, or time and rotation under measurement.",
+            "which by time and rotation under measurement.",
         ),
         (
             ["time_s,rotation_rad,time_s", *ROWS],
@@ -481,6 +480,25 @@ def test_endless_names_and_cells_are_refused(tmp_path: Path, letters: int) -> No
 def test_a_unit_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
     with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
         unit_of(Path("t.csv"), "t", given, TIME_UNITS)
+
+
+@pytest.mark.parametrize(
+    ("column", "option", "key"),
+    [
+        ("psi", "by --time and --rotation.", "by time and rotation under measurement."),
+        ("phi", "(by --rotation-unit)", "(by rotation_unit under measurement)"),
+    ],
+)
+def test_what_a_column_is_was_said_by_options_or_by_keys(
+    column: str, option: str, key: str, tmp_path: Path
+) -> None:
+    path = written(tmp_path / "t.csv", ["time_s,phi", *ROWS])
+    said = refusal(path, Columns("time_s", column, by_options=True))
+    assert option in said
+    assert "measurement" not in said
+    said = refusal(path, Columns("time_s", column))
+    assert key in said
+    assert "--" not in said
 
 
 @pytest.mark.parametrize(

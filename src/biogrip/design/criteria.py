@@ -142,8 +142,35 @@ def inverted(information: Array) -> Array:
 
     What rounding leaves of a singular one has an inverse, too, as large as rounding allows.
     """
+    correlations, length = _correlations(information)
+    size = length[:, :, None] * length[:, None, :]
+    return np.linalg.inv(correlations + _ROUNDING * np.eye(information.shape[1])) / size
+
+
+def whitened(information: Array, told: Array) -> Array:
+    """Return sensitivities in units in which the information is one in all directions.
+
+    In directions of which only rounding has information, they are next to nothing.
+
+    Parameters
+    ----------
+    information : (n, n_parameters, n_parameters)
+    told : (n, n_parameters, n_cells)
+
+    Returns
+    -------
+    (n, n_parameters, n_cells)
+    """
+    correlations, length = _correlations(information)
+    singular = np.linalg.eigvalsh(correlations)[:, 0] < _ROUNDING
+    lifted = np.where(singular, _ROUNDING, 0.0)[:, None, None] * np.eye(information.shape[1])
+    root = np.linalg.cholesky(correlations + lifted)
+    white: Array = np.linalg.solve(root, told / length[:, :, None])
+    return white
+
+
+def _correlations(information: Array) -> tuple[Array, Array]:
+    """Information with a unit diagonal, and the roots of its own, (n, n_parameters)."""
     length = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     length = np.where(length > 0, length, 1.0)
-    size = length[:, :, None] * length[:, None, :]
-    count = information.shape[1]
-    return np.linalg.inv(information / size + _ROUNDING * np.eye(count)) / size
+    return information / (length[:, :, None] * length[:, None, :]), length

@@ -16,6 +16,12 @@ from biogrip.response.ringing import ringing_responses
 Experiment = tuple[tuple[Phase, ...], Sampling]
 """Protocol and sampling."""
 
+NO_BOUND = 10.0
+"""Of which nobody would say that something is known: a factor of e to the tenth."""
+
+# Information that rounding leaves of none; its bound is a thousand times what none is.
+_NOTHING = 1e-6 * NO_BOUND**-2
+
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
@@ -44,7 +50,10 @@ class Wanted:
     criterion
         What is to be small.
     before : (n, n_parameters, n_parameters) or (1, n_parameters, n_parameters)
-        Information on the log-parameters that earlier experiments gave.
+        Information on the log-parameters that earlier experiments gave; and of those out of reach,
+        that they are known within a factor of e to the `NO_BOUND`.
+    out_of_reach
+        Indices of parameters that no torque tells, see `biogrip.design.within_reach`.
     """
 
     gripper: Gripper
@@ -59,6 +68,21 @@ class Wanted:
     stroke_rad: float
     criterion: Criterion
     before: Array
+    out_of_reach: tuple[int, ...] = ()
+
+    def bounds(self, information: Array) -> Array:
+        """Return `relative_bounds`, without what is taken to be known of those out of reach.
+
+        Parameters
+        ----------
+        information : (n, n_parameters, n_parameters)
+            With what is in `before`.
+        """
+        found = relative_bounds(information)
+        apart = list(self.out_of_reach)
+        told = found[:, apart] ** -2 - NO_BOUND**-2
+        found[:, apart] = np.maximum(told, _NOTHING) ** -0.5
+        return found
 
 
 def told_at(

@@ -13,6 +13,7 @@ References
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.design.criteria import whitened
 
 # By which the information may differ, as a share of what it is in any direction.
 _AS_GOOD = 1e-3
@@ -44,9 +45,7 @@ def in_few_cells(
     from scipy.optimize import linprog
 
     information = (told * samples) @ told.swapaxes(1, 2) + before
-    size = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
-    root = np.linalg.cholesky(information / (size[:, :, None] * size[:, None, :]))
-    white = np.linalg.solve(root, told / size[:, :, None])
+    white = whitened(information, told)
     first, second = np.triu_indices(told.shape[1])
     rows = (white[:, first] * white[:, second]).reshape(-1, told.shape[2])
     wanted = rows @ samples

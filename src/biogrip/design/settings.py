@@ -9,6 +9,9 @@ from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
+# Of a step: as long as generators need, readings by default, and as few as there must be.
+_SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
+
 _Value = Annotated[float, Key(above=0, high=1e12)]
 
 
@@ -36,14 +39,15 @@ class DesignSettings:
         Key("Largest voltage, instead; counted like a protocol's.", "V", above=0, high=1e4),
     ] = None
     shortest_step_s: Annotated[
-        float,
+        float | None,
         Key(
-            "All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s.",
+            "All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s, or "
+            "ten readings at `fastest_Hz` if these take longer.",
             "s",
             low=1e-6,
             high=1e6,
         ),
-    ] = 0.01
+    ] = None
     most_steps: Annotated[
         int,
         Key(
@@ -108,6 +112,13 @@ class DesignSettings:
     ] = 2000
     sequence: Annotated[SequenceSettings | None, Key()] = None
 
+    @property
+    def unit_s(self) -> float:
+        """What all steps, ramps and sinusoids last whole multiples of."""
+        if self.shortest_step_s is not None:
+            return self.shortest_step_s
+        return max(_SHORTEST_S, _READINGS / self.fastest_Hz)
+
     def problems(self) -> Iterator[Problem]:
         """Find keys that do not go together."""
         if self.sequence and not self.ranges:
@@ -117,13 +128,23 @@ class DesignSettings:
         if len(given) != 1:
             text = f"found {' and '.join(given) or 'neither'}, allowed is one of largest_torque_Nm "
             yield (), f"{text}and largest_voltage_V."
-        if self.shortest_step_s * self.fastest_Hz < 2:
+        if self.unit_s * self.fastest_Hz < _FEWEST:
             text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
-            yield ("shortest_step_s",), f"{text}{2 / self.fastest_Hz:g} s."
+            yield ("shortest_step_s",), f"{text}{_FEWEST / self.fastest_Hz:g} s."
         fewest, words = (4, "four ramps") if "ramps" in self.shapes else (2, "two steps")
-        if fewest * self.shortest_step_s > self.longest_s:
-            text = f"found {self.longest_s}, allowed is at least {words}, "
-            yield ("longest_s",), f"{text}{fewest * self.shortest_step_s:g} s."
+        shortest_s = fewest * self.unit_s
+        if shortest_s > self.longest_s:
+            text = f"found {self.longest_s}, allowed is at least {words}, {shortest_s:g} s"
+            yield ("longest_s",), f"{text}{self._instead(self.longest_s / fewest)}."
         for name, (low, high) in (self.ranges or {}).items():
             if not low <= high:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."
+
+    def _instead(self, longest_s: float) -> str:
+        """Say what else to change where steps, as long as by default, have to be shorter."""
+        if self.shortest_step_s is not None:
+            return ""
+        fastest_Hz = _FEWEST / longest_s
+        if fastest_Hz > self.fastest_Hz:
+            return f", or a fastest_Hz of at least {fastest_Hz:g}"
+        return f", or a shortest_step_s of at most {longest_s:g}"

@@ -7,9 +7,10 @@ from pathlib import Path
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
 from biogrip.own_design.as_config import as_config
-from biogrip.own_design.designed import designed, in_words
+from biogrip.own_design.designed import designed, in_words, percent
 from biogrip.own_design.earlier import Recorded, told_by_recorded
 from biogrip.own_traces.outputs import check_output
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.progress import Progress
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
@@ -21,8 +22,9 @@ def design(
     names: Sequence[str],
     output: Path,
     *,
-    after: Sequence[Sequence[Path]] = (),
-    force: bool = False,
+    after: Sequence[Sequence[Path]],
+    read_as: ReadAs,
+    force: bool,
 ) -> None:
     """Design the experiments of cases, write them as a config and as a page, and print them.
 
@@ -37,6 +39,8 @@ def design(
     after
         Traces of one sample, whose telling is used: a CSV file, and, if it was not recorded as the
         config says, the YAML files to be laid over that. In the order of the experiments.
+    read_as
+        How these files are to be read.
     force
         Whether to replace files that this program did not write.
 
@@ -53,6 +57,8 @@ def design(
         raise BiogripError(f"{output}: allowed is the name of a YAML file; the page is beside it.")
     if after and len(chosen) > 1:
         raise BiogripError("--after: is of one case; choose it with --case.")
+    if read_as != ReadAs() and not after:
+        raise BiogripError("found options of a trace, allowed are these with --after only.")
     refuse_inputs([output, page], [*configs, *chain.from_iterable(after)])
     for path in (output, page):
         check_output(path, force=force)
@@ -60,10 +66,10 @@ def design(
     with Progress("designs", len(chosen), live=True) as progress:
         for case in chosen:
             traces = [_recorded(files, own, case.name) for own in after]
-            told = told_by_recorded(traces, study.study_seed) if traces else None
+            told = told_by_recorded(traces, read_as, study.study_seed) if traces else None
 
             def tried(count: int, bound: float, title: str = case.title) -> None:
-                progress.doing(f"{title}: {count} torques tried, bound {100 * bound:.3g} %")
+                progress.doing(f"{title}: {count} torques tried, bound {percent(bound)}")
 
             found.append(designed(case, study.study_seed, tried, told))
             progress.done()

@@ -7,17 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Wanted, information_of, relative_bounds, told_at
-from biogrip.design.schedule import Plan, forces, planned
-from biogrip.design.search import best_torques
+from biogrip.design.experiment import NO_BOUND, Wanted, information_of, told_at
+from biogrip.design.schedule import Plan, forces
 from biogrip.design.told import Earlier
+from biogrip.design.within_reach import planned_within_reach
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.study.asked_design import wanted_of
 from biogrip.study.study import Case
-
-NO_BOUND = 10.0
-"""Of which nobody would say that something is known: a factor of e to the tenth."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +26,7 @@ class Designed:
     case
         For which sample.
     wanted
-        What was asked.
+        What was asked, without what no torque tells.
     plan
         The experiment.
     before, after : (n, n_parameters)
@@ -71,13 +68,12 @@ def designed(
     Raises
     ------
     BiogripError
-        If nothing was found with which the jaws press throughout.
+        If nothing was found with which the jaws press throughout, or that tells what is asked.
     """
-    wanted = wanted_of(case, earlier)
     asked = case.block.design
     assert asked is not None
     rng = stream(study_seed, case.name, 0, "design")
-    plan = planned(wanted, best_torques(wanted, asked.tried, rng, progress))
+    wanted, plan = planned_within_reach(wanted_of(case, earlier), asked.tried, rng, progress)
     history = torque_history(case.phases)
     told = told_at(
         wanted.gripper,
@@ -87,10 +83,11 @@ def designed(
         wanted.parameters,
         wanted.noise_rad,
     )
-    before = relative_bounds(information_of(told) + wanted.before)
+    before = wanted.bounds(information_of(told) + wanted.before)
     network = wanted.model.network(wanted.parameters)
     time_s, force_N = forces(wanted.gripper, network, plan.phases)
-    return Designed(case, wanted, plan, before, relative_bounds(plan.information), time_s, force_N)
+    after = wanted.bounds(plan.information)
+    return Designed(case, wanted, plan, before, after, time_s, force_N)
 
 
 def in_words(found: Designed) -> str:
@@ -102,11 +99,23 @@ def in_words(found: Designed) -> str:
     lines.append(f"  bound (1 standard deviation{several}): as configured | designed")
     for name, before, after in zip(model.names, *worst, strict=True):
         lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
+    if found.wanted.out_of_reach:
+        lines.append(f"  {left_out(found.wanted)}")
     lines.append(
         f"  no other sampling of this torque is better by more than {100 * plan.gap:.2g} %; the "
         f"jaws press throughout, with at most {1e6 * found.force_N.max():.3g} µN"
     )
     return "\n".join(lines)
+
+
+def left_out(wanted: Wanted) -> str:
+    """Say what no torque tells, and what to change."""
+    names = ", ".join(wanted.model.names[index] for index in sorted(wanted.out_of_reach))
+    return (
+        f"left out, as with readings at {wanted.fastest_Hz:g} Hz no torque that was tried tells "
+        f"it: {names}; the other bounds allow for a factor of e to the {NO_BOUND:g} in it. A "
+        "faster camera (fastest_Hz), more torque or other shapes may tell it."
+    )
 
 
 def _setting(found: Designed) -> str:

@@ -11,11 +11,10 @@ from biogrip.groups.replicates import joint_problem
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.methods import best_fit
 from biogrip.identify.problem import Problem
-from biogrip.products.stages import recording
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.study.asked_design import plausible_ends
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.traces.recordings import Columns
 
 # What a fit may leave of traces, in units of the noise, before they are of something else.
 _UNLIKE = 2.0
@@ -30,14 +29,14 @@ class Recorded:
     case
         Its protocol and gripper are the trace's.
     file
-        CSV file with the columns time_s and rotation_rad.
+        CSV file.
     """
 
     case: Case
     file: Path
 
 
-def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
+def told_by_recorded(traces: Sequence[Recorded], read_as: ReadAs, study_seed: int) -> Earlier:
     """Fit the traces of one sample together, one more after the other.
 
     Parameters
@@ -45,18 +44,24 @@ def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
     traces
         In the order of their experiments. Search range, least squares, and the block `design` with
         the noise, are those of the first one's case.
+    read_as
+        Where in their files they stand, what the instrument added, and their noise, if it is not
+        that of the block; noise is taken for white.
     study_seed
         Of starting points and draws.
 
     Raises
     ------
     BiogripError
-        With file and line, if a trace cannot be used, or is not what the configs say.
+        With the option, or with file and line, if a trace cannot be used, or is not what the
+        configs say.
     """
     case = traces[0].case
     asked = case.block.design
     assert asked is not None
-    problems = [_posed(each, asked.noise_rad) for each in traces]
+    read_as.check()
+    noise_rad = read_as.noise_rad or asked.noise_rad
+    problems = [_posed(each, read_as, noise_rad) for each in traces]
     rng = stream(study_seed, case.name, 0, "after")
 
     def identify(problem: Problem) -> Identification:
@@ -64,24 +69,28 @@ def told_by_recorded(traces: Sequence[Recorded], study_seed: int) -> Earlier:
 
     told, ends = None, plausible_ends(case)
     for count, recorded in enumerate(traces, 1):
-        joint = joint_problem(problems[:count], count * [asked.noise_rad])
-        told = told_by(joint, asked.noise_rad, identify, ends, asked.drawn, rng, told)
-        if told.misfit_rad > _UNLIKE * asked.noise_rad:
+        joint = joint_problem(problems[:count], count * [noise_rad])
+        told = told_by(joint, noise_rad, identify, ends, asked.drawn, rng, told)
+        if told.misfit_rad > _UNLIKE * noise_rad:
             raise BiogripError(
                 f"--after: {recorded.file}: found {told.misfit_rad:.3g} rad that the best fit "
-                f"leaves, allowed is at most {_UNLIKE:g} times design.noise_rad: is it of this "
-                "sample, and was it recorded as the configs say?"
+                f"leaves, allowed is at most {_UNLIKE:g} times the noise of {noise_rad:.3g} rad "
+                "(--noise, else design.noise_rad): is it of this sample, and was it recorded as "
+                "the configs say?"
             )
     assert told is not None
     return told
 
 
-def _posed(recorded: Recorded, noise_rad: float) -> Problem:
+def _posed(recorded: Recorded, read_as: ReadAs, noise_rad: float) -> Problem:
     if wrong := trace_file_problem(recorded.file):
         raise BiogripError(f"--after: {wrong}")
-    case = recorded.case
-    posed = replace(case.problem, noise_rad=noise_rad)
-    columns = Columns("time_s", "rotation_rad")
-    settings = recording.Settings(case.gripper, posed, columns)
-    trace = recording.read_checked(settings, recorded.file)
+    problem = recorded.case.problem
+    posed = replace(
+        problem,
+        noise_rad=noise_rad,
+        offset=problem.offset or read_as.offset,
+        drift=problem.drift or read_as.drift,
+    )
+    trace = read_as.read(recorded.file, recorded.case.gripper, posed)
     return posed.of(trace.time_s, trace.rotation_rad[0])

@@ -12,7 +12,7 @@ from biogrip import __version__
 from biogrip.experiment.protocol import Harmonic, Phase
 from biogrip.files import write_text
 from biogrip.instrument.actuator import CombDrive, voltage
-from biogrip.own_design.designed import Designed, in_numbers, kind, percent
+from biogrip.own_design.designed import Designed, in_numbers, kind, left_out, percent
 from biogrip.own_design.drawings import drawings
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import embedded
@@ -99,6 +99,7 @@ def _told(found: Designed) -> dict[str, Any]:
                 wanted.parameters, found.before, found.after, strict=True
             )
         ],
+        "left_out": left_out(wanted) if wanted.out_of_reach else "",
         "figures": figures,
         "gap": f"{100 * plan.gap:.2g}",
         "force_uN": f"{1e6 * found.force_N.max():.3g}",

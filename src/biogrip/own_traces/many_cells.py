@@ -35,7 +35,7 @@ from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.verdicts import diagnosis_data
-from biogrip.products.stages import judgement, recording
+from biogrip.products.stages import judgement
 from biogrip.progress import Progress
 from biogrip.study.trace_file import trace_file_problem
 
@@ -209,7 +209,7 @@ class _Traces:
     def _posed(self, trace: Path) -> _Posed:
         study = study_of(replace(self._wanted, trace=trace))
         (case,) = study.cases.values()
-        recorded = recording.read_checked(recording.settings_of(case), trace)
+        recorded = self._wanted.read_as.read(trace, case.gripper, case.problem)
         rotation_rad = recorded.rotation_rad[0]
         # Noise is never the same twice; copies would pass for cells that agree to the last digit.
         same = sha256(rotation_rad.tobytes()).digest()

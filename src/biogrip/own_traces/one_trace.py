@@ -101,7 +101,7 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     (case,) = study.cases.values()
     pieces = 5 + (case.posterior is not None)
     with Progress(str(wanted.trace), pieces, live=True) as progress:
-        recorded = recording.read_checked(recording.settings_of(case), wanted.trace)
+        recorded = wanted.read_as.read(wanted.trace, case.gripper, case.problem)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
         settings, posed = judgement.settings_of(study, case), case.problem

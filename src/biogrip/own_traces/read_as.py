@@ -1,10 +1,16 @@
 """How the file of a recorded trace is to be read."""
 
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
 from biogrip.errors import BiogripError
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.instrument.gripper import Gripper
+from biogrip.products.files.traces import Measurements
+from biogrip.products.stages import recording
 from biogrip.study.measurement_block import COLOURED
 from biogrip.study.validation import value_problem
+from biogrip.traces.recordings import Columns
 
 _OPTIONS = {"noise_rad": "noise"}
 
@@ -40,6 +46,29 @@ class ReadAs:
     def block(self) -> dict[str, str | float | bool]:
         """The keys that are given."""
         return {key: value for key, value in asdict(self).items() if value is not None}
+
+    @property
+    def columns(self) -> Columns:
+        """Where in its file a trace stands."""
+        units = self.time_unit, self.rotation_unit
+        return Columns(self.time, self.rotation, *units, by_options=True)
+
+    def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
+        """Read a trace, and refuse what its gripper and protocol cannot have given.
+
+        Parameters
+        ----------
+        file
+            CSV file.
+        gripper, problem
+            With what and under what it was recorded.
+
+        Raises
+        ------
+        BiogripError
+            With file, line and column, if the trace cannot be used.
+        """
+        return recording.read_checked(recording.Settings(gripper, problem, self.columns), file)
 
     def check(self) -> None:
         """Refuse what the config would refuse.

@@ -33,7 +33,7 @@ def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
     asked = case.block.design
     assert asked is not None
     model = case.problem.searched
-    slots = round(asked.shortest_step_s * asked.fastest_Hz)
+    slots = round(asked.unit_s * asked.fastest_Hz)
     return Wanted(
         gripper=case.gripper,
         model=model,

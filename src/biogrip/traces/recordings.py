@@ -23,7 +23,6 @@ MOST_ROWS = 10_000_000
 # Of the last time: closer ones are no clock's, but of numbers that damage made.
 _SHORTEST_STEP = 1e-18
 
-_WHICH = " Say which is which by --time and --rotation, or time and rotation under measurement."
 _SPELLED_OUT = {
     "s": ("sec", "secs", "second", "seconds"),
     "ms": ("msec", "millisecond", "milliseconds"),
@@ -54,12 +53,15 @@ class Columns:
         Names of the columns.
     time_unit, rotation_unit
         A key of `TIME_UNITS` and one of `ROTATION_UNITS`, or None if the name ends with it.
+    by_options
+        Whether a command's options said so, not the keys of a config; messages name what did.
     """
 
     time: str
     rotation: str
     time_unit: str | None = None
     rotation_unit: str | None = None
+    by_options: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,7 +171,14 @@ def place(path: Path, line: int | None = None, column: str | None = None) -> str
     return where
 
 
-def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, float]) -> str:
+def unit_of(
+    path: Path,
+    column: str,
+    given: str | None,
+    allowed: Mapping[str, float],
+    *,
+    by_options: bool = False,
+) -> str:
     """Return the unit of a column, a key of `allowed`.
 
     Parameters
@@ -182,6 +191,8 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
         The unit as the user states it, or None.
     allowed
         The units there are, `TIME_UNITS` or `ROTATION_UNITS`.
+    by_options
+        As of `Columns`.
 
     Raises
     ------
@@ -194,8 +205,8 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
     stated = named if given is None else _plain(given)
     if stated is None:
         raise BiogripError(
-            f"{place(path, column=column)}: found no unit, neither stated (by --{quantity}-unit, "
-            f"or {quantity}_unit under measurement) nor at the end of the name; allowed are "
+            f"{place(path, column=column)}: found no unit, neither stated (by "
+            f"{_said_by(by_options, f'{quantity}_unit')}) nor at the end of the name; allowed are "
             f"{choices}."
         )
     if stated not in allowed:
@@ -209,6 +220,13 @@ def unit_of(path: Path, column: str, given: str | None, allowed: Mapping[str, fl
             f"'{named}', allowed is one unit."
         )
     return stated
+
+
+def _said_by(by_options: bool, *names: str) -> str:
+    """Return the options or the keys of a config that say something of a trace."""
+    if by_options:
+        return " and ".join(f"--{name.replace('_', '-')}" for name in names)
+    return f"{' and '.join(names)} under measurement"
 
 
 def nearest_unit(name: object, allowed: Collection[str]) -> str:
@@ -242,8 +260,13 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
     at: list[int] = []
     lines = _significant(path, stream, at)
     layout = _layout(path, next(lines, None), at, columns)
-    time_unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
-    rotation_unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
+    time_unit, rotation_unit = (
+        unit_of(path, column, given, allowed, by_options=columns.by_options)
+        for column, given, allowed in (
+            (columns.time, columns.time_unit, TIME_UNITS),
+            (columns.rotation, columns.rotation_unit, ROTATION_UNITS),
+        )
+    )
     sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
     from biogrip.traces.plain_rows import plain_rows  # Arrow takes as long as a short job.
 
@@ -275,7 +298,8 @@ def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> 
         raise BiogripError(f"{path}: found no header, allowed is a line with column names.")
     wanted = (columns.time, columns.rotation)
     separator, names = _header(path, at[0], header, wanted)
-    time, rotation = (_index(path, at[0], names, column) for column in wanted)
+    which = _said_by(columns.by_options, "time", "rotation")
+    time, rotation = (_index(path, at[0], names, column, which) for column in wanted)
     if time == rotation:
         raise BiogripError(
             f"{place(path, at[0], columns.time)}: found time and rotation in one column, "
@@ -303,12 +327,12 @@ def _header(path: Path, at: int, line: str, wanted: tuple[str, str]) -> tuple[st
     return separator, readings[separator]
 
 
-def _index(path: Path, line: int, names: list[str], column: str) -> int:
+def _index(path: Path, line: int, names: list[str], column: str, which: str) -> int:
     indices = [i for i, name in enumerate(names) if _plain(name) == _plain(column)]
     if not indices:
         raise BiogripError(
             f"{place(path, line, column)}: found no such column, allowed are {_listed(names)}."
-            f"{nearest(column, names)}{_WHICH}"
+            f"{nearest(column, names)} Say which is which by {which}."
         )
     if len(indices) > 1:
         raise BiogripError(

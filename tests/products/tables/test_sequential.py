@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from biogrip.design import within_reach
 from biogrip.design.experiment import Wanted
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.plan import Plan
-from biogrip.products.stages import sequence as stage
 from biogrip.products.stages.sequence import (
     AFTER,
     BEFOREHAND,
@@ -105,7 +105,7 @@ class OneTorque:
 def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A trace of the paper's leaves c_p open however often; a designed one after it does not."""
     search = OneTorque()
-    monkeypatch.setattr(stage, "best_torques", search)
+    monkeypatch.setattr(within_reach, "best_torques", search)
     study = study_of(OVERLAY)
     assert len(SEQUENCE.jobs(Plan(study, tmp_path))) == 3  # type: ignore[arg-type]
     chosen = settings(study, {"case": "endothelial_cell", "seed": "0"})

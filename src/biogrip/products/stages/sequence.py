@@ -10,9 +10,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.design.experiment import Experiment, Wanted
-from biogrip.design.schedule import planned, presses
-from biogrip.design.search import best_torques
+from biogrip.design.schedule import presses
 from biogrip.design.told import Earlier, told_by
+from biogrip.design.within_reach import planned_within_reach
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
@@ -223,7 +223,7 @@ class _Cell:
 
     def _designed(self, purpose: str, wanted: Wanted) -> Experiment:
         rng = self._stream(f"{purpose}, design")
-        plan = planned(wanted, best_torques(wanted, self._settings.tried, rng, lambda *_: None))
+        _, plan = planned_within_reach(wanted, self._settings.tried, rng, silent)
         return plan.phases, Sampling(bursts=plan.bursts)
 
     def _identify(self, way: str, count: int, problem: Problem) -> Identification:
