@@ -438,6 +438,27 @@ def test_what_is_wrong_with_all_traces_is_said_once_and_at_once(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("a.csv", "b.csv"):
+@pytest.mark.parametrize(
+    ("named", "tried"),
+    [
+        ("[damper, maxwell]", ["damper", "maxwell", "generalized_maxwell"]),
+        ("[generalized_maxwell]", []),
+        ("[]", []),
+    ],
+)
+def test_models_that_are_named_are_those_that_are_tried(
+    tmp_path: Path, named: str, tried: list[str]
+) -> None:
+    """Beside the one that the trace is identified with."""
+    config, output = tmp_path / "named.yaml", tmp_path / "found.json"
+    few = "least_squares: {candidates: 100, starts: 4}"
+    config.write_text(f"{few}\nmodel_selection: {{models: {named}}}\n")
+    assert identify(EXAMPLE, "--config", config, "--output", output).returncode == 0
+    found = json.loads(output.read_text())
+    assert [row["model"] for row in found["models"]] == tried
+    assert (found["advice"] is None) == (not tried)
+
+
         shutil.copy(EXAMPLE, name)
     Path("theirs.html").write_text("<p>mine</p>")
     Path("bad.yaml").write_text("seedz: 3")

@@ -17,7 +17,7 @@ from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.own_traces.assumed import assumed, by_default, versions
+from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
 from biogrip.own_traces.models_tried import judged_again, models_tried
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
@@ -114,7 +114,9 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
         )
         progress.done()
         progress.doing("trying other sample models")
-        models = models_tried(study, case, fit, told, lambda: None)
+        models = models_tried(
+            study, case, fit, told, lambda: None, named=names_models(wanted.config)
+        )
         told, doubts = judged_again(fit, told, models, confidence, posed.noise_rad)
         progress.done()
         progress.doing("trying an offset and a drift")
