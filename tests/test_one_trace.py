@@ -107,7 +107,7 @@ def test_units_separators_offset_and_drift(
     done = identify(other, *options, "--offset", "--drift", "--output", shifted)
     assert done.returncode == 0, done.stderr
     found = json.loads(shifted.read_text())
-    left_out = f"2 of {len(times) + 2} rows hold no number and are left out."
+    left_out = f"Left out for want of a number: 2 rows of {len(times) + 2}."
     assert found["notes"][0] == left_out
     assert f"Note: {left_out}" in done.stdout
     # Fitted along, both are known to some per cent of the rotation.

@@ -36,6 +36,11 @@ def significant(values: Array, digits: int) -> Array:
     return values
 
 
+def counted(count: object, noun: str) -> str:
+    """Return a number with what it counts, a regular noun: ``1 row``, ``3 rows``."""
+    return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
+
+
 def with_unit(name: str, unit: str) -> str:
     """Return a quantity's name with its unit behind it, if it has one: ``k (N/m)``, ``alpha``."""
     return f"{name} ({unit})" if unit else name

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.traces.recordings import place
 
@@ -97,8 +98,8 @@ def _rows(table: Path, text: str) -> Iterator[_Row]:
         cells = _split(table, line, content, separator)
         if len(cells) < len(names) or any(cells[len(names) :]):
             raise BiogripError(
-                f"{place(table, line)}: found {len(cells)} cells in the row, allowed are the "
-                f"header's {len(names)}."
+                f"{place(table, line)}: found {counted(len(cells), 'cell')} in the row, "
+                f"allowed are the header's {len(names)}."
             )
         file, cell, group = (cells[index] for index in at)
         for column, value in zip(COLUMNS, (file, cell, group), strict=True):

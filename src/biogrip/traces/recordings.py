@@ -12,6 +12,7 @@ from unicodedata import normalize
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
@@ -361,14 +362,15 @@ def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layou
         for column, index in layout.indices.items():
             if len(row) <= index:
                 raise BiogripError(
-                    f"{place(path, line, column)}: found only {len(row)} cells in the row, "
-                    f"allowed are the header's {layout.width}."
+                    f"{place(path, line, column)}: found only {counted(len(row), 'cell')} in the "
+                    f"row, allowed are the header's {layout.width}."
                 )
         # A separator at the end of every row is common, and harmless.
         if any(cell.strip() for cell in row[layout.width :]):
             raise BiogripError(
-                f"{place(path, line)}: found {len(row)} cells in the row, allowed are the "
-                f"header's {layout.width}. A decimal comma needs semicolons or tabs as separators."
+                f"{place(path, line)}: found {counted(len(row), 'cell')} in the row, allowed "
+                f"are the header's {layout.width}. A decimal comma needs semicolons or "
+                "tabs as separators."
             )
 
 
@@ -412,10 +414,10 @@ def _listed(names: list[str]) -> str:
 
 def _check_count(path: Path, columns: Columns, found: int, without_number: int) -> None:
     if found < FEWEST_SAMPLES:
-        gaps = f" ({without_number} rows hold NaN)" if without_number else ""
+        gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
         raise BiogripError(
-            f"{path}: found {found} rows with a number in both {columns.time} and "
-            f"{columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
+            f"{place(path)}: found {counted(found, 'row')} with a number in both "
+            f"{columns.time} and {columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
         )
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
@@ -85,7 +86,8 @@ def notes_on_gaps(trace: Measurements) -> list[str]:
     samples = len(trace.time_s)
     if not trace.gaps:
         return []
-    return [f"{trace.gaps} of {samples + trace.gaps} rows hold no number and are left out."]
+    rows = counted(trace.gaps, "row")
+    return [f"Left out for want of a number: {rows} of {samples + trace.gaps}."]
 
 
 def check_traces(study: Study) -> None:
