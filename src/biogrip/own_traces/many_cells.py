@@ -38,6 +38,7 @@ from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
 from biogrip.study.trace_file import trace_file_problem
+from biogrip.terminal import visible, visible_lines
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,8 @@ def groups(
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
     found = compare_groups(Wanted(table, model, read_as, config), cells, written)
-    print(in_words(found))
-    print(f"Written to {written}.")
+    print(visible_lines(in_words(found)))
+    print(f"Written to {visible(written)}.")
     return 1 if found["skipped"] else 0
 
 
@@ -148,7 +149,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         progress.done()
     if not judged:
         raise BiogripError(
-            f"{wanted.trace}: none of its traces can be used; the first: "
+            f"{visible(wanted.trace)}: none of its traces can be used; the first: "
             f"{traces.skipped[0]['reason']}"
         )
     # The first in the table is compared with, whichever of its traces can be used.
@@ -172,7 +173,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
 def in_words(found: dict[str, Any]) -> str:
     """Return what `compare_groups` found as tables to read."""
     percent = f"{100 * found['confidence']:g} %"
-    parts = [f"{found['table']}: {found['model_title']}, {percent} limits"]
+    parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
@@ -202,7 +203,9 @@ class _Traces:
             try:
                 posed.append(self._posed(trace))
             except BiogripError as error:
-                reason = str(error) if str(trace) in str(error) else f"{trace}: {error}"
+                reason = (
+                    str(error) if visible(trace) in str(error) else f"{visible(trace)}: {error}"
+                )
                 self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
         return posed
 
@@ -215,7 +218,8 @@ class _Traces:
         same = sha256(rotation_rad.tobytes()).digest()
         if (before := self._read.setdefault(same, trace)) != trace:
             raise BiogripError(
-                f"{trace}: found the very rotations of {before}, allowed is each trace once."
+                f"{visible(trace)}: found the very rotations of {visible(before)}, "
+                "allowed is each trace once."
             )
         settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)

@@ -11,6 +11,7 @@ from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
+from biogrip.terminal import visible
 
 if TYPE_CHECKING:
     from biogrip.own_traces.page import Page
@@ -57,7 +58,7 @@ def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | 
             if page is not None:
                 page.add(identified)
         if len(outputs) > 1:
-            print(f"{number} of {len(outputs)}: {trace}", file=sys.stderr, flush=True)
+            print(f"{number} of {len(outputs)}: {visible(trace)}", file=sys.stderr, flush=True)
     return Told(found, refused)
 
 

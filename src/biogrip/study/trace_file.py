@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from biogrip.errors import nearest
+from biogrip.terminal import visible
 
 _SHOWN = 200
 
@@ -10,8 +11,8 @@ _SHOWN = 200
 def trace_file_problem(path: str | Path) -> str | None:
     """Say what is wrong with the path of a trace, if it leads to no file."""
     file = Path(path)
-    shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}..."
-    shown = shown if shown.isprintable() else ascii(shown)[1:-1]
+    shown = visible(path)
+    shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}..."
     found = f"found '{shown}', allowed is a file that exists."
     try:
         if file.is_file():

@@ -14,6 +14,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
+from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
@@ -150,7 +151,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     except UnicodeDecodeError as error:
         raise BiogripError(_not_text(path)) from error
     except OSError as error:
-        raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
+        raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
     gaps = np.any(np.isnan(values), axis=1)
     kept, kept_lines = values[~gaps], lines[~gaps]
     without_number = len(lines) - len(kept_lines)
@@ -162,11 +163,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
     """Return where in a file something was found, as messages begin."""
-    where = str(path)
+    where = visible(path)
     if line is not None:
         where += f", line {line}"
     if column is not None:
-        where += f", column '{column}'"
+        where += f", column '{visible(column)}'"
     return where
 
 
@@ -273,7 +274,7 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
 
 def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
     if header is None:
-        raise BiogripError(f"{path}: found no header, allowed is a line with column names.")
+        raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
     wanted = (columns.time, columns.rotation)
     separator, names = _header(path, at[0], header, wanted)
     time, rotation = (_index(path, at[0], names, column) for column in wanted)
@@ -330,7 +331,9 @@ def _blocks(
         rows = list(islice(_one_per_line(path, reader, at), _ROWS_AT_ONCE))
         count += len(rows)
         if count > MOST_ROWS:
-            raise BiogripError(f"{path}: found over {MOST_ROWS} rows, allowed are {MOST_ROWS}.")
+            raise BiogripError(
+                f"{place(path)}: found over {MOST_ROWS} rows, allowed are {MOST_ROWS}."
+            )
         if not rows:
             return
         yield rows
@@ -442,4 +445,4 @@ def _not_text(path: Path) -> str:
         before = StringIO(content[: error.start].decode("utf-8") + "?", newline="")
         line, byte = sum(1 for _ in before), content[error.start]
         return f"{place(path, line)}: found the byte 0x{byte:02x}, allowed is text in UTF-8."
-    return f"{path}: changed while it was read."
+    return f"{place(path)}: changed while it was read."

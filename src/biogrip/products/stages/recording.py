@@ -14,7 +14,7 @@ from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.recordings import Columns, read_recording
+from biogrip.traces.recordings import Columns, place, read_recording
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
     """
     trace = read_checked(settings, recorded)
     for note in notes_on_gaps(trace):
-        warn(f"{recorded}: {note}")
+        warn(f"{place(recorded)}: {note}")
     write_measurements(measurements, trace)
 
 
@@ -65,8 +65,8 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
     trace, problem = read_recording(recorded, settings.columns), settings.problem
     if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
-            f"{recorded}: found {len(trace.time_s)} samples, allowed are at most {MOST_SAMPLES} "
-            "with a coloured noise model: average neighbouring ones."
+            f"{place(recorded)}: found {len(trace.time_s)} samples, allowed are at most "
+            f"{MOST_SAMPLES} with a coloured noise model: average neighbouring ones."
         )
     nuisance = problem.nuisance(trace.time_s)
     check_recording(
