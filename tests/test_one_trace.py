@@ -304,6 +304,43 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(
     assert mine.read_text() == '{"mine": 1}'
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "identify pipe",
+        "identify a.csv --config pipe",
+        "identify a.csv --output pipe --force",
+        "identify a.csv --csv pipe --force",
+        "identify a.csv --report pipe --force",
+        f"identify a.csv --csv {os.devnull} --force",
+        "groups pipe",
+        "groups table.csv --config pipe",
+        "groups table.csv --output pipe --force",
+        "run pipe.yaml",
+        "design pipe",
+    ],
+)
+def test_what_is_no_regular_file_is_neither_read_nor_replaced(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+) -> None:
+    """At once: of a pipe that nobody writes to, reading waits without end."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    os.mkfifo("pipe.yaml")
+    shutil.copy(EXAMPLE, "a.csv")
+    Path("table.csv").write_text("file,cell,group\na.csv,a,b\n")
+    before = sorted(tmp_path.iterdir())
+    assert main(command.split()) == 1
+    error = capsys.readouterr().err
+    assert "no regular file; allowed is one." in error
+    assert error.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+    assert Path("pipe").is_fifo()
+
+
 def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path, few: str) -> None:
     output = tmp_path / "found.json"
     output.write_text("mine")
@@ -401,6 +438,27 @@ def test_what_is_said_is_enough_to_repeat_it(
     assert again["quantities"] == told["quantities"]
 
 
+@pytest.mark.parametrize(
+    ("named", "tried"),
+    [
+        ("[damper, maxwell]", ["damper", "maxwell", "generalized_maxwell"]),
+        ("[generalized_maxwell]", []),
+        ("[]", []),
+    ],
+)
+def test_models_that_are_named_are_those_that_are_tried(
+    tmp_path: Path, named: str, tried: list[str]
+) -> None:
+    """Beside the one that the trace is identified with."""
+    config, output = tmp_path / "named.yaml", tmp_path / "found.json"
+    few = "least_squares: {candidates: 100, starts: 4}"
+    config.write_text(f"{few}\nmodel_selection: {{models: {named}}}\n")
+    assert identify(EXAMPLE, "--config", config, "--output", output).returncode == 0
+    found = json.loads(output.read_text())
+    assert [row["model"] for row in found["models"]] == tried
+    assert (found["advice"] is None) == (not tried)
+
+
 def test_the_chosen_model_is_held_against_others(
     tmp_path: Path, example: tuple[str, dict[str, Any]]
 ) -> None:
@@ -438,27 +496,6 @@ def test_what_is_wrong_with_all_traces_is_said_once_and_at_once(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("a.csv", "b.csv"):
-@pytest.mark.parametrize(
-    ("named", "tried"),
-    [
-        ("[damper, maxwell]", ["damper", "maxwell", "generalized_maxwell"]),
-        ("[generalized_maxwell]", []),
-        ("[]", []),
-    ],
-)
-def test_models_that_are_named_are_those_that_are_tried(
-    tmp_path: Path, named: str, tried: list[str]
-) -> None:
-    """Beside the one that the trace is identified with."""
-    config, output = tmp_path / "named.yaml", tmp_path / "found.json"
-    few = "least_squares: {candidates: 100, starts: 4}"
-    config.write_text(f"{few}\nmodel_selection: {{models: {named}}}\n")
-    assert identify(EXAMPLE, "--config", config, "--output", output).returncode == 0
-    found = json.loads(output.read_text())
-    assert [row["model"] for row in found["models"]] == tried
-    assert (found["advice"] is None) == (not tried)
-
-
         shutil.copy(EXAMPLE, name)
     Path("theirs.html").write_text("<p>mine</p>")
     Path("bad.yaml").write_text("seedz: 3")

@@ -46,7 +46,11 @@ def check_output(output: Path, *, force: bool) -> None:
         except FileNotFoundError:
             continue
         except OSError as error:
-            raise BiogripError(f"{output}: cannot be written: {error.strerror}.") from error
+            raise BiogripError(
+                f"{visible(output)}: cannot be written: {error.strerror}."
+            ) from error
+    if os.path.exists(output) and not output.is_symlink() and not output.is_file():
+        raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
     if os.path.lexists(output) and not force and not _is_ours(output):
         raise BiogripError(
             f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, "

@@ -19,6 +19,8 @@ def trace_file_problem(path: str | Path) -> str | None:
             return None
         if file.is_dir():
             return f"found the folder '{shown}', allowed is a file."
+        if file.exists():
+            return f"found '{shown}', which is no regular file; allowed is one."
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
     except (OSError, ValueError):
         # A name too long for any folder, or one that no system allows, has no neighbours.

@@ -106,6 +106,9 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
 
 def _text(file: Path) -> str:
     try:
+        # Of a pipe that nobody writes to, opening would wait without end.
+        if file.exists() and not (file.is_file() or file.is_dir()):
+            raise BiogripError(f"{shown_path(file)}: is no regular file; allowed is one.")
         with file.open("rb") as stream:
             content = stream.read(LARGEST_BYTES + 1)
     except OSError as error:

@@ -144,8 +144,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     """
     try:
         if not path.is_file():
-            found = "a directory" if path.is_dir() else "no file"
-            raise BiogripError(f"{path}: found {found}, allowed is a text file with a trace.")
+            other = "no regular file" if path.exists() else "no file"
+            found = "a directory" if path.is_dir() else other
+            raise BiogripError(
+                f"{place(path)}: found {found}, allowed is a text file with a trace."
+            )
         with path.open(encoding="utf-8-sig", newline="") as stream:
             sizes, values, lines = _read(path, stream, columns)
     except UnicodeDecodeError as error:
