@@ -1,20 +1,21 @@
 """What leaves for a terminal: text of others with nothing in it that a terminal obeys."""
 
 import os
-import re
 import sys
 
 # Control characters, marks and overrides of the direction of writing, separators of lines, and
 # halves of characters, which stand for bytes in the name of a file that are no text.
-_OBEYED = re.compile(
-    r"[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]"
+_OBEYED = (
+    *(range(0x20), range(0x7F, 0xA0), range(0x61C, 0x61D), range(0x200E, 0x2010)),
+    *(range(0x2028, 0x202F), range(0x2066, 0x206A), range(0xD800, 0xE000)),
 )
+_SHOWN = {number: ascii(chr(number))[1:-1] for numbers in _OBEYED for number in numbers}
 _STREAMS = {"stdin": "r", "stdout": "w", "stderr": "w"}
 
 
 def visible(text: object) -> str:
     r"""Return text in which a terminal obeys nothing, e.g. ``\x1b[31m`` of a change of colour."""
-    return _OBEYED.sub(lambda odd: ascii(odd[0])[1:-1], str(text))
+    return str(text).translate(_SHOWN)
 
 
 def visible_lines(text: object) -> str:
