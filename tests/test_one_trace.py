@@ -21,7 +21,9 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.own_traces.many_traces import Told, write_table
+from biogrip.own_traces.one_trace import Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
@@ -364,6 +366,19 @@ def test_a_path_that_no_system_allows_is_one_message(
     said = capsys.readouterr().err
     assert said.startswith("biogrip: ")
     assert said.count("\n") == 1
+
+
+def test_what_is_said_has_all_digits_and_what_is_written_five(tmp_path: Path, few: str) -> None:
+    output = tmp_path / "found.json"
+    said = identify_trace(Wanted(EXAMPLE, "maxwell", ReadAs(), Path(few)), output).data
+    written = json.loads(output.read_text())
+    for one, other in [
+        (said, written),
+        *zip(said["quantities"], written["quantities"], strict=True),
+    ]:
+        for name in {"noise_rad", "misfit_rad", "value", "low", "high"} & set(one):
+            assert other[name] == float(f"{one[name]:.5g}") != one[name]
+    assert written["assumed"] == said["assumed"]
 
 
 def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:

@@ -1,5 +1,7 @@
 """How numbers and their units are written."""
 
+from typing import Any
+
 import numpy as np
 
 from biogrip.arrays import Array
@@ -17,6 +19,15 @@ _TENS = np.array([float(f"1e{exponent}") for exponent in range(-_LARGEST, _LARGE
 def rounded(value: float | None) -> float | None:
     """Return a number to five significant digits."""
     return None if value is None else float(f"{value:.{_DIGITS}g}")
+
+
+def rounded_numbers(data: Any) -> Any:
+    """Return plain data, lists and dictionaries, its numbers to five significant digits."""
+    if isinstance(data, dict):
+        return {key: rounded_numbers(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [rounded_numbers(value) for value in data]
+    return rounded(data) if isinstance(data, float) else data
 
 
 def rounded_rise(rise: float) -> float:

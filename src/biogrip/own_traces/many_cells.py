@@ -13,7 +13,7 @@ from tabulate import tabulate
 
 from biogrip import __version__
 from biogrip.arrays import Array
-from biogrip.digits import rounded
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
@@ -34,7 +34,7 @@ from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import judgement, recording
 from biogrip.progress import Progress
 from biogrip.study.trace_file import trace_file_problem
@@ -107,7 +107,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
     cells
         What the table holds.
     output
-        Is written with what is returned, JSON.
+        Is written with what is returned, its numbers rounded, JSON.
 
     Raises
     ------
@@ -139,11 +139,11 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
                     "cell": cell.name,
                     "group": cell.group,
                     "traces": [
-                        {"file": str(each.trace), "noise_rad": rounded(noise)}
+                        {"file": str(each.trace), "noise_rad": noise}
                         for each, noise in zip(usable, fit.noise_rad, strict=True)
                     ],
-                    "agreement_p": rounded(fit.agreement),
-                    **diagnosis_data(fit.diagnosis),
+                    "agreement_p": fit.agreement,
+                    **exact_data(fit.diagnosis),
                 }
             )
         progress.done()
@@ -166,7 +166,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
         "skipped": traces.skipped,
     }
-    write_text(output, json.dumps(found, indent=1) + "\n")
+    write_text(output, json.dumps(rounded_numbers(found), indent=1) + "\n")
     return found
 
 
@@ -250,7 +250,7 @@ def _group_data(finding: GroupFinding) -> dict[str, Any]:
         "quantity": finding.quantity,
         "unit": finding.unit,
         "determined": [
-            {"cell": cell, "value": rounded(exp(value)), "log_deviation": rounded(float(deviation))}
+            {"cell": cell, "value": exp(value), "log_deviation": float(deviation)}
             for cell, value, deviation in zip(
                 known.cells, known.log_values, known.deviations, strict=True
             )
@@ -260,13 +260,13 @@ def _group_data(finding: GroupFinding) -> dict[str, Any]:
     if population is not None:
         reach = population.reach * population.shrunk_deviations
         data |= {
-            "median": rounded(population.median),
-            "low": rounded(population.low),
-            "high": rounded(population.high),
+            "median": population.median,
+            "low": population.low,
+            "high": population.high,
             "spread": {
-                "log_deviation": rounded(population.spread),
-                "low": rounded(population.spread_low),
-                "high": rounded(population.spread_high),
+                "log_deviation": population.spread,
+                "low": population.spread_low,
+                "high": population.spread_high,
             },
             "shrunk": _shrunk(known.cells, population.shrunk, reach),
         }
@@ -278,9 +278,9 @@ def _shrunk(cells: Iterable[str], values: Array, reach: Array) -> list[dict[str,
     return [
         {
             "cell": cell,
-            "value": rounded(float(value)),
-            "low": rounded(float(low)),
-            "high": rounded(float(high)),
+            "value": float(value),
+            "low": float(low),
+            "high": float(high),
         }
         for cell, value, low, high in zip(cells, *ends, strict=True)
     ]
@@ -292,18 +292,18 @@ def _difference_data(each: GroupDifference) -> dict[str, Any]:
         "quantity": each.quantity,
         "group": each.group,
         "against": each.against,
-        "ratio": rounded(apart.ratio),
-        "low": rounded(apart.low),
-        "high": rounded(apart.high),
-        "degrees_of_freedom": rounded(apart.freedom),
-        "p": rounded(apart.p_value),
-        "adjusted_p": rounded(each.adjusted_p),
+        "ratio": apart.ratio,
+        "low": apart.low,
+        "high": apart.high,
+        "degrees_of_freedom": apart.freedom,
+        "p": apart.p_value,
+        "adjusted_p": each.adjusted_p,
         "by_ranks": {
-            "ratio": rounded(exp(ranks.estimate)),
-            "low": None if ranks.low is None else rounded(exp(ranks.low)),
-            "high": None if ranks.high is None else rounded(exp(ranks.high)),
+            "ratio": exp(ranks.estimate),
+            "low": None if ranks.low is None else exp(ranks.low),
+            "high": None if ranks.high is None else exp(ranks.high),
         },
-        "ratio_seen": rounded(each.ratio_seen),
+        "ratio_seen": each.ratio_seen,
     }
 
 

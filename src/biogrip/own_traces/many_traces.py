@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
@@ -80,7 +81,7 @@ def write_table(told: Told, table: Path) -> None:
             each["advice"] or "",
             each[WRITTEN_BY],
         )
-        for each in told.found
+        for each in map(rounded_numbers, told.found)
     ]
     rows += [
         (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in told.refused.items()

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.experiment.springpot import LONGEST_S
@@ -53,11 +52,11 @@ class ModelsTried:
                 "model": each.candidate,
                 "title": each.model.title,
                 "parameters": len(each.model.names),
-                "misfit_rad": rounded(each.misfit_rad),
+                "misfit_rad": each.misfit_rad,
                 "vanished": vanished(each.candidate, answer),
                 "converged": answer.converged,
-                "delta_aic": rounded(each.delta_aic),
-                "delta_bic": rounded(each.delta_bic),
+                "delta_aic": each.delta_aic,
+                "delta_bic": each.delta_bic,
             }
             for each, answer in zip(self.tried, self.answers, strict=True)
         ]
