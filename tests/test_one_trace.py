@@ -21,7 +21,9 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.own_traces.many_traces import Told, write_table
+from biogrip.own_traces.one_trace import Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
@@ -107,7 +109,7 @@ def test_units_separators_offset_and_drift(
     done = identify(other, *options, "--offset", "--drift", "--output", shifted)
     assert done.returncode == 0, done.stderr
     found = json.loads(shifted.read_text())
-    left_out = f"2 of {len(times) + 2} rows hold no number and are left out."
+    left_out = f"Left out for want of a number: 2 rows of {len(times) + 2}."
     assert found["notes"][0] == left_out
     assert f"Note: {left_out}" in done.stdout
     # Fitted along, both are known to some per cent of the rotation.
@@ -304,6 +306,43 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(
     assert mine.read_text() == '{"mine": 1}'
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        "identify pipe",
+        "identify a.csv --config pipe",
+        "identify a.csv --output pipe --force",
+        "identify a.csv --csv pipe --force",
+        "identify a.csv --report pipe --force",
+        f"identify a.csv --csv {os.devnull} --force",
+        "groups pipe",
+        "groups table.csv --config pipe",
+        "groups table.csv --output pipe --force",
+        "run pipe.yaml",
+        "design pipe",
+    ],
+)
+def test_what_is_no_regular_file_is_neither_read_nor_replaced(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    command: str,
+) -> None:
+    """At once: of a pipe that nobody writes to, reading waits without end."""
+    monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
+    os.mkfifo("pipe.yaml")
+    shutil.copy(EXAMPLE, "a.csv")
+    Path("table.csv").write_text("file,cell,group\na.csv,a,b\n")
+    before = sorted(tmp_path.iterdir())
+    assert main(command.split()) == 1
+    error = capsys.readouterr().err
+    assert "no regular file; allowed is one." in error
+    assert error.count("\n") == 1
+    assert sorted(tmp_path.iterdir()) == before
+    assert Path("pipe").is_fifo()
+
+
 def test_an_output_is_replaced_that_biogrip_wrote_or_by_force(tmp_path: Path, few: str) -> None:
     output = tmp_path / "found.json"
     output.write_text("mine")
@@ -327,6 +366,19 @@ def test_a_path_that_no_system_allows_is_one_message(
     said = capsys.readouterr().err
     assert said.startswith("biogrip: ")
     assert said.count("\n") == 1
+
+
+def test_what_is_said_has_all_digits_and_what_is_written_five(tmp_path: Path, few: str) -> None:
+    output = tmp_path / "found.json"
+    said = identify_trace(Wanted(EXAMPLE, "maxwell", ReadAs(), Path(few)), output).data
+    written = json.loads(output.read_text())
+    for one, other in [
+        (said, written),
+        *zip(said["quantities"], written["quantities"], strict=True),
+    ]:
+        for name in {"noise_rad", "misfit_rad", "value", "low", "high"} & set(one):
+            assert other[name] == float(f"{one[name]:.5g}") != one[name]
+    assert written["assumed"] == said["assumed"]
 
 
 def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
@@ -399,6 +451,27 @@ def test_what_is_said_is_enough_to_repeat_it(
     again = json.loads(second.read_text())
     assert (told["by_default"], again["by_default"]) == (["gripper", "protocol"], [])
     assert again["quantities"] == told["quantities"]
+
+
+@pytest.mark.parametrize(
+    ("named", "tried"),
+    [
+        ("[damper, maxwell]", ["damper", "maxwell", "generalized_maxwell"]),
+        ("[generalized_maxwell]", []),
+        ("[]", []),
+    ],
+)
+def test_models_that_are_named_are_those_that_are_tried(
+    tmp_path: Path, named: str, tried: list[str]
+) -> None:
+    """Beside the one that the trace is identified with."""
+    config, output = tmp_path / "named.yaml", tmp_path / "found.json"
+    few = "least_squares: {candidates: 100, starts: 4}"
+    config.write_text(f"{few}\nmodel_selection: {{models: {named}}}\n")
+    assert identify(EXAMPLE, "--config", config, "--output", output).returncode == 0
+    found = json.loads(output.read_text())
+    assert [row["model"] for row in found["models"]] == tried
+    assert (found["advice"] is None) == (not tried)
 
 
 def test_the_chosen_model_is_held_against_others(

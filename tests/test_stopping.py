@@ -86,7 +86,7 @@ print(*{*sys.modules} - before)
 """
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     ours = {name for name in run.stdout.split() if name.startswith("biogrip")}
-    assert ours == {"biogrip", "biogrip.__main__", "biogrip.stopping"}
+    assert ours == {"biogrip", "biogrip.__main__", "biogrip.stopping", "biogrip.terminal"}
     assert not {"argparse", "json", "typing", "hashlib", "pathlib"} & set(run.stdout.split())
 
 

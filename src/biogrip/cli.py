@@ -7,11 +7,12 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
 from biogrip.files import watched
+from biogrip.terminal import visible, visible_lines
 
 if TYPE_CHECKING:
     from biogrip.own_traces.read_as import ReadAs
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.command(options)
             sys.stdout.flush()
     except BiogripError as error:
-        print(f"biogrip: {error}", file=sys.stderr)
+        print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
         return 1
     except BrokenPipeError:
         # Whoever was reading has gone. Python would say so once more on its way out.
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 128 + signal.SIGPIPE
     except OSError as error:
         # What only the system knows of a path: no permission, too long a name, ...
-        place = "" if error.filename is None else f"{str(error.filename)[:_SHOWN]}: "
+        place = "" if error.filename is None else f"{visible(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
     return options.status
@@ -63,8 +64,16 @@ def _refuse_others(path: Path, scratch: Path) -> None:
         refuse_others(Manifest(RESULTS), RESULTS, [path])
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong with a command so that a terminal obeys nothing that was typed."""
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse a command."""
+        super().error(visible_lines(message))
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="biogrip", description=__doc__)
+    parser = _Parser(prog="biogrip", description=__doc__)
     parser.set_defaults(recorded=False, status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -299,13 +308,13 @@ def _run(options: argparse.Namespace) -> None:
 def _verify(options: argparse.Namespace) -> None:
     from biogrip.running.verify import verify
 
-    print(verify(options.results))
+    print(visible_lines(verify(options.results)))
 
 
 def _clean(options: argparse.Namespace) -> None:
     from biogrip.running.clean import clean
 
-    print(clean(options.results))
+    print(visible_lines(clean(options.results)))
 
 
 def _crate(options: argparse.Namespace) -> None:
@@ -314,16 +323,16 @@ def _crate(options: argparse.Namespace) -> None:
 
     with recorded_in(RESULTS):
         said = write_crate(RESULTS, options.output)
-    print(said)
+    print(visible_lines(said))
 
 
 def _publish(options: argparse.Namespace) -> None:
     from biogrip.running.published import publish
 
-    print(publish(options.results, options.published, options.only))
+    print(visible_lines(publish(options.results, options.published, options.only)))
 
 
 def _compare(options: argparse.Namespace) -> None:
     from biogrip.running.comparison import compare
 
-    print(compare(options.published, options.now))
+    print(visible_lines(compare(options.published, options.now)))

@@ -1,5 +1,7 @@
 """How numbers and their units are written."""
 
+from typing import Any
+
 import numpy as np
 
 from biogrip.arrays import Array
@@ -19,6 +21,15 @@ def rounded(value: float | None) -> float | None:
     return None if value is None else float(f"{value:.{_DIGITS}g}")
 
 
+def rounded_numbers(data: Any) -> Any:
+    """Return plain data, lists and dictionaries, its numbers to five significant digits."""
+    if isinstance(data, dict):
+        return {key: rounded_numbers(value) for key, value in data.items()}
+    if isinstance(data, list):
+        return [rounded_numbers(value) for value in data]
+    return rounded(data) if isinstance(data, float) else data
+
+
 def rounded_rise(rise: float) -> float:
     """Return a rise of chi^2 to five digits, and no finer than fits know it."""
     return float(f"{round(rise, _RISE_DECIMALS):.{_DIGITS}g}") + 0.0
@@ -34,6 +45,11 @@ def significant(values: Array, digits: int) -> Array:
     up, down = np.maximum(shift, 0) + _LARGEST, np.maximum(-shift, 0) + _LARGEST
     values[usual] = np.rint(values[usual] / _TENS[down] * _TENS[up]) / _TENS[up] * _TENS[down]
     return values
+
+
+def counted(count: object, noun: str) -> str:
+    """Return a number with what it counts, a regular noun: ``1 row``, ``3 rows``."""
+    return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.stopping import unfinished
+from biogrip.terminal import visible
 
 Watch = Callable[[Path, Path], None]
 """Is told of a file, and of the scratch file with its contents, just before it is in place."""
@@ -49,7 +50,9 @@ def written_whole(path: Path) -> Iterator[Path]:
             watch(path, scratch)
         os.replace(scratch, path)
     except OSError as error:
-        raise BiogripError(f"{path}: cannot be written: {error.strerror or error}.") from error
+        raise BiogripError(
+            f"{visible(path)}: cannot be written: {error.strerror or error}."
+        ) from error
     finally:
         # Why it could not be written is said already.
         with suppress(OSError):
@@ -80,4 +83,4 @@ def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
     read = [path for path in inputs if os.path.exists(path)]
     for output in outputs:
         if os.path.exists(output) and any(output.samefile(path) for path in read):
-            raise BiogripError(f"{output}: is read; allowed is another file to write.")
+            raise BiogripError(f"{visible(output)}: is read; allowed is another file to write.")

@@ -4,6 +4,8 @@ import sys
 import time
 from typing import Self
 
+from biogrip.terminal import visible, visible_lines
+
 _EVERY_S = 5.0
 _CLEARED = "\r\x1b[K"
 
@@ -23,7 +25,7 @@ class Progress:
     """
 
     def __init__(self, what: str, total: int, *, live: bool = False) -> None:
-        self._what = what
+        self._what = visible(what)
         self._total = total
         self._live = live and sys.stderr.isatty()
         self._done = 0
@@ -47,7 +49,7 @@ class Progress:
 
     def doing(self, phase: str) -> None:
         """Name what comes next, until it is done."""
-        self._phase = f", {phase}"
+        self._phase = f", {visible(phase)}"
         self._say("")
 
     def within(self, evaluations: int, misfit_rad: float) -> None:
@@ -67,7 +69,7 @@ class Progress:
 
 def warn(text: str) -> None:
     """Say what should be doubted: to whoever waits at the terminal, and in the job's log."""
-    line = f"biogrip: warning: {text}"
+    line = f"biogrip: warning: {visible_lines(text)}"
     print(line, flush=True)
     if not sys.stderr.isatty():
         print(line, file=sys.stderr, flush=True)

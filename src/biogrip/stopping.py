@@ -11,6 +11,8 @@ import sys
 from contextlib import suppress
 from types import FrameType
 
+from biogrip.terminal import visible
+
 _SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
 _CLEARED = "\r\x1b[K"
 
@@ -46,7 +48,7 @@ def end_at_once(number: int, line: str) -> None:
         sys.stdout.flush()
     with suppress(OSError):
         cleared = _CLEARED if os.isatty(2) else ""
-        os.write(2, f"{cleared}biogrip: {line}\n".encode())
+        os.write(2, f"{cleared}biogrip: {visible(line)}\n".encode())
     os._exit(128 + number)
 
 

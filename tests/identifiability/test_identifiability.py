@@ -27,7 +27,8 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.own_traces.words import limits_in_short
+from biogrip.products.files.verdicts import diagnosis_data, exact_data
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import GRIPPER, MODEL, SAMPLES, TORQUE, clean, posed_for, problem, run
 
@@ -261,6 +262,18 @@ def test_data_of_a_diagnosis_are_plain_and_rounded() -> None:
     assert float(f"{k['value']:.5g}") == k["value"]
     assert len(k["profile"]["values"]) == len(k["profile"]["rises"])
     assert k["in_words"] == f"determined: {k['value']:.3g} N/m ({k['low']:.3g} to {k['high']:.3g})"
+
+
+def test_what_is_said_is_rounded_once() -> None:
+    """To five digits, as in files, it is 1.165, of which three would be 1.17."""
+    diagnosis, _ = told("endothelial_cell")
+    first = diagnosis.findings[0]
+    profile = replace(first.profile, low=0.0, best=math.log(1.1), high=math.log(1.164998))
+    close = replace(diagnosis, findings=[replace(first, profile=profile)])
+    (item,) = exact_data(close)["quantities"]
+    assert item["in_words"] == "determined: 1.1 N/m (1 to 1.16)"
+    assert limits_in_short(item) == "1.1 (1 to 1.16)"
+    assert diagnosis_data(close)["quantities"][0]["high"] == 1.165
 
 
 def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:

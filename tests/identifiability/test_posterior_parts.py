@@ -224,7 +224,7 @@ def test_as_many_walkers_as_the_sampler_wants() -> None:
     model = model_named("generalized_maxwell", 5)
     least = 2 * len(model.names)
     (problem,) = PosteriorSettings(walkers=least - 1).problems_of(model, [])
-    said = f"found {least - 1}, allowed are at least {least} where 12 parameters are identified."
+    said = f"found {least - 1}, allowed are at least {least} to identify 12 parameters."
     assert problem == (("walkers",), said)
     assert not list(PosteriorSettings(walkers=least).problems_of(model, []))
     assert not list(PosteriorSettings(walkers=least - 1).problems_of(model, ["k_1"]))

@@ -39,7 +39,7 @@ def test_white_noise_is_seldom_doubted() -> None:
         ({"relaxing": Relaxing(1.0, 0.1)}, "Neighbouring residuals"),
         ({"relaxing": Relaxing(0.08, 2.0)}, "more of some frequencies"),
         ({"relaxing": Relaxing(0.05, 20.0)}, "The residual wanders"),
-        ({"outliers": Outliers(0.005, 20.0)}, "samples are outliers"),
+        ({"outliers": Outliers(0.005, 20.0)}, "outliers, as of Gaussian noise"),
     ],
 )
 def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:

@@ -20,7 +20,7 @@ def folders(tmp_path: Path) -> tuple[Path, Path]:
 
 def test_tables_agree_byte_for_byte(folders: tuple[Path, Path]) -> None:
     published, now = folders
-    expected = f"1 files of tables agree with {published}, byte for byte."
+    expected = f"1 file of tables compared with {published}: the same bytes."
     assert compare(published, now) == expected
     (now / "errors.csv").write_bytes(b"case,value\r\ncell,1\r\ndrop,2\r\n")
     with pytest.raises(BiogripError, match=r"errors.csv: differs in its text"):

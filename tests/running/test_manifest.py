@@ -151,12 +151,12 @@ def test_cleaning_counts_what_it_removes(results: Path, tmp_path: Path) -> None:
     log.parent.mkdir()
     log.symlink_to(tmp_path / "mine.log")
     (results / "b.json").unlink()
-    assert clean(results) == f"1 files of {results} removed."
+    assert clean(results) == f"1 file of {results} removed."
     assert log.is_symlink()
 
 
 def test_verifying_names_what_is_missing(results: Path) -> None:
-    assert verify(results) == f"2 files of {results} are what was written."
+    assert verify(results) == f"2 files of {results} read: as written."
     (results / "b.json").unlink()
     with pytest.raises(BiogripError, match=r"b.json: is missing"):
         verify(results)

@@ -154,7 +154,7 @@ def test_reading_the_places_refuses_it_too(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["", ".", "x" * 300, "/dev/zero"])
 def test_a_config_that_is_no_file_is_refused(name: str) -> None:
-    with pytest.raises(BiogripError, match=r"cannot be read|more than 1000000 bytes"):
+    with pytest.raises(BiogripError, match=r"cannot be read|is no regular file"):
         read_config(Path(name))
 
 

@@ -128,7 +128,7 @@ BAD = {
     r"'measurement.rate_Hz', allowed is the key of a block that a case may change.",
     ("[0.1, 2e-2]", "[0.1, -2]"): r"my.yaml, line 4: sweeps.noise.rows.values\[1\]: gives "
     r"measurement.noise.level: found -2, allowed is at least 0",
-    ("[0.1, 2e-2]", "[]"): r"rows.values: found a list of 0, allowed are at least 1 items",
+    ("[0.1, 2e-2]", "[]"): r"rows.values: found a list of 0, allowed are at least 1 item",
     ("[0.1, 2e-2]", "[0.1, 0.1]"): r"rows.values: holds something twice",
     ("[0.1, 2e-2]", "[0.1, 0.1000000000000000001]"): r"rows.values: holds something twice",
     ("[0.1, 2e-2]", "[0.1, true]"): r"rows.values\[1\]: found True, allowed is a number or text",

@@ -250,7 +250,7 @@ def test_long_text_is_shown_in_part(tmp_path: Path) -> None:
             ", line 6, column 'time_s': found 2.5 after 3 (line 5), allowed are times that",
         ),
         (11, "-1,1", ", line 13, column 'time_s': found -1 after 10 (line 12), allowed"),
-        (4, "4", ", line 6, column 'rotation_rad': found only 1 cells in the row, allowed are the"),
+        (4, "4", ", line 6, column 'rotation_rad': found only 1 cell in the row, allowed are the"),
         (0, "0,1,2", ", line 2: found 3 cells in the row, allowed are the header's 2"),
         (3, '3,"1e-6', ", line 5: found a quote without its end"),
         (3, "3,\0", ", line 5: found binary data, allowed is text"),
@@ -265,7 +265,7 @@ def test_a_bad_row_is_named(tmp_path: Path, row: int, text: str, message: str) -
 def test_a_time_column_that_a_row_lacks_is_named(tmp_path: Path) -> None:
     rows = [",".join(reversed(row.split(","))) for row in ROWS]
     path = written(tmp_path / "t.csv", ["rotation_rad,time_s", *rows[:3], "1e-6", *rows[3:]])
-    assert refusal(path).startswith(", line 5, column 'time_s': found only 1 cells")
+    assert refusal(path).startswith(", line 5, column 'time_s': found only 1 cell")
 
 
 def test_times_are_compared_over_gaps_and_blocks(
@@ -301,12 +301,12 @@ def test_a_decimal_comma_among_commas_is_not_read_as_cells(tmp_path: Path) -> No
         ),
         (
             ["time_s,rotation_rad", *(f"{i},NaN" for i in range(4001))],
-            ": found 0 rows with a number in both time_s and rotation_rad (4001 rows hold NaN), "
+            ": found 0 rows with a number in both time_s and rotation_rad (4001 rows with NaN), "
             "allowed are at least 10.",
         ),
         (
             ["time_s,rotation_rad", *ROWS[:9], "10,-"],
-            ": found 9 rows with a number in both time_s and rotation_rad (1 rows hold NaN), "
+            ": found 9 rows with a number in both time_s and rotation_rad (1 row with NaN), "
             "allowed are at least 10.",
         ),
         (

@@ -17,6 +17,7 @@ from biogrip.running.sheet import files_of, sheets_of
 from biogrip.running.wholeness import Claim, hold_against_record
 from biogrip.study.load import load_study
 from biogrip.study.source import read_places
+from biogrip.terminal import visible_lines
 
 DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
 
@@ -29,7 +30,7 @@ shell.prefix(f"trap : TERM; set -euo pipefail; PATH={COMMANDS}:$PATH; ")
 try:
     read_places([DEFAULT_CONFIG])
 except BiogripError as error:
-    sys.exit(f"biogrip: {error}")
+    sys.exit(f"biogrip: {visible_lines(error)}")
 
 
 configfile: DEFAULT_CONFIG
@@ -44,7 +45,7 @@ try:
     if workflow.exec_mode == ExecMode.DEFAULT:
         check_traces(STUDY)
 except BiogripError as error:
-    sys.exit(f"biogrip: {error}")
+    sys.exit(f"biogrip: {visible_lines(error)}")
 
 RESULTS = Path("results")
 
@@ -71,7 +72,7 @@ onstart:
             [Path(file) for job in jobs for file in job.log],
         )
     except BiogripError as error:
-        sys.exit(f"biogrip: {error}")
+        sys.exit(f"biogrip: {visible_lines(error)}")
 
 
 onsuccess:

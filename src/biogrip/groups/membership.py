@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.traces.recordings import place
 
@@ -66,14 +67,18 @@ def read_cells(table: Path) -> list[Cell]:
     try:
         text = table.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise BiogripError(f"{table}: found bytes that are no UTF-8, allowed is text.") from error
+        raise BiogripError(
+            f"{place(table)}: found bytes that are no UTF-8, allowed is text."
+        ) from error
     except OSError as error:
-        raise BiogripError(f"{table}: cannot be read: {error.strerror}.") from error
+        raise BiogripError(f"{place(table)}: cannot be read: {error.strerror}.") from error
     if "\0" in text:
-        raise BiogripError(f"{table}: found binary data, allowed is text.")
+        raise BiogripError(f"{place(table)}: found binary data, allowed is text.")
     rows = list(_rows(table, text))
     if not rows:
-        raise BiogripError(f"{table}: found no traces, allowed is a row for each below the header.")
+        raise BiogripError(
+            f"{place(table)}: found no traces, allowed is a row for each below the header."
+        )
     _refuse_repeated(table, rows)
     by_cell: dict[str, list[_Row]] = {}
     for row in rows:
@@ -88,7 +93,7 @@ def _rows(table: Path, text: str) -> Iterator[_Row]:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     if not numbered:
-        raise BiogripError(f"{table}: found no header, allowed is {','.join(COLUMNS)}.")
+        raise BiogripError(f"{place(table)}: found no header, allowed is {','.join(COLUMNS)}.")
     header_line, header = numbered[0]
     separator = max(_SEPARATORS, key=header.count)
     names = _split(table, header_line, header, separator)
@@ -97,8 +102,8 @@ def _rows(table: Path, text: str) -> Iterator[_Row]:
         cells = _split(table, line, content, separator)
         if len(cells) < len(names) or any(cells[len(names) :]):
             raise BiogripError(
-                f"{place(table, line)}: found {len(cells)} cells in the row, allowed are the "
-                f"header's {len(names)}."
+                f"{place(table, line)}: found {counted(len(cells), 'cell')} in the row, "
+                f"allowed are the header's {len(names)}."
             )
         file, cell, group = (cells[index] for index in at)
         for column, value in zip(COLUMNS, (file, cell, group), strict=True):

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.experiment.sample import SampleModel
 from biogrip.keys import Key, Problem
@@ -63,7 +64,7 @@ class PosteriorSettings:
         if self.walkers < 2 * len(searched):
             # As emcee wants them: their differences have to span all directions.
             text = f"found {self.walkers}, allowed are at least {2 * len(searched)}"
-            yield ("walkers",), f"{text} where {len(searched)} parameters are identified."
+            yield ("walkers",), f"{text} to identify {counted(len(searched), 'parameter')}."
         branches = [name for pair in model.branches for name in pair] * (len(model.branches) > 1)
         for name in self.prior:
             if name not in searched:

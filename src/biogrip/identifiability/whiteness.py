@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import counted
 from biogrip.identify.outliers import FAR, outliers_of
 
 FALSE_ALARM = 0.003
@@ -49,8 +50,9 @@ def doubts_about_noise(residual: Array) -> Iterator[str]:
     chance = _chance_of_far(far, len(residual))
     if chance < FALSE_ALARM:
         yield (
-            f"{far} samples are outliers, more than {FAR:g} standard deviations from those around "
-            f"them, as of Gaussian noise {one_in(chance)} traces: they weigh too much."
+            f"Beyond {FAR:g} standard deviations from the samples around: "
+            f"{counted(far, 'outlier')}, as of Gaussian noise {one_in(chance)} traces. What lies "
+            "so far off weighs too much."
         )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
+from biogrip.digits import counted
 from biogrip.keys import Key, Problem
 
 _MOST = 1_000_000
@@ -87,4 +88,4 @@ class GeneticSettings:
         last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
         if genes and not 1 <= self.first_cut <= last:
             text = f"found {self.first_cut}, allowed is 1 to last_cut, "
-            yield ("first_cut",), f"{text}which is {last} of {genes} genes here."
+            yield ("first_cut",), f"{text}which is {last} of {counted(genes, 'gene')} here."

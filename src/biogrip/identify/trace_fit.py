@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.digits import rounded
+from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
@@ -80,7 +80,7 @@ class TraceFit:
             "instrument are fitted along, and the intervals allow for all of it."
         ]
         if left_out:
-            samples = f"{left_out} sample{'s' if left_out > 1 else ''}"
+            samples = counted(left_out, "sample")
             said.append(f"Left out as outliers: {samples} of {len(self.outliers)}.")
         return said
 

@@ -13,6 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.instrument.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.instrument.gripper import Arm
@@ -120,7 +121,7 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
     """Stiffness from the step's end, frequency from the ring's spectrum, damping from its fall."""
     if len(record.time_s) < _FEWEST_SAMPLES:
-        found = f"found {len(record.time_s)} samples"
+        found = f"found {counted(len(record.time_s), 'sample')}"
         raise BiogripError(f"calibration: {found}, allowed are {_FEWEST_SAMPLES} or more.")
     tail = len(record.time_s) // 4
     stiffness = step_Nm / np.mean(record.step_rad[-tail:])

@@ -15,6 +15,7 @@ from biogrip.progress import Progress
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
+from biogrip.terminal import visible_lines
 
 
 def design(
@@ -78,8 +79,8 @@ def design(
 
     write_text(output, as_config(found))
     write_page(found, page)
-    print("\n".join(map(in_words, found)))
-    print(f"Written to {output}, {page}.")
+    print(visible_lines("\n".join(map(in_words, found))))
+    print(visible_lines(f"Written to {output}, {page}."))
 
 
 def _recorded(files: Sequence[Path], own: Sequence[Path], name: str) -> Recorded:

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.digits import counted
 from biogrip.experiment.protocol import Phase
 from biogrip.own_design.designed import Designed, kind
 from biogrip.products.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, PURPLE, SKY, figure
@@ -93,7 +94,7 @@ def draw_told(found: Designed) -> Figure:
             axes.semilogy(shown, told, color=_COLOURS[index % len(_COLOURS)], label=name)
         lowest = axes.get_ylim()[0]
         axes.plot(read, np.full(len(read), lowest), "|", color=BLACK, ms=5)
-        axes.set_title(f"{kind(phase)} {k + 1}: {len(read)} readings")
+        axes.set_title(f"{kind(phase)} {k + 1}: {counted(len(read), 'reading')}")
     panels[0].set_ylabel("|sensitivity| / noise")
     panels[0].legend()
     return drawn

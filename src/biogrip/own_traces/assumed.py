@@ -26,6 +26,12 @@ def by_default(config: Path | None) -> list[str]:
     return [name for name in ("gripper", "protocol") if name not in given]
 
 
+def names_models(config: Path | None) -> bool:
+    """Whether somebody has named the sample models that are tried."""
+    given = read_configs([config]) if config else {}
+    return "models" in (given.get("model_selection") or {})
+
+
 def versions() -> dict[str, str]:
     """Return the versions of what the numbers come from."""
     return {name: version(name) for name in ("biogrip", "numpy", "scipy")}

@@ -11,6 +11,7 @@ from biogrip.own_traces.outputs import SAMPLES, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import in_words, side_by_side
 from biogrip.study.trace_file import trace_file_problem
+from biogrip.terminal import visible
 
 
 def identify(
@@ -90,7 +91,7 @@ def identify(
     said = [outputs[Path(each["trace"])] for each in told.found]
     said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
-    print(f"Written to {', '.join(map(str, said))}.")
+    print(f"Written to {', '.join(map(visible, said))}.")
     return 1 if told.refused else 0
 
 

@@ -13,7 +13,7 @@ from tabulate import tabulate
 
 from biogrip import __version__
 from biogrip.arrays import Array
-from biogrip.digits import rounded
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
@@ -34,10 +34,11 @@ from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import judgement
 from biogrip.progress import Progress
 from biogrip.study.trace_file import trace_file_problem
+from biogrip.terminal import visible, visible_lines
 
 
 @dataclass(frozen=True)
@@ -89,8 +90,8 @@ def groups(
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
     found = compare_groups(Wanted(table, model, read_as, config), cells, written)
-    print(in_words(found))
-    print(f"Written to {written}.")
+    print(visible_lines(in_words(found)))
+    print(f"Written to {visible(written)}.")
     return 1 if found["skipped"] else 0
 
 
@@ -106,7 +107,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
     cells
         What the table holds.
     output
-        Is written with what is returned, JSON.
+        Is written with what is returned, its numbers rounded, JSON.
 
     Raises
     ------
@@ -138,17 +139,17 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
                     "cell": cell.name,
                     "group": cell.group,
                     "traces": [
-                        {"file": str(each.trace), "noise_rad": rounded(noise)}
+                        {"file": str(each.trace), "noise_rad": noise}
                         for each, noise in zip(usable, fit.noise_rad, strict=True)
                     ],
-                    "agreement_p": rounded(fit.agreement),
-                    **diagnosis_data(fit.diagnosis),
+                    "agreement_p": fit.agreement,
+                    **exact_data(fit.diagnosis),
                 }
             )
         progress.done()
     if not judged:
         raise BiogripError(
-            f"{wanted.trace}: none of its traces can be used; the first: "
+            f"{visible(wanted.trace)}: none of its traces can be used; the first: "
             f"{traces.skipped[0]['reason']}"
         )
     # The first in the table is compared with, whichever of its traces can be used.
@@ -165,14 +166,14 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
         "skipped": traces.skipped,
     }
-    write_text(output, json.dumps(found, indent=1) + "\n")
+    write_text(output, json.dumps(rounded_numbers(found), indent=1) + "\n")
     return found
 
 
 def in_words(found: dict[str, Any]) -> str:
     """Return what `compare_groups` found as tables to read."""
     percent = f"{100 * found['confidence']:g} %"
-    parts = [f"{found['table']}: {found['model_title']}, {percent} limits"]
+    parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
@@ -202,7 +203,9 @@ class _Traces:
             try:
                 posed.append(self._posed(trace))
             except BiogripError as error:
-                reason = str(error) if str(trace) in str(error) else f"{trace}: {error}"
+                reason = (
+                    str(error) if visible(trace) in str(error) else f"{visible(trace)}: {error}"
+                )
                 self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
         return posed
 
@@ -215,7 +218,8 @@ class _Traces:
         same = sha256(rotation_rad.tobytes()).digest()
         if (before := self._read.setdefault(same, trace)) != trace:
             raise BiogripError(
-                f"{trace}: found the very rotations of {before}, allowed is each trace once."
+                f"{visible(trace)}: found the very rotations of {visible(before)}, "
+                "allowed is each trace once."
             )
         settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)
@@ -246,7 +250,7 @@ def _group_data(finding: GroupFinding) -> dict[str, Any]:
         "quantity": finding.quantity,
         "unit": finding.unit,
         "determined": [
-            {"cell": cell, "value": rounded(exp(value)), "log_deviation": rounded(float(deviation))}
+            {"cell": cell, "value": exp(value), "log_deviation": float(deviation)}
             for cell, value, deviation in zip(
                 known.cells, known.log_values, known.deviations, strict=True
             )
@@ -256,13 +260,13 @@ def _group_data(finding: GroupFinding) -> dict[str, Any]:
     if population is not None:
         reach = population.reach * population.shrunk_deviations
         data |= {
-            "median": rounded(population.median),
-            "low": rounded(population.low),
-            "high": rounded(population.high),
+            "median": population.median,
+            "low": population.low,
+            "high": population.high,
             "spread": {
-                "log_deviation": rounded(population.spread),
-                "low": rounded(population.spread_low),
-                "high": rounded(population.spread_high),
+                "log_deviation": population.spread,
+                "low": population.spread_low,
+                "high": population.spread_high,
             },
             "shrunk": _shrunk(known.cells, population.shrunk, reach),
         }
@@ -274,9 +278,9 @@ def _shrunk(cells: Iterable[str], values: Array, reach: Array) -> list[dict[str,
     return [
         {
             "cell": cell,
-            "value": rounded(float(value)),
-            "low": rounded(float(low)),
-            "high": rounded(float(high)),
+            "value": float(value),
+            "low": float(low),
+            "high": float(high),
         }
         for cell, value, low, high in zip(cells, *ends, strict=True)
     ]
@@ -288,18 +292,18 @@ def _difference_data(each: GroupDifference) -> dict[str, Any]:
         "quantity": each.quantity,
         "group": each.group,
         "against": each.against,
-        "ratio": rounded(apart.ratio),
-        "low": rounded(apart.low),
-        "high": rounded(apart.high),
-        "degrees_of_freedom": rounded(apart.freedom),
-        "p": rounded(apart.p_value),
-        "adjusted_p": rounded(each.adjusted_p),
+        "ratio": apart.ratio,
+        "low": apart.low,
+        "high": apart.high,
+        "degrees_of_freedom": apart.freedom,
+        "p": apart.p_value,
+        "adjusted_p": each.adjusted_p,
         "by_ranks": {
-            "ratio": rounded(exp(ranks.estimate)),
-            "low": None if ranks.low is None else rounded(exp(ranks.low)),
-            "high": None if ranks.high is None else rounded(exp(ranks.high)),
+            "ratio": exp(ranks.estimate),
+            "low": None if ranks.low is None else exp(ranks.low),
+            "high": None if ranks.high is None else exp(ranks.high),
         },
-        "ratio_seen": rounded(each.ratio_seen),
+        "ratio_seen": each.ratio_seen,
     }
 
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
+from biogrip.terminal import visible
 
 if TYPE_CHECKING:
     from biogrip.own_traces.page import Page
@@ -57,7 +59,7 @@ def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | 
             if page is not None:
                 page.add(identified)
         if len(outputs) > 1:
-            print(f"{number} of {len(outputs)}: {trace}", file=sys.stderr, flush=True)
+            print(f"{number} of {len(outputs)}: {visible(trace)}", file=sys.stderr, flush=True)
     return Told(found, refused)
 
 
@@ -79,7 +81,7 @@ def write_table(told: Told, table: Path) -> None:
             each["advice"] or "",
             each[WRITTEN_BY],
         )
-        for each in told.found
+        for each in map(rounded_numbers, told.found)
     ]
     rows += [
         (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in told.refused.items()

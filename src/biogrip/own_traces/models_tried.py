@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.experiment.springpot import LONGEST_S
@@ -53,11 +52,11 @@ class ModelsTried:
                 "model": each.candidate,
                 "title": each.model.title,
                 "parameters": len(each.model.names),
-                "misfit_rad": rounded(each.misfit_rad),
+                "misfit_rad": each.misfit_rad,
                 "vanished": vanished(each.candidate, answer),
                 "converged": answer.converged,
-                "delta_aic": rounded(each.delta_aic),
-                "delta_bic": rounded(each.delta_bic),
+                "delta_aic": each.delta_aic,
+                "delta_bic": each.delta_bic,
             }
             for each, answer in zip(self.tried, self.answers, strict=True)
         ]
@@ -76,11 +75,18 @@ def vanished(candidate: str, answer: Identification) -> list[str]:
 
 
 def models_tried(
-    study: Study, case: Case, fit: TraceFit, told: Diagnosis, done: Callable[[], None]
+    study: Study,
+    case: Case,
+    fit: TraceFit,
+    told: Diagnosis,
+    done: Callable[[], None],
+    *,
+    named: bool,
 ) -> ModelsTried:
     """Fit sample models in the noise of a trace.
 
-    With parameters that are known, or where a fit takes minutes, none are tried.
+    With parameters that are known, or where a fit takes minutes, none are tried, nor where there
+    is no other model.
 
     Parameters
     ----------
@@ -92,14 +98,18 @@ def models_tried(
         What it tells; its best fit is one of the points that fits start from.
     done
         Is called after every model.
+    named
+        Whether somebody has named the models of the study; else power laws are tried as well.
     """
     posed, chosen = case.problem, case.sample.candidate
     if posed.nonlinear or posed.fixed:
         return ModelsTried(chosen)
     # Beside so many samples the modes of a springpot, which has dozens, would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
-    power_laws = _power_laws(posed.torque.end_s) if few else []
+    power_laws = _power_laws(posed.torque.end_s) if few and not named else []
     candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
+    if len(candidates) < 2:
+        return ModelsTried(chosen)
     settings = case.method("least_squares")
     assert isinstance(settings, LeastSquaresSettings)
     found = fit_models(

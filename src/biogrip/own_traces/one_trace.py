@@ -11,20 +11,20 @@ import numpy as np
 
 from biogrip import __version__
 from biogrip.arrays import Array
-from biogrip.digits import rounded
+from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.own_traces.assumed import assumed, by_default, versions
+from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
 from biogrip.own_traces.models_tried import judged_again, models_tried
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
-from biogrip.products.files.verdicts import diagnosis_data
+from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import judgement, posterior, recording
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
@@ -67,7 +67,7 @@ class Identified:
     Parameters
     ----------
     data
-        What is said of it, see `identify_trace`.
+        What is said of it, see `identify_trace`; numbers of a diagnosis with all their digits.
     problem
         What was assumed.
     recorded
@@ -114,12 +114,14 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
         )
         progress.done()
         progress.doing("trying other sample models")
-        models = models_tried(study, case, fit, told, lambda: None)
+        models = models_tried(
+            study, case, fit, told, lambda: None, named=names_models(wanted.config)
+        )
         told, doubts = judged_again(fit, told, models, confidence, posed.noise_rad)
         progress.done()
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, told, progress.within)
-        said = diagnosis_data(told)
+        said = exact_data(told)
         data = {
             WRITTEN_BY: __version__,
             "trace": str(wanted.trace),
@@ -149,8 +151,14 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             words = {WRITTEN_BY: __version__}
             write_samples(output.with_suffix(SAMPLES), posed.searched, drawn, words)
             samples = np.exp(drawn)
-    write_text(output, json.dumps(data, indent=1) + "\n")
+    write_text(output, json.dumps(_written(data), indent=1) + "\n")
     return Identified(data, posed, recorded, samples)
+
+
+def _written(data: dict[str, Any]) -> dict[str, Any]:
+    """Round what was found; what was assumed is to be repeated, and a posterior is rounded."""
+    kept = {name: data[name] for name in ("assumed", "posterior") if name in data}
+    return {**rounded_numbers(data), **kept}
 
 
 def check_trace_file(trace: Path) -> None:
@@ -210,6 +218,6 @@ def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -
     added = within(basis, measured - simulated)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     start = float(added[0] - slope * time_s[0])
-    return ({"offset_rad": rounded(start)} if posed.offset else {}) | (
-        {"drift_rad_per_s": rounded(slope)} if posed.drift else {}
+    return ({"offset_rad": start} if posed.offset else {}) | (
+        {"drift_rad_per_s": slope} if posed.drift else {}
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_of
 from biogrip.products.files.parquet import column_names
+from biogrip.terminal import visible
 
 WRITTEN_BY = "written_by_biogrip"
 """Tells our files from others, which are not replaced."""
@@ -36,7 +37,8 @@ def check_output(output: Path, *, force: bool) -> None:
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
         raise BiogripError(
-            f"{output}: cannot be written; allowed is a file in a folder that you may write to."
+            f"{visible(output)}: cannot be written; allowed is a file in a folder that you "
+            "may write to."
         )
     for place in (output, scratch_of(output)):
         try:
@@ -44,10 +46,14 @@ def check_output(output: Path, *, force: bool) -> None:
         except FileNotFoundError:
             continue
         except OSError as error:
-            raise BiogripError(f"{output}: cannot be written: {error.strerror}.") from error
+            raise BiogripError(
+                f"{visible(output)}: cannot be written: {error.strerror}."
+            ) from error
+    if os.path.exists(output) and not output.is_symlink() and not output.is_file():
+        raise BiogripError(f"{visible(output)}: is no regular file; allowed is one.")
     if os.path.lexists(output) and not force and not _is_ours(output):
         raise BiogripError(
-            f"{output}: is there, and biogrip did not write it; allowed is another name, "
+            f"{visible(output)}: is there, and biogrip did not write it; allowed is another name, "
             "or --force to replace it."
         )
 

@@ -27,6 +27,7 @@ from biogrip.products.figures.residual_diagnosis import draw_residuals
 from biogrip.products.figures.results import fit_of
 from biogrip.products.figures.style import save_png, styled
 from biogrip.products.pages.png_address import png_address
+from biogrip.terminal import visible, visible_lines
 
 
 class Page:
@@ -44,6 +45,7 @@ class Page:
         self._traces.append(
             {
                 **data,
+                "trace": visible(data["trace"]),
                 "figures": figures,
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
                 "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
@@ -58,7 +60,7 @@ class Page:
         environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
         text = environment.from_string(template).render(
             traces=self._traces,
-            refused=refused,
+            refused={visible(trace): visible_lines(reason) for trace, reason in refused.items()},
             written_by=f"{WRITTEN_BY} {__version__}",
             labels=labels_of(self._traces),
         )

@@ -16,6 +16,7 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
+from biogrip.terminal import visible, visible_lines
 
 STRONG = 3.0
 """Natural logarithm of a ratio of evidences from which on it is strong (Kass and Raftery 1995)."""
@@ -27,8 +28,8 @@ def in_words(found: Mapping[str, Any]) -> str:
     """Return what is said of one trace, see `identify_trace`, as text to read."""
     width = max(len(item["quantity"]) for item in found["quantities"])
     lines = [
-        f"{found['trace']}: {found['samples']} samples, noise {found['noise_rad']:.3g} rad, "
-        f"misfit {found['misfit_rad']:.3g} rad",
+        f"{visible(found['trace'])}: {found['samples']} samples, "
+        f"noise {found['noise_rad']:.3g} rad, misfit {found['misfit_rad']:.3g} rad",
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
             f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
@@ -43,7 +44,7 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
     if "drift_rad_per_s" in found:
         lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
-    lines += [f"Note: {note}" for note in found["notes"]]
+    lines += [f"Note: {visible(note)}" for note in found["notes"]]
     lines += [found["advice"]] if found["advice"] else []
     lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
@@ -85,18 +86,20 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
     lines = []
     if found:
         labels = labels_of(found)
-        rows = [[each["trace"], *_cells(each, labels), _doubts(each)] for each in found]
+        rows = [[visible(each["trace"]), *_cells(each, labels), _doubts(each)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
         header = ["trace", *(with_unit(label, units[label]) for label in labels), "doubts"]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
         lines += [f"Sums are told provided {words}." for words in provided]
-        lines += [f"{each['trace']}: {note}" for each in found for note in each["notes"]]
+        lines += [
+            f"{visible(each['trace'])}: {visible(note)}" for each in found for note in each["notes"]
+        ]
         lines += [taken_for_granted(found[0])] if found[0]["by_default"] else []
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
-        lines += [f"  {reason}" for reason in refused.values()]
+        lines += [f"  {visible_lines(reason)}" for reason in refused.values()]
     return "\n".join(lines)
 
 

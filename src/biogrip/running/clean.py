@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.running.journal import JOURNALS
 from biogrip.running.locks import is_locked, release_dead_locks
@@ -51,4 +52,4 @@ def clean(results: Path) -> str:
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
     kept = f" Kept, for they were edited: {', '.join(map(str, left))}." if left else ""
-    return f"{len(written)} files of {results} removed.{kept}"
+    return f"{counted(len(written), 'file')} of {results} removed.{kept}"

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.products.product import PUBLISHED_TABLE_KINDS
 
@@ -45,7 +46,7 @@ def compare(published: Path, now: Path) -> str:
             if not found:
                 problems.append(f"{name}: differs in its text")
     if not problems and not differences:
-        return f"{len(names)} files of tables agree with {published}, byte for byte."
+        return f"{counted(len(names), 'file')} of tables compared with {published}: the same bytes."
     raise BiogripError(_report(published, problems, differences))
 
 
@@ -89,5 +90,5 @@ def _report(published: Path, problems: list[str], differences: list[tuple[str, .
         )
         lines += ["", frame.to_markdown(index=False, disable_numparse=True)]
         if len(differences) > _SHOWN:
-            lines.append(f"... and {len(differences) - _SHOWN} more differences.")
+            lines.append(f"... and {counted(len(differences) - _SHOWN, 'further difference')}.")
     return "\n".join(lines)

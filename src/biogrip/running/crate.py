@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
+from biogrip.digits import counted
 from biogrip.files import written_whole
 from biogrip.running.manifest import Manifest
 from biogrip.running.provenance import finished
@@ -116,7 +117,7 @@ def write_crate(results: Path, output: Path) -> str:
     crate.root_dataset.append_to("mentions", action)
     with written_whole(output) as scratch:
         crate.write_zip(scratch)
-    return f"{len(made)} results of {results} packed in {output}."
+    return f"{counted(len(made), 'result')} of {results} packed in {output}."
 
 
 def _time(record: Record) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Container, Iterable
 from contextlib import suppress
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.products.product import FIGURE_KINDS, PUBLISHED_TABLE_KINDS
@@ -65,7 +66,7 @@ def publish(results: Path, published: Path, only: str = "*") -> str:
     for name in new:
         os.replace(_beside(published / name), published / name)
     _write_sums(published, new.items())
-    return f"{len(new)} files published in {published}."
+    return f"{counted(len(new), 'file')} published in {published}."
 
 
 def _check_places(published: Path, names: list[str], old: Container[str]) -> None:

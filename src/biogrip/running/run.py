@@ -14,6 +14,7 @@ from types import FrameType
 
 from biogrip.errors import BiogripError
 from biogrip.stopping import end_at_once
+from biogrip.terminal import visible_lines
 
 # What is large is imported by who uses it: until then no signal would be answered.
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -70,7 +71,7 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
         command += ["--configfile", *map(str, configs)]
     status = signals.supervise([*command, *rest[cut:]])
     if status == 0 and signals.first is None and not known.dry_run:
-        print(_to_open(folder, rest))
+        print(visible_lines(_to_open(folder, rest)))
     return status
 
 

@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
@@ -48,5 +49,5 @@ def verify(results: Path) -> str:
         others = len(manifest.others([*map(name_of, files_of(sheets)), *OF_NO_RULE]))
     if problems:
         raise BiogripError("\n".join([*problems, "The next run makes them again."]))
-    also = f" {others} of them are of other studies than {results / STUDY}." if others else ""
-    return f"{len(manifest.files)} files of {results} are what was written.{also}"
+    also = f" Of other studies than {results / STUDY}: {others}." if others else ""
+    return f"{counted(len(manifest.files), 'file')} of {results} read: as written.{also}"

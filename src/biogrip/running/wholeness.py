@@ -12,6 +12,7 @@ from biogrip.errors import BiogripError
 from biogrip.running.journal import Journal
 from biogrip.running.locks import release_dead_locks
 from biogrip.running.manifest import OF_NO_RULE, Manifest, refuse_other_than_folder, set_aside
+from biogrip.terminal import visible, visible_lines
 
 _SHOWN = 6
 _ROOM_BYTES = 256 * 1024
@@ -56,7 +57,7 @@ def hold_against_record(
                     release_dead_locks(Path(".snakemake"))
                     begin()
             except BiogripError as error:
-                sys.exit(f"biogrip: {error}")
+                sys.exit(f"biogrip: {visible_lines(error)}")
         ended = execute(*args, **kwargs)
         if not kind.dryrun_exec:
             _say_what_else_is_there(results, asked())
@@ -279,7 +280,7 @@ def make_room(manifest: Manifest, results: Path, path: str, *, changing: bool) -
         kept = set_aside(file) if changing else f"{file}.edited"
         how = f"is not what was written (edited, or damaged), kept as {kept}"
     then = "making it again" if changing else "a run makes it again"
-    print(f"biogrip: {file}: {how}; {then}.", file=sys.stderr)
+    print(f"biogrip: {visible(file)}: {how}; {then}.", file=sys.stderr)
 
 
 def _name(results: Path, file: Path) -> str:

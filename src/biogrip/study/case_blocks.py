@@ -7,6 +7,7 @@ from itertools import pairwise
 from typing import Annotated, Any
 
 from biogrip.design.settings import DesignSettings
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
@@ -279,7 +280,8 @@ class CaseBlock(Shared):
             samples = end * measured.rate_Hz + 1
             most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
             if not needed <= samples <= most:
-                text = f"found {measured.rate_Hz}, which gives {samples:.6g} samples over the "
+                given = counted(f"{samples:.6g}", "sample")
+                text = f"found {measured.rate_Hz}, which gives {given} over the "
                 how = " with a coloured noise model" if measured.coloured else ""
                 allowed = f"protocol; allowed are {needed} to {most}{how}."
                 yield ("measurement", "rate_Hz"), text + allowed
@@ -297,7 +299,7 @@ class CaseBlock(Shared):
         bursts = self.measurement.bursts
         samples = sum(burst.samples for burst in bursts)
         if not needed <= samples <= _MOST_SAMPLES:
-            text = f"found {samples} samples, allowed are {needed} to {_MOST_SAMPLES}."
+            text = f"found {counted(samples, 'sample')}, allowed are {needed} to {_MOST_SAMPLES}."
             yield ("measurement", "bursts"), text
             return
         last = -1.0

@@ -5,6 +5,7 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any
 
+from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.keys import Key, Problem
 from biogrip.study.models import FORM, TWICE, errors_in, word
@@ -125,14 +126,17 @@ def _explained(
 
 def _length(key: Key, found: Any) -> str:
     few = key.fewest is not None and len(found) < key.fewest
-    limit = f"at least {key.fewest}" if few else f"at most {key.most}"
+    words, limit = ("at least", key.fewest) if few else ("at most", key.most)
     if isinstance(found, str):
-        return f"found {_shown(found)} of {len(found)} characters, allowed are {limit}."
+        return (
+            f"found {_shown(found)} of {counted(len(found), 'character')}, allowed are "
+            f"{words} {limit}."
+        )
     if isinstance(found, Mapping):
         if not found:
             return "is empty; at least one is needed."
-        return f"found {len(found)} keys, allowed are {limit}."
-    return f"found a list of {len(found)}, allowed are {limit} items."
+        return f"found {counted(len(found), 'key')}, allowed are {words} {limit}."
+    return f"found a list of {len(found)}, allowed are {words} {counted(limit, 'item')}."
 
 
 def _range(key: Key) -> str:

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from biogrip.errors import nearest
+from biogrip.terminal import visible
 
 _SHOWN = 200
 
@@ -10,14 +11,16 @@ _SHOWN = 200
 def trace_file_problem(path: str | Path) -> str | None:
     """Say what is wrong with the path of a trace, if it leads to no file."""
     file = Path(path)
-    shown = str(path) if len(str(path)) <= _SHOWN else f"{str(path)[:_SHOWN]}..."
-    shown = shown if shown.isprintable() else ascii(shown)[1:-1]
+    shown = visible(path)
+    shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}..."
     found = f"found '{shown}', allowed is a file that exists."
     try:
         if file.is_file():
             return None
         if file.is_dir():
             return f"found the folder '{shown}', allowed is a file."
+        if file.exists():
+            return f"found '{shown}', which is no regular file; allowed is one."
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
     except (OSError, ValueError):
         # A name too long for any folder, or one that no system allows, has no neighbours.

@@ -11,6 +11,7 @@ from pathlib import Path
 import yaml
 
 from biogrip.errors import BiogripError
+from biogrip.terminal import visible
 
 LARGEST_BYTES = 1_000_000
 DEEPEST = 50
@@ -52,7 +53,7 @@ class _Open:
 def shown_path(file: Path) -> str:
     """Name a file as the user would: relative to where they are, if it is below."""
     here = Path.cwd()
-    return str(file.relative_to(here) if file.is_relative_to(here) else file)
+    return visible(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
 def compose(file: Path) -> yaml.Node | None:
@@ -105,6 +106,9 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
 
 def _text(file: Path) -> str:
     try:
+        # Of a pipe that nobody writes to, opening would wait without end.
+        if file.exists() and not (file.is_file() or file.is_dir()):
+            raise BiogripError(f"{shown_path(file)}: is no regular file; allowed is one.")
         with file.open("rb") as stream:
             content = stream.read(LARGEST_BYTES + 1)
     except OSError as error:

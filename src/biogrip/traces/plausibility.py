@@ -366,4 +366,4 @@ def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], 
 
 
 def _extent(recording: Recording, path: Path) -> str:
-    return f"{path}, lines {recording.lines[0]} to {recording.lines[-1]}"
+    return f"{place(path)}, lines {recording.lines[0]} to {recording.lines[-1]}"

@@ -12,7 +12,9 @@ from unicodedata import normalize
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
+from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
+from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
@@ -144,14 +146,17 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     """
     try:
         if not path.is_file():
-            found = "a directory" if path.is_dir() else "no file"
-            raise BiogripError(f"{path}: found {found}, allowed is a text file with a trace.")
+            other = "no regular file" if path.exists() else "no file"
+            found = "a directory" if path.is_dir() else other
+            raise BiogripError(
+                f"{place(path)}: found {found}, allowed is a text file with a trace."
+            )
         with path.open(encoding="utf-8-sig", newline="") as stream:
             sizes, values, lines = _read(path, stream, columns)
     except UnicodeDecodeError as error:
         raise BiogripError(_not_text(path)) from error
     except OSError as error:
-        raise BiogripError(f"{path}: cannot be read: {error.strerror}.") from error
+        raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
     gaps = np.any(np.isnan(values), axis=1)
     kept, kept_lines = values[~gaps], lines[~gaps]
     without_number = len(lines) - len(kept_lines)
@@ -163,11 +168,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
     """Return where in a file something was found, as messages begin."""
-    where = str(path)
+    where = visible(path)
     if line is not None:
         where += f", line {line}"
     if column is not None:
-        where += f", column '{column}'"
+        where += f", column '{visible(column)}'"
     return where
 
 
@@ -295,7 +300,7 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
 
 def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
     if header is None:
-        raise BiogripError(f"{path}: found no header, allowed is a line with column names.")
+        raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
     wanted = (columns.time, columns.rotation)
     separator, names = _header(path, at[0], header, wanted)
     which = _said_by(columns.by_options, "time", "rotation")
@@ -353,7 +358,9 @@ def _blocks(
         rows = list(islice(_one_per_line(path, reader, at), _ROWS_AT_ONCE))
         count += len(rows)
         if count > MOST_ROWS:
-            raise BiogripError(f"{path}: found over {MOST_ROWS} rows, allowed are {MOST_ROWS}.")
+            raise BiogripError(
+                f"{place(path)}: found over {MOST_ROWS} rows, allowed are {MOST_ROWS}."
+            )
         if not rows:
             return
         yield rows
@@ -385,14 +392,15 @@ def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layou
         for column, index in layout.indices.items():
             if len(row) <= index:
                 raise BiogripError(
-                    f"{place(path, line, column)}: found only {len(row)} cells in the row, "
-                    f"allowed are the header's {layout.width}."
+                    f"{place(path, line, column)}: found only {counted(len(row), 'cell')} in the "
+                    f"row, allowed are the header's {layout.width}."
                 )
         # A separator at the end of every row is common, and harmless.
         if any(cell.strip() for cell in row[layout.width :]):
             raise BiogripError(
-                f"{place(path, line)}: found {len(row)} cells in the row, allowed are the "
-                f"header's {layout.width}. A decimal comma needs semicolons or tabs as separators."
+                f"{place(path, line)}: found {counted(len(row), 'cell')} in the row, allowed "
+                f"are the header's {layout.width}. A decimal comma needs semicolons or "
+                "tabs as separators."
             )
 
 
@@ -436,10 +444,10 @@ def _listed(names: list[str]) -> str:
 
 def _check_count(path: Path, columns: Columns, found: int, without_number: int) -> None:
     if found < FEWEST_SAMPLES:
-        gaps = f" ({without_number} rows hold NaN)" if without_number else ""
+        gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
         raise BiogripError(
-            f"{path}: found {found} rows with a number in both {columns.time} and "
-            f"{columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
+            f"{place(path)}: found {counted(found, 'row')} with a number in both "
+            f"{columns.time} and {columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
         )
 
 
@@ -464,4 +472,4 @@ def _not_text(path: Path) -> str:
         before = StringIO(content[: error.start].decode("utf-8") + "?", newline="")
         line, byte = sum(1 for _ in before), content[error.start]
         return f"{place(path, line)}: found the byte 0x{byte:02x}, allowed is text in UTF-8."
-    return f"{path}: changed while it was read."
+    return f"{place(path)}: changed while it was read."

@@ -80,7 +80,7 @@ def test_rows_of_a_recording_without_a_number_are_counted(
         recording.record(settings, trace, made)
         samples = len(read_measurements(made).time_s)
         said = capsys.readouterr().out
-        warned = f"{trace}: 3 of {samples + 3} rows hold no number and are left out."
+        warned = f"{trace}: Left out for want of a number: 3 rows of {samples + 3}."
         assert (warned in said) == bool(gaps)
         assert np.isfinite(read_measurements(made).rotation_rad[0]).all()
 

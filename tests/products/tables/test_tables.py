@@ -11,9 +11,10 @@ from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
 from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
+from biogrip.products.files.rows import inert
 from biogrip.products.tables.all_errors import all_errors
 from biogrip.products.tables.errors import ERRORS, Settings, errors
-from biogrip.products.tables.layout import Column, Table, inert, write
+from biogrip.products.tables.layout import Column, Table, write
 from tests.helpers.places import ROOT
 
 SETTINGS = Settings(

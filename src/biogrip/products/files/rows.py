@@ -1,16 +1,25 @@
 """Files of rows: CSV with a header, written whole, and read with the message that fits."""
 
 import csv
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from biogrip.errors import BiogripError
 from biogrip.files import written_whole
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+# What a spreadsheet computes as a formula, and what we have written of it.
+_FORMULA = re.compile(r"'*[=+@\t\r-]")
+_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
+
+_END = "\r\n"
 
 
 @dataclass(frozen=True)
@@ -53,11 +62,37 @@ class RowFile:
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a header and rows, as they come."""
-    with written_whole(path) as scratch, scratch.open("w", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(columns)
-        writer.writerows(rows)
+    """Write a header and rows, as they come, so that no cell is a formula to a spreadsheet."""
+    with (
+        written_whole(path) as scratch,
+        # Of a file's name, bytes may be no text.
+        scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
+    ):
+        writer = csv.writer(_Lines(stream), lineterminator=_END)
+        for row in chain((columns,), rows):
+            writer.writerow([inert(cell) if isinstance(cell, str) else cell for cell in row])
+
+
+class _Lines:
+    """Ends lines as we do, where cells with an end of line, of whatever kind, are in quotes."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, row: str) -> None:
+        """Write a row."""
+        self._stream.write(row.removesuffix(_END) + "\n")
+
+
+def inert(text: str) -> str:
+    """Return text that a spreadsheet takes for no formula, numbers with a sign as they are."""
+    return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
+
+
+def as_it_was(cell: Any) -> Any:
+    """Return the text of which `inert` has made another, and what is no text as it is."""
+    ours = isinstance(cell, str) and cell[:1] == "'" and _FORMULA.match(cell)
+    return cell[1:] if ours else cell
 
 
 def read_frame(
@@ -89,6 +124,9 @@ def read_frame(
         raise BiogripError(f"{path}: cannot be read as {what}: {error}.") from error
     if not set(columns) <= set(frame.columns):
         raise BiogripError(f"{path}, line 1: wanted the columns {', '.join(columns)}.")
+    for column in frame.columns:
+        if not pd.api.types.is_numeric_dtype(frame[column]):
+            frame[column] = frame[column].map(as_it_was)
     return frame
 
 
@@ -101,8 +139,8 @@ def read_rows(path: Path, wanted: Sequence[str] | None = None) -> list[list[str]
         If the file cannot be read, or its header is not the wanted one.
     """
     try:
-        with path.open(newline="") as stream:
-            rows = list(csv.reader(stream))
+        with path.open(encoding="utf-8", newline="") as stream:
+            rows = [[as_it_was(cell) for cell in row] for row in csv.reader(stream)]
     except (OSError, ValueError, csv.Error) as error:
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
     if not rows:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.products.files.parquet import column_names, read_columns, table_of, write_tables
 from biogrip.products.files.rows import write_rows
@@ -110,7 +111,9 @@ def _target_columns(path: Path) -> Array:
         raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
     if values.shape[1] != len(TARGET_COLUMNS):
         allowed = f"allowed are {len(TARGET_COLUMNS)}"
-        raise BiogripError(f"{path}: found {values.shape[1]} columns in the rows, {allowed}.")
+        raise BiogripError(
+            f"{path}: found {counted(values.shape[1], 'column')} in the rows, {allowed}."
+        )
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
         raise BiogripError(
             f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biogrip.digits import rounded, rounded_rise
+from biogrip.digits import rounded_numbers, rounded_rise
 from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
@@ -17,14 +17,20 @@ EXPECTED = "results/identifiability/expected/{case}.json"
 
 
 def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return a diagnosis as dictionaries, lists, text and numbers in SI units."""
+    """Return a diagnosis as dictionaries, lists, text and rounded numbers in SI units."""
+    data: dict[str, Any] = rounded_numbers(exact_data(diagnosis))
+    return data
+
+
+def exact_data(diagnosis: "Diagnosis") -> dict[str, Any]:
+    """Return what `diagnosis_data` does, with all digits but of rises: to be rounded once."""
     likelihood = diagnosis.likelihood
     return {
         "samples": likelihood.problem.residuals.samples,
-        "misfit_rad": rounded(likelihood.misfit_rad),
-        "noise_rad": rounded(likelihood.noise_rad),
-        "threshold": rounded(likelihood.threshold),
-        "certainty": rounded(likelihood.certainty),
+        "misfit_rad": likelihood.misfit_rad,
+        "noise_rad": likelihood.noise_rad,
+        "threshold": likelihood.threshold,
+        "certainty": likelihood.certainty,
         "quantities": [_finding(finding) for finding in diagnosis.findings],
         "trades": [
             {
@@ -34,13 +40,9 @@ def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
             }
             for trade in diagnosis.trades
         ],
-        "jaw_force": {key: _known(value) for key, value in vars(diagnosis.grip).items()},
+        "jaw_force": dict(vars(diagnosis.grip)),
         "notes": diagnosis.notes,
     }
-
-
-def _known(value: float | None) -> float | None:
-    return None if value is None else rounded(value)
 
 
 def read_verdicts(path: Path) -> dict[str, Any]:
@@ -66,15 +68,15 @@ def _finding(finding: "Finding") -> dict[str, Any]:
         "symbol": finding.quantity.symbol,
         "unit": finding.quantity.unit,
         "verdict": finding.verdict,
-        "value": rounded(finding.value),
-        "low": rounded(finding.low),
-        "high": rounded(finding.high),
-        "excluded": [[rounded(start), rounded(end)] for start, end in finding.gaps],
-        "deviation": rounded(finding.deviation),
+        "value": finding.value,
+        "low": finding.low,
+        "high": finding.high,
+        "excluded": [[start, end] for start, end in finding.gaps],
+        "deviation": finding.deviation,
         "provided": finding.quantity.provided,
         "in_words": finding.words(),
         "profile": {
-            "values": [rounded(float(value)) for value in np.exp(profile.log_values)],
+            "values": [float(value) for value in np.exp(profile.log_values)],
             "rises": [rounded_rise(float(rise)) for rise in profile.rises],
         },
     }

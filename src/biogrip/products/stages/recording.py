@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
@@ -13,7 +14,7 @@ from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.recordings import Columns, read_recording
+from biogrip.traces.recordings import Columns, place, read_recording
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
     """
     trace = read_checked(settings, recorded)
     for note in notes_on_gaps(trace):
-        warn(f"{recorded}: {note}")
+        warn(f"{place(recorded)}: {note}")
     write_measurements(measurements, trace)
 
 
@@ -64,8 +65,8 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
     trace, problem = read_recording(recorded, settings.columns), settings.problem
     if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
-            f"{recorded}: found {len(trace.time_s)} samples, allowed are at most {MOST_SAMPLES} "
-            "with a coloured noise model: average neighbouring ones."
+            f"{place(recorded)}: found {len(trace.time_s)} samples, allowed are at most "
+            f"{MOST_SAMPLES} with a coloured noise model: average neighbouring ones."
         )
     nuisance = problem.nuisance(trace.time_s)
     check_recording(
@@ -85,7 +86,8 @@ def notes_on_gaps(trace: Measurements) -> list[str]:
     samples = len(trace.time_s)
     if not trace.gaps:
         return []
-    return [f"{trace.gaps} of {samples + trace.gaps} rows hold no number and are left out."]
+    rows = counted(trace.gaps, "row")
+    return [f"Left out for want of a number: {rows} of {samples + trace.gaps}."]
 
 
 def check_traces(study: Study) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.digits import counted
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.identify.success import near_noise, near_noise_words, typical
@@ -102,8 +103,9 @@ def errors(settings: Settings, identifications: Path) -> Table:
             )
         )
     number = f"Table {truth.published.table}. " if truth.published.table is not None else ""
+    seeds = counted(len(found), "seed")
     caption = (
-        f"{number}{truth.title}: target and identified parameters over {len(found)} seeds. "
+        f"{number}{truth.title}: target and identified parameters over {seeds}. "
         f"{TYPICAL} Error = (target - identified) / target."
         if truth.parameters
         else f"{truth.title}: parameters identified in the recorded trace."

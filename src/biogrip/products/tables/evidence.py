@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from biogrip.digits import counted
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
 from biogrip.identify.genome import GeneRange
@@ -169,7 +170,9 @@ def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
     # Not the traces themselves are kept: of many seeds they are more than fits into memory.
     extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
     low, high = (1e3 * float(value) for value in np.median(extremes, axis=0))
-    remark = f"median of {len(extremes)} noisy traces; the paper's is the end of its axis"
+    remark = (
+        f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
+    )
     return [
         (
             f"{case.title}: smallest sample",

@@ -1,7 +1,6 @@
 """How a table looks: the same numbers as CSV to compute with and as text to read."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -10,11 +9,9 @@ from pathlib import Path
 import pandas as pd
 
 from biogrip.files import write_text
+from biogrip.products.files.rows import write_rows
 
 Cell = str | float | int | None
-
-_FORMULA = re.compile(r"[=+@\t\r-]")
-_SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 
 
 @dataclass(frozen=True)
@@ -56,8 +53,6 @@ def write(table: Table, output: Path) -> None:
 
     To read, it has no columns in which there is nothing.
     """
-    names = [column.name for column in table.columns]
-    raw = pd.DataFrame([[inert(_text(c, 6)) for c in row] for row in table.rows], columns=names)
     shown = pd.DataFrame(
         [
             [_text(cell, column.digits) for cell, column in zip(row, table.columns, strict=True)]
@@ -76,7 +71,8 @@ def write(table: Table, output: Path) -> None:
         label=f"tab:{output.stem}",
         column_format="l" * shown.shape[1],
     )
-    write_text(output, raw.to_csv(index=False, lineterminator="\n"))
+    names = [column.name for column in table.columns]
+    write_rows(output, names, ([_text(cell, 6) for cell in row] for row in table.rows))
     write_text(output.with_suffix(".md"), f"{table.caption}\n\n{markdown}\n")
     write_text(output.with_suffix(".tex"), latex)
     write_text(output.with_suffix(".html"), _page(table.caption, shown))
@@ -91,11 +87,6 @@ def _text(cell: Cell, digits: int) -> str:
         shown = float(f"{cell:.6g}")
         return f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
     return str(cell)
-
-
-def inert(text: str) -> str:
-    """Return text that a spreadsheet takes for no formula, numbers with a sign as they are."""
-    return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
 
 
 def _without_bars(text: str) -> str:

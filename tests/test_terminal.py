@@ -1,0 +1,160 @@
+"""What reaches a terminal: nothing that it obeys but our own, and nothing where it is closed."""
+
+import csv
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from biogrip import progress
+from biogrip.cli import main
+from biogrip.terminal import visible, visible_lines
+from tests.helpers.places import EXAMPLE
+
+FEW = """
+least_squares: {candidates: 100, starts: 4}
+model_selection: {models: [damper, maxwell]}
+"""
+# A colour, the title of a window, a line that is cleared, text that runs from right to left.
+HOSTILE = "\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
+OBEYED = re.compile("[^\n -~\xa1-\u200d\u2010-\u2027\u2030-\u2065\u2070-\ud7ff]")
+# Of these, what a cell of a table may hold.
+FOUND = HOSTILE.replace("\r", "")
+
+
+def test_text_is_shown_as_it_is_but_for_what_a_terminal_obeys() -> None:
+    assert visible("k (µN) ≥ 2, “é” 細胞") == "k (µN) ≥ 2, “é” 細胞"
+    shown = r"\x1b[31m\x9b2J\x1b]0;x\x07\r\u202ea\x7f"
+    assert visible(HOSTILE) == visible(visible(HOSTILE)) == shown
+    assert visible("a\tb\nc\u2028d\udcffe") == r"a\tb\nc\u2028d\udcffe"
+    assert visible_lines("a\n\x1bb\n") == "a\n\\x1bb\n"
+    for number in (
+        *range(0x20),
+        *range(0x7F, 0xA0),
+        *range(0x202A, 0x202F),
+        *range(0x2066, 0x206A),
+    ):
+        assert visible(chr(number)).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "said"),
+    [
+        ("time_s,rotation_rad", f"1,{FOUND}", f"found '{visible(FOUND)}'"),
+        (f"time_s,{FOUND}", "1,2", f"allowed are time_s, {visible(FOUND)}"),
+    ],
+)
+def test_a_message_shows_what_was_found(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], header: str, row: str, said: str
+) -> None:
+    trace = tmp_path / f"a{HOSTILE}\nb.csv"
+    trace.write_text(f"{header}\n{row}\n", newline="\n")
+    assert main(["identify", str(trace)]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"biogrip: {visible(trace)}, line ")
+    assert said in error
+    assert not OBEYED.search(error)
+    assert error.count("\n") == 1
+
+
+def test_what_was_typed_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["identify", "a.csv", f"--{HOSTILE}"])
+    error = capsys.readouterr().err
+    assert f"unrecognized arguments: --{visible(HOSTILE)}" in error
+    assert not OBEYED.search(error)
+
+
+def test_names_of_traces_are_shown_wherever_they_are_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, page = tmp_path / "few.yaml", tmp_path / "page.html"
+    config.write_text(FEW)
+    good, bad, absent = (tmp_path / f"{name}{HOSTILE}\n.csv" for name in ("good", "bad", "absent"))
+    shutil.copy(EXAMPLE, good)
+    bad.write_text("time_s,rotation_rad\n1,high\n")
+    options = ["--config", str(config)]
+    several = [*map(str, (good, bad, absent)), "--report", str(page)]
+    for arguments, status in ((several, 1), ([str(good)], 0)):
+        assert main(["identify", *arguments, *options]) == status
+        said = capsys.readouterr()
+        for text in said:
+            assert not OBEYED.search(text)
+        assert visible(good) in said.out
+        assert f"{visible(good.with_suffix('.identified.json'))}" in said.out
+        if arguments is several:
+            assert said.err.splitlines() == [f"1 of 2: {visible(good)}", f"2 of 2: {visible(bad)}"]
+            assert f"  {visible(bad)}, line 2, column" in said.out
+            assert f"  TRACE: found '{visible(absent)}'"[:200] in said.out
+    assert json.loads(good.with_suffix(".identified.json").read_text())["trace"] == str(good)
+    assert f">{visible(good)}<" in page.read_text()
+
+
+def test_names_of_cells_groups_and_their_traces_are_shown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    config, table = tmp_path / "few.yaml", tmp_path / f"{FOUND}.csv"
+    config.write_text(FEW)
+    shutil.copy(EXAMPLE, tmp_path / f"a{FOUND}.csv")
+    rows = [["file", "cell", "group"], [f"b{FOUND}.csv", "b", "c"]]
+    arguments = ["groups", str(table), "--config", str(config)]
+    _write(table, rows)
+    assert main(arguments) == 1
+    error = capsys.readouterr().err
+    assert f"none of its traces can be used; the first: TRACE: found '{visible(tmp_path)}" in error
+    assert not OBEYED.search(error)
+    _write(table, [*rows, [f"a{FOUND}.csv", f"cell {FOUND}", f"group {FOUND}"]])
+    assert main(arguments) == 1
+    said = capsys.readouterr().out
+    for text in (f"cell {FOUND} (group {FOUND})", f"  a{FOUND}.csv: noise", f"b{FOUND}.csv', all"):
+        assert visible(text) in said
+    assert not OBEYED.search(said)
+    (skipped,) = json.loads(table.with_suffix(".compared.json").read_text())["skipped"]
+    assert skipped["trace"] == str(tmp_path / f"b{FOUND}.csv")
+
+
+def _write(table: Path, rows: list[list[str]]) -> None:
+    with table.open("w", newline="") as stream:
+        csv.writer(stream).writerows(rows)
+
+
+def test_progress_and_warnings_are_shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "_EVERY_S", 0.0)
+    with progress.Progress(HOSTILE, 1) as told:
+        told.doing(f"cell {HOSTILE}")
+        told.done()
+    progress.warn(f"{HOSTILE}: a note")
+    for text in capsys.readouterr():
+        assert visible(HOSTILE) in text or not text
+        assert not OBEYED.search(text)
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [("verify .", 1), ("clean .", 0), ("identify a.csv --config few.yaml", 0), ("design", 2)],
+)
+def test_a_command_may_have_nobody_to_talk_to(
+    tmp_path: Path, arguments: str, status: int, closed: str
+) -> None:
+    """And what it would have said is in no file."""
+    shutil.copy(EXAMPLE, tmp_path / "a.csv")
+    (tmp_path / "few.yaml").write_text(FEW)
+    command = f'"$0" -m biogrip {arguments} {closed}'
+    done = subprocess.run(
+        ["sh", "-c", command, sys.executable],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == status
+    assert "Traceback" not in done.stdout + done.stderr
+    for output in tmp_path.glob("*.json"):
+        assert json.loads(output.read_text())["written_by_biogrip"]
