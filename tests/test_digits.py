@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from biogrip.digits import counted
+from biogrip.digits import counted, rounded
 from biogrip.identifiability.whiteness import doubts_about_noise
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages.recording import notes_on_gaps
@@ -24,3 +24,17 @@ def test_notes_on_one_of_something_are_sentences() -> None:
     residual[30] = 30.0
     said = " ".join(doubts_about_noise(residual))
     assert "from the samples around: 1 outlier, as of Gaussian noise once in" in said
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [(1.16499, 1.16499), (1.164996, 1.164996), (1.165, 1.165), (1.2345678, 1.2346), (None, None)],
+)
+def test_what_is_rounded_again_comes_out_as_if_once(value: float, found: float) -> None:
+    assert rounded(value) == found
+    assert value is None or f"{rounded(value):.3g}" == f"{value:.3g}"
+
+
+def test_a_value_on_the_edge_keeps_few_digits() -> None:
+    """Where last bits of a processor would decide, digits end somewhere."""
+    assert rounded(1.165 - 1e-14) == 1.165

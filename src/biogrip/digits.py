@@ -8,6 +8,7 @@ from biogrip.arrays import Array
 
 # Far more than is determined, far fewer than those in which processors differ.
 _DIGITS = 5
+_MOST_DIGITS = 9
 # Fits know chi^2 to 0.001; in what lies below, processors may differ.
 _RISE_DECIMALS = 2
 
@@ -17,8 +18,17 @@ _TENS = np.array([float(f"1e{exponent}") for exponent in range(-_LARGEST, _LARGE
 
 
 def rounded(value: float | None) -> float | None:
-    """Return a number to five significant digits."""
-    return None if value is None else float(f"{value:.{_DIGITS}g}")
+    """Return a number to five significant digits, or more where it would later round otherwise.
+
+    What is 1.16499 is 1.16 to three digits, and what is 1.165 is not.
+    """
+    if value is None:
+        return None
+    for digits in range(_DIGITS, _MOST_DIGITS):
+        found = float(f"{value:.{digits}g}")
+        if all(f"{found:.{few}g}" == f"{value:.{few}g}" for few in range(2, _DIGITS)):
+            return found
+    return float(f"{value:.{_DIGITS}g}")
 
 
 def rounded_numbers(data: Any) -> Any:

@@ -219,4 +219,4 @@ def test_a_difference_is_shown_and_fails(finished: Path, tmp_path: Path) -> None
         assert word in row
     same = biogrip(tmp_path, "compare", now, now)
     assert same.returncode == 0
-    assert "byte for byte" in same.stdout
+    assert "the same bytes" in same.stdout
