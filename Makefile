@@ -33,13 +33,10 @@ test: $(READY)
 	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
 
 # A small study and the quick tests, weekly and before a release: with the oldest versions that
-# pyproject.toml allows, and with whichever other Pythons there are.
+# pyproject.toml allows, and with whichever other Pythons there are, at least one.
 test-lowest:
 	$(PYTHON) -m venv --clear .venv-lowest
-	.venv-lowest/bin/python -m pip install --quiet uv
-	.venv-lowest/bin/uv pip compile pyproject.toml --extra dev --extra bench --resolution lowest-direct \
-	  --quiet --no-header --output-file .venv-lowest/lowest.txt
-	.venv-lowest/bin/python -m pip install --quiet -r .venv-lowest/lowest.txt
+	.venv-lowest/bin/python -m pip install --quiet --require-hashes -r requirements-lowest.lock
 	.venv-lowest/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
 	.venv-lowest/bin/ruff check .
 	.venv-lowest/bin/ruff format --check .
@@ -47,13 +44,17 @@ test-lowest:
 	.venv-lowest/bin/python -m pytest -q -n $(JOBS) $(QUICK)
 
 test-pythons:
+	ran=; \
 	for version in 3.12 3.13; do \
-	  python$$version --version || continue; \
+	  python$$version --version || { echo "test-pythons: skipped Python $$version, which is not there" >&2; continue; }; \
 	  python$$version -m venv --clear .venv-$$version && \
 	  .venv-$$version/bin/python -m pip install --quiet --require-hashes -r requirements.lock && \
 	  .venv-$$version/bin/python -m pip install --quiet --no-deps --no-build-isolation -e . && \
 	  .venv-$$version/bin/python -m pytest -q -n $(JOBS) $(QUICK) || exit 1; \
-	done
+	  ran="$$ran $$version"; \
+	done; \
+	test -n "$$ran" || { echo "test-pythons: nothing ran" >&2; exit 1; }; \
+	echo "test-pythons: ran with Python$$ran"
 
 # Every result read again, and held against the record of what was written.
 verify: $(READY)
@@ -115,6 +116,7 @@ lock:
 	$(subst 3.11,3.12,$(LOCK)) pyproject.toml benchmarks/field/requirements.in \
 	  --output-file benchmarks/field/requirements.lock
 	$(LOCK) --group docs --output-file docs/requirements.lock
+	$(LOCK) pyproject.toml --extra dev --extra bench --resolution lowest-direct --output-file requirements-lowest.lock
 
 # Of the results only what the study wrote.
 clean:

@@ -2,7 +2,7 @@
 
 from snakemake.utils import min_version
 
-min_version("9.10")
+min_version("9.11")
 
 
 report: "workflow/report/study.rst"

@@ -1,8 +1,10 @@
 """Populations of cells, against other programs' formulas, limiting cases and simulations."""
 
+from itertools import pairwise, product
+
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import integrate, special, stats
 
 from biogrip.arrays import Array
 from biogrip.groups.comparison import adjusted, difference
@@ -161,6 +163,44 @@ def test_power_is_the_noncentral_t() -> None:
     assert cells_needed(100.0, 0.8, 0.1, 0.0) == 3
     seen = ratio_seen(12, 0.8, 0.3, 0.1)
     assert power(seen, 12, 0.3, 0.1) == pytest.approx(0.8, abs=1e-6)
+
+
+def test_power_is_a_mean_of_normal_probabilities() -> None:
+    """Over chi-squared, from a difference that hardly shows to one that cannot be missed."""
+    for cells, ratio, confidence in product((2, 3, 8, 40), (1.01, 1.4, 3), (0.5, 0.99)):
+        freedom, middle = 2 * (cells - 1), np.log(ratio) / 0.1 * np.sqrt(cells / 2)
+        limit = stats.t.ppf((1 + confidence) / 2, freedom)
+
+        def missed(
+            v: float, freedom: int = freedom, middle: float = middle, limit: float = limit
+        ) -> float:
+            reach = limit * np.sqrt(v / freedom)
+            inside = special.ndtr(reach - middle) - special.ndtr(-reach - middle)
+            return inside * stats.chi2.pdf(v, freedom)
+
+        widths = freedom + np.sqrt(2 * freedom) * np.array([-3, -1, 0, 1, 3, 6, 12])
+        between = [0, *widths[widths > 0], 20 * freedom + 100]
+        lost = sum(integrate.quad(missed, *ends, epsabs=1e-13)[0] for ends in pairwise(between))
+        assert power(ratio, cells, 0.1, 0.0, confidence) == pytest.approx(1 - lost, abs=1e-9)
+
+
+@pytest.mark.parametrize("spread", [0.01, 0.1, 0.3, 1.0])
+@pytest.mark.parametrize("ratio", [1.02, 1.2, 3.0, 1e6])
+def test_enough_cells_are_found_for_every_difference(ratio: float, spread: float) -> None:
+    enough = cells_needed(ratio, 0.8, spread, 0.0)
+    assert power(ratio, enough, spread, 0.0) >= 0.8
+    assert enough == 3 or power(ratio, enough - 1, spread, 0.0) < 0.8
+    # More cells never show less, nor anything but a probability.
+    powers = [power(ratio, enough * 2**k, spread, 0.0) for k in range(8)]
+    assert np.all(np.diff(powers) > -1e-12)
+    assert powers[-1] <= 1 + 1e-12
+
+
+@pytest.mark.parametrize("wanted", [0.1, 0.8, 0.99])
+@pytest.mark.parametrize("cells", [2, 3, 20, 1000])
+def test_the_ratio_seen_has_the_power_wanted(cells: int, wanted: float) -> None:
+    seen = ratio_seen(cells, wanted, 0.3, 0.1)
+    assert power(seen, cells, 0.3, 0.1) == pytest.approx(wanted, abs=1e-9)
 
 
 @pytest.mark.parametrize(

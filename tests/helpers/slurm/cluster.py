@@ -102,6 +102,9 @@ def _configure(folder: Path) -> dict[str, str]:
             node_port=_free_port(),
         )
     )
+    # slurmd sets up cgroups even if nothing uses them: of the second version at once, which takes
+    # root, and outside the folder; of the first when they are used.
+    (folder / "cgroup.conf").write_text("CgroupPlugin=cgroup/v1\n")
     return {
         **os.environ,
         "PATH": os.pathsep.join([str(programs), PATH]),
