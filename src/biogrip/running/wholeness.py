@@ -3,7 +3,8 @@
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
@@ -51,13 +52,11 @@ def hold_against_record(
     def checked(*args: Any, **kwargs: Any) -> Any:
         kind = kwargs["executor_plugin"].common_settings
         if not kind.touch_exec:
-            try:
+            with _said_and_ended():
                 check_results(results, asked(), may_make, changing=not kind.dryrun_exec)
                 if not kind.dryrun_exec:
                     release_dead_locks(Path(".snakemake"))
                     begin()
-            except BiogripError as error:
-                sys.exit(f"biogrip: {visible_lines(error)}")
         ended = execute(*args, **kwargs)
         if not kind.dryrun_exec:
             _say_what_else_is_there(results, asked())
@@ -68,11 +67,21 @@ def hold_against_record(
 
         Snakemake knows of settings what it has noted itself, beside the results.
         """
-        stale = made_otherwise(Manifest(results))
-        workflow.dag.forcefiles.update(f"{results}/{name}" for name in stale)
+        with _said_and_ended():
+            stale = made_otherwise(Manifest(results))
+            workflow.dag.forcefiles.update(f"{results}/{name}" for name in stale)
         return build()
 
     workflow.execute, workflow._build_dag = checked, forced
+
+
+@contextmanager
+def _said_and_ended() -> Iterator[None]:
+    """End with the message of an error alone: this keeps Snakemake's stack out of it."""
+    try:
+        yield
+    except BiogripError as error:
+        sys.exit(f"biogrip: {visible_lines(error)}")
 
 
 def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
