@@ -151,7 +151,8 @@ def _in_turn(
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = gripper_functions(posed, time_s, found.parameters)
+        inertia = problem.residuals.inertia
+        uncertain = gripper_functions(posed, time_s, found.parameters, inertia=inertia)
         left = problem.residuals.free - len(found.parameters)
         noise_rad = posed.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
         before: Colour | None = colour
@@ -160,7 +161,6 @@ def _in_turn(
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = ColourLikelihood(time_s, residual, directions)
             colour = likelihood.best(near=before)
-        inertia = problem.residuals.inertia
         condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, inertia=inertia)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))
