@@ -54,7 +54,7 @@ def identify(
         If an option or the config cannot be used, or the only trace cannot.
     """
     if output is not None and len(traces) > 1:
-        raise BiogripError("--output: allowed with one trace only; each of several gets a file beside it.")
+        raise BiogripError("--output: only for one trace; each of several gets its own file.")
     if len(traces) == 1:
         check_trace_file(traces[0])
     problems = {trace: trace_file_problem(trace) for trace in traces}
