@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 RESULTS = Path("results")
 _SHOWN = 200
 
-# Imports stay inside their command: a job pays only for what it uses.
+# Imports are inside the commands, so that jobs import only what they use.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return its exit status."""
+    """Run the command line, and return its exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = _parser()
     if given[:1] == ["run"] and not {"-h", "--help"} & set(given):
-        # What follows is for Snakemake to read.
+        # All other arguments are for Snakemake.
         options = parser.parse_args(given[:1])
         options.rest = given[1:]
     else:
         options = parser.parse_args(given)
-    # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
+    # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # What a person writes elsewhere is theirs to replace.
+        # Protect only files inside a study's results.
         with watched(_refuse_others) if options.recorded else nullcontext():
             options.command(options)
             sys.stdout.flush()
@@ -44,11 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # Whoever was reading has gone. Python would say so once more on its way out.
+        # The reader has closed the pipe. Python would report that again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except OSError as error:
-        # What only the system knows of a path: no permission, too long a name, ...
+        # Errors of the operating system: no permission, a name too long, ...
         place = "" if error.filename is None else f"{visible(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse_others(path: Path, scratch: Path) -> None:
-    """Refuse to replace what the study has no record of; Snakemake has removed what it has."""
+    """Refuse to replace files without a record; Snakemake has removed those that have one."""
     if os.path.lexists(path):
         from biogrip.running.manifest import Manifest
         from biogrip.running.wholeness import refuse_others
@@ -65,10 +65,10 @@ def _refuse_others(path: Path, scratch: Path) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong with a command so that a terminal obeys nothing that was typed."""
+    """Argument parser whose error messages are safe to print on a terminal."""
 
     def error(self, message: str) -> NoReturn:
-        """Refuse a command."""
+        """Print a usage error and exit."""
         super().error(visible_lines(message))
 
 
@@ -204,7 +204,7 @@ def _design_parser(stages: Any) -> None:
 
 
 def _reading_options(command: argparse.ArgumentParser) -> None:
-    """Add what tells how recorded traces are to be read, and what the instrument added."""
+    """Add options for columns, noise and nuisance terms of recorded traces."""
     command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
     command.add_argument(
         "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
@@ -217,7 +217,7 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:
-    """Add what tells how recorded traces are to be read and identified."""
+    """Add options for reading and identifying recorded traces."""
     _reading_options(command)
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
