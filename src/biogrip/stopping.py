@@ -52,4 +52,4 @@ def end_at_once(number: int, line: str) -> None:
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    end_at_once(number, f"{_SAID[signal.Signals(number)]}; nothing was written by halves.")
+    end_at_once(number, f"{_SAID[signal.Signals(number)]}; no file was left half-written.")

@@ -68,7 +68,7 @@ class HeatMaps:
 
 
 def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
-    """Choose what the table and the heat maps of a sweep depend on."""
+    """Return the settings that the table and the heat maps of a sweep depend on."""
     titles = {name: study.cases[name].title for name in sweep.cases}
     return HeatMaps(
         sweep.title,

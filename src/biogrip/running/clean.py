@@ -51,5 +51,5 @@ def clean(results: Path) -> str:
     for folder in sorted({*folders, results / JOURNALS}, key=lambda f: -len(f.parts)):
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
-    kept = f" Kept, for they were edited: {', '.join(map(str, left))}." if left else ""
+    kept = f" Kept, as they were edited: {', '.join(map(str, left))}." if left else ""
     return f"{counted(len(written), 'file')} of {results} removed.{kept}"

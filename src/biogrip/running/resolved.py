@@ -56,7 +56,7 @@ def read_study(results: Path) -> Study:
         return study
     except FileNotFoundError as error:
         raise BiogripError(
-            f"{file}: there is none, for no study was run here; allowed is what a run has begun."
+            f"{file}: there is none, as no study was run here; allowed is what a run has begun."
         ) from error
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise BiogripError(f"{file}: cannot be read as a study: {error!r}.") from error

@@ -36,7 +36,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the profiles of a case depend on."""
+    """Return the settings that the profiles of a case depend on."""
     return Settings(case.title, case.parameters)
 
 

@@ -67,7 +67,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's intervals depend on."""
+    """Return the settings that a case's intervals depend on."""
     case = study.case(job["case"])
     return Settings(
         study.study_seed,

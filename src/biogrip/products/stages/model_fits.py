@@ -43,7 +43,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the fits of a case depend on."""
+    """Return the settings that the fits of a case depend on."""
     case = study.case(job["case"])
     fits, models = case.method("least_squares"), study.models_of(case)
     assert isinstance(fits, LeastSquaresSettings)

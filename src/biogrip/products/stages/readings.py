@@ -61,7 +61,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's readings depend on."""
+    """Return the settings that a case's readings depend on."""
     name = job["case"]
     readings = {reading: _reading(cases[name]) for reading, cases in study.readings.items()}
     return Settings(study.study_seed, name, study.case(name).seeds, readings)

@@ -103,9 +103,9 @@ def _say_if_contact_is_lost(settings: Settings, network: Network, torque: Torque
     if words is None:
         return
     then = (
-        "they leave it there, which its identification does not know"
+        "contact is lost there, which its identification ignores"
         if settings.unilateral
-        else "unless it sticks to them, contact is lost there (contact: unilateral simulates that)"
+        else "without adhesion contact is lost there (contact: unilateral simulates that)"
     )
     warn(f"{settings.case}: under this protocol {words}; {then}.")
 

@@ -107,12 +107,12 @@ def contact_loss(settings: Settings) -> Table:
         for row in _rows(settings.study_seed, name, case)
     ]
     caption = (
-        "Cases in which the jaws would have to pull: what least squares identifies, on the "
-        "assumption that they hold the sample, in traces in which they do, in traces in which they "
-        "let go where the force reaches zero, and in the samples of the latter up to there. "
+        "Cases in which the jaws would have to pull: what least squares identifies, assuming "
+        "bilateral contact, in traces with bilateral contact, in traces with loss of contact where "
+        "the force reaches zero, and in the readings of the latter before the loss. "
         f"Medians over the same noise of at most {_MOST_SEEDS} seeds; the misfit is over the RMS "
-        "of the noise. Errors are (target - identified)/target; empty if there is no meaning in "
-        f"them, beyond {_MEANS_LITTLE:g} %."
+        "of the noise. Errors are (target - identified)/target; empty beyond "
+        f"{_MEANS_LITTLE:g} %."
     )
     return Table(caption, _COLUMNS, rows)
 

@@ -123,14 +123,13 @@ def coverage(
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
-        "often the intervals hold the truth. The bound is that of a simpler problem, and none of "
-        "the one that is fitted: parameters of which the traces carry no information are taken as "
-        "known. Fits have to find these too; they can only be too large, near zero as they are, "
-        "and what they take is missing elsewhere: hence the bias, and a spread above the bound. "
-        "Rest known: the spread with these parameters at their true values. On the right: what "
-        f"users are shown, verdicts from whole profiles, in every {EVERY}th seed, and how many of "
-        "them are true; a limit on one side is an end of the interval with two, and holds more "
-        "often than the confidence says."
+        "often the intervals hold the truth. The bound is for a simpler problem than that of the "
+        "fits: parameters without information in the traces are fixed. Fits search these too; as "
+        "they are near zero they can only be overestimated, at the expense of others: hence the "
+        "bias, and a spread above the bound. Rest known: the spread with these parameters at "
+        "their true values. On the right: verdicts from whole profiles, as users are shown them, "
+        f"in every {EVERY}th seed, and how many of them are true; one-sided limits hold more often "
+        "than the confidence says."
     )
     return Table(caption, _COLUMNS, rows)
 

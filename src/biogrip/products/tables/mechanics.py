@@ -57,7 +57,7 @@ class CaseSettings:
 
 
 def settings_of(case: Case) -> CaseSettings:
-    """Choose what a case's mechanics depend on."""
+    """Return the settings that a case's mechanics depend on."""
     return CaseSettings(
         case.title,
         case.gripper,

@@ -68,8 +68,8 @@ def sequential(settings: Mapping[str, tuple[int, float]], rows: list[Path]) -> T
         "for the true values, again and again. A quantity counts as known where its interval of "
         f"{confidence} %, from the profile likelihood, has two ends and is no wider than "
         f"{100 * WELL:g} % to each side; all are where each of them is. Intervals with one end "
-        "count, too, among those that hold the truth. A best fit is missed if one from the truth "
-        "goes deeper."
+        "count, too, among those that hold the truth. A best fit is missed if a fit from the "
+        "truth has a lower chi-squared."
     )
     return Table(caption, _COLUMNS, lines)
 

@@ -81,12 +81,11 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
         for trade in found["trades"]
     )
     caption = (
-        f"{settings.title}: what the trace of one seed tells, from profile likelihoods.{trades} "
-        "Limits are the ends of an interval with two; one that stands alone holds with "
-        f"{50 * (1 + found['confidence']):g} %."
+        f"{settings.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
+        f"One-sided limits hold with {50 * (1 + found['confidence']):g} % confidence."
     )
     if others:
-        caption += " Expected: the same of the trace without noise, held against its noise."
+        caption += " Expected: the same for the trace without noise, judged at the noise level."
     percent = f"{100 * found['confidence']:g} %"
     columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _COLUMNS)
     return Table(caption, columns, rows)
