@@ -111,7 +111,7 @@ def _reweighted(
     x = np.log(found.parameters)
     free, shared = joint.residuals.free, len(x)
     for _ in range(_MOST_ROUNDS):
-        # Each trace loses a share of the degrees of freedom of the shared parameters.
+        # The shared parameters take a share of each trace's degrees of freedom.
         left = [problem.residuals.free * (1 - shared / free) for problem in problems]
         sums = [_square_sum(problem, x) for problem in problems]
         before, levels = levels, [sqrt(s / own) for s, own in zip(sums, left, strict=True)]

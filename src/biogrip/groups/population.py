@@ -36,7 +36,7 @@ FEWEST_CELLS = 3
 """Fewest cells for a population: with two, the 95 % interval of the median would reach six
 times their distance to either side."""
 
-# The iteration for tau starts at the smallest error and at most doubles it per step.
+# Iterations for tau, which may start many doublings below its value.
 _MOST_STEPS = 500
 
 

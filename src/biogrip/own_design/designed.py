@@ -60,7 +60,7 @@ def designed(
     study_seed
         Seed of the random search.
     progress
-        Function that is told the number of torques tried and the lowest typical relative bound.
+        Callback with the number of torques tried and the lowest typical relative bound.
     earlier
         Information from earlier traces. All bounds then include it, the first ones assuming that
         the config's experiment is repeated.

@@ -32,7 +32,7 @@ def second_opinion(
     told
         Diagnosis without the added terms.
     progress
-        Function that is told of the fit's progress.
+        Callback for progress.
 
     Returns
     -------

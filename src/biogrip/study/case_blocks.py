@@ -67,7 +67,7 @@ class Equations:
 class Identifiability:
     """Settings of the identifiability analysis."""
 
-    confidence: Annotated[float, Key("Confidence of all intervals.", low=0.5, high=0.99)]
+    confidence: Annotated[float, Key("Confidence level of all intervals.", low=0.5, high=0.99)]
     coverage_seeds: Annotated[
         int,
         Key(
@@ -101,8 +101,8 @@ class Shared:
     posterior: Annotated[
         PosteriorSettings | None,
         Key(
-            "The posterior of the first trace, sampled if this block is there, even an empty one, "
-            "`{}`."
+            "Settings of posterior sampling for the first trace; it is sampled if this block is "
+            "there, even an empty one, `{}`."
         ),
     ] = None
 
@@ -120,28 +120,28 @@ class CaseBlock(Shared):
     ] = None
     sample: Annotated[SampleBlock, Key()]
     published: Annotated[
-        Published | None, Key("What the paper reports of this sample; data to compare with.")
+        Published | None, Key("Results that the paper reports for this sample, to compare with.")
     ] = None
     fixed: Annotated[
         Mapping[str, Annotated[float, Key(low=0, high=LARGEST_PARAMETER)]] | None,
-        Key("Parameters that are known and not identified, by name, with their values."),
+        Key("Known values of parameters, by name; these are not identified."),
     ] = None
     contact: Annotated[
         str | None,
         Key(
-            "`bilateral`: the jaws hold the sample even where they have to pull it (it sticks), as "
-            "the paper's equations have it; `unilateral`: where the force reaches zero they leave "
-            "it, it recovers by itself and may be met again. Of the target alone, whose model is "
-            "linear; identification always takes contact for bilateral. By default bilateral.",
+            "`bilateral`: the jaws can pull the sample (adhesion), as in the paper's equations; "
+            "`unilateral`: contact is lost where the force reaches zero, the free sample recovers, "
+            "and contact may return. It holds for the target only, whose model must be linear; "
+            "identification always assumes bilateral contact. By default bilateral.",
             choices=("bilateral", "unilateral"),
         ),
     ] = None
     assumed_gripper: Annotated[
         Mapping[str, Any] | str | None,
         Key(
-            "The gripper that the identification believes in, where it differs from the true one: "
-            "keys of a gripper block (its angle being the one at contact), or `calibrated` for "
-            "what a no-load test of the true one finds."
+            "Gripper that the identification assumes, if it differs from the true one: keys of a "
+            "gripper block (with the angle at contact), or `calibrated` for the result of a "
+            "no-load test."
         ),
     ] = None
 

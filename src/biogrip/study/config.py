@@ -55,7 +55,7 @@ class Evaluation:
         float,
         Key(
             "A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by "
-            "at most this. One is what moving a parameter by its standard deviation costs.",
+            "at most this. A change of one parameter by its standard deviation raises χ² by one.",
             above=0,
             high=100,
         ),
@@ -109,7 +109,7 @@ class StudyConfig(Shared):
     methods: Annotated[
         tuple[Annotated[str, Key(choices=tuple(METHODS))], ...],
         Key(
-            "Identifiers that every trace is given to. Tables 5-7 and the figures of single fits "
+            "Identification methods applied to every trace. Tables 5-7 and figures of single fits "
             "show the first.",
             fewest=1,
             most=100,
@@ -138,8 +138,7 @@ class StudyConfig(Shared):
     only: Annotated[
         tuple[str, ...],
         Key(
-            "Names of the cases that the study has, the others being left out. If it is not "
-            "given, all that stand under `cases`.",
+            "Names of the cases to run; the others are left out. By default all under `cases`.",
             fewest=1,
             most=_MOST_CASES,
             unique=True,
@@ -149,7 +148,7 @@ class StudyConfig(Shared):
         Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
         Key(
             f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points together. "
-            "Every point is a case like another, but for the two values; it is identified, and "
+            "Every point is a case that differs in two values; it is identified like others, and "
             "shown in heat maps and their table only."
         ),
     ] = field(default_factory=dict)

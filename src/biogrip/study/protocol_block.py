@@ -51,9 +51,9 @@ class PhaseBlock:
     voltage_V: Annotated[
         float | None,
         Key(
-            "Voltage on both comb drives, instead of torque_Nm. As in the paper it is turned into "
-            "grip torque by eq. (9) and counted from contact; what closes the jaws onto a sample "
-            "comes on top.",
+            "Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts "
+            "it to grip torque, counted from contact; the voltage that closes the jaws onto a "
+            "sample comes on top.",
             "V",
             low=0,
             high=1e4,
@@ -87,7 +87,7 @@ class PhaseBlock:
 
     @property
     def drives(self) -> bool:
-        """True if the phase has any torque or voltage."""
+        """True if any torque or voltage of the phase is above zero."""
         torques = self.torque_Nm, self.to_torque_Nm, self.torque_right_Nm
         return any((*torques, self.voltage_V, self.to_voltage_V, self.voltage_right_V))
 

@@ -52,7 +52,7 @@ FALSE_ALARM = 1e-3
 # Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-6, 0.1, 10.0)
-# Log-likelihood ratio, times two, above which the other sign is accepted.
+# Log-likelihood ratio, times two, above which a trace counts as mirrored.
 _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
 # Norm below which a constant lies in the span of offset and drift.
 _NO_CONSTANT = 1e-6

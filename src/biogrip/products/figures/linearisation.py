@@ -40,7 +40,7 @@ def settings(study: Study) -> Settings:
 
 
 def draw(settings: Settings, differences: Path) -> Figure:
-    """Draw the difference for the last case at twenty times the torque, and maps for all.
+    """Draw the difference for the last case at twenty times the torque, and maps of a few.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ def draw(settings: Settings) -> Figure:
 
 
 def _joints(gripper: Gripper, closing_rad: float = 0.0) -> dict[str, tuple[float, float]]:
-    """Positions in millimetres of the four joints, both arms closed by an angle."""
+    """Return positions of the four joints in millimetres, with both arms closed by an angle."""
     length, angle = (
         1e3 * gripper.arm_length_m,
         math.radians(gripper.reference_angle_deg),
@@ -166,7 +166,7 @@ def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
 
 
 def _networks(axes: Axes) -> None:
-    """Liquid drop with membrane (1) and generalized Maxwell model (2) of Figure 5."""
+    """Draw the liquid drop with membrane (1) and generalized Maxwell model (2) of Figure 5."""
     for top, rows, title in (
         (4.3, ("kc", "k_p"), "(1) Maxwell liquid drop, membrane"),
         (1.6, ("kc", "k_p", "c_p"), "(2) generalized Maxwell-Wiechert"),

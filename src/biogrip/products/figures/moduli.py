@@ -67,7 +67,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Return the first simulated cases with the shown method and least squares, if both are run."""
+    """Return the first simulated cases, the shown method, and least squares if it is run."""
     cases = [study.cases[name] for name in shown_cases(study)]
     methods = [study.shown, *(["least_squares"] if "least_squares" in study.methods else [])]
     return Settings(

@@ -112,7 +112,7 @@ def draw(
 def _quantity(
     axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float, confidence: float
 ) -> None:
-    """One column of points a method; what lies beyond the axis stands on its edge."""
+    """Draw one column of points per method, with points beyond the axis at its edge."""
     loose = limit > _LOOSE
     top = _DECADES if loose else 1 + _WIDTHS * limit
     bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
@@ -142,7 +142,7 @@ def _quantity(
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
     if np.isfinite(limit):
         reach = NormalDist().inv_cdf((1 + confidence) / 2) * limit
-        # Of the logarithm, straight where the axis is.
+        # Limits of the logarithm; linearised on a linear axis.
         low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
         axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
     axes.axhline(1, color=TARGET, linewidth=0.6)

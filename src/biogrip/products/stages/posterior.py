@@ -134,7 +134,7 @@ def posterior_of_trace(
     limits
         Limits of its profile likelihoods.
     progress
-        Function that is told of the evaluations.
+        Callback for progress.
 
     Returns
     -------

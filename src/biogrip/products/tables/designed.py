@@ -103,7 +103,7 @@ def _least_force(case: CaseSettings) -> float:
 
 
 def _percent(bound: float) -> Cell:
-    """Return a bound in percent; none if it exceeds a factor of ten."""
+    """Return a relative bound in percent; none if it is 1000 % or more."""
     return 100 * float(bound) if bound < 10 else None
 
 
