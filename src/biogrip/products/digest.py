@@ -14,7 +14,7 @@ _DIGITS = 12
 
 
 def digest(settings: object) -> str:
-    """Return a hash of settings.
+    """Return a hash of settings that is the same on all processors.
 
     Parameters
     ----------

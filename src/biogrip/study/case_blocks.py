@@ -33,7 +33,7 @@ _MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class SearchRange:
-    """Values that the genes may take (Table 3); Table 4 follows from it."""
+    """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
 
     k: Annotated[GeneRange, Key()]
     k_p: Annotated[GeneRange, Key()]

@@ -28,7 +28,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class GripperBlock(Gripper):
-    """The two arms (Table 1)."""
+    """The gripper's two arms and jaw gap (Table 1)."""
 
     jaw_gap_m: Annotated[
         float,

@@ -75,7 +75,7 @@ class SweepBlock:
 
 @dataclass(frozen=True)
 class Value:
-    """A value on an axis.
+    """A value on an axis of a sweep's grid.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a grid.
+    """One axis of a sweep's grid, with its values.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a grid.
+    """A point of a sweep's grid, i.e. a case with two values changed.
 
     Parameters
     ----------

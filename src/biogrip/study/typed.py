@@ -57,7 +57,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Entry:
-    """A key of a block.
+    """A key of a config block, with schema and default.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from biogrip.errors import BiogripError
 
 
 def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object.
+    """Read a JSON object, checking for required keys.
 
     Parameters
     ----------

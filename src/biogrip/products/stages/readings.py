@@ -25,7 +25,7 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Reading:
-    """A case under one reading.
+    """Assumptions, genetic algorithm and noise of a case under one reading of the paper.
 
     Parameters
     ----------

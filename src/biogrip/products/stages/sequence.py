@@ -149,7 +149,7 @@ class _Known:
 
 
 class _Cell:
-    """A simulated cell."""
+    """A simulated cell, whose sequences of experiments are simulated in four ways."""
 
     def __init__(self, settings: Settings, number: int) -> None:
         self._settings, self._number = settings, number

@@ -16,7 +16,7 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Column:
-    """A column.
+    """A column of a table: its names in CSV and print.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table with caption, columns and rows.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class CaseSettings:
-    """A simulated case.
+    """Inputs of a simulated case, from which its mechanics are computed.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ _LEADING = (
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the comparison.
+    """Settings of the comparison of identification methods.
 
     Parameters
     ----------

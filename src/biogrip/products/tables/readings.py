@@ -26,7 +26,7 @@ _ROUNDING = 0.005
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of the comparison.
+    """Settings of the comparison of readings of the paper.
 
     Parameters
     ----------
