@@ -59,7 +59,7 @@ def test_an_uncertain_inertia_changes_the_ring_where_one_shows() -> None:
     arm = POSED.gripper.left
     unsure = 0.05 * arm.inertia_kgm2
     posed = replace(POSED, uncertainty={"left": {"inertia_kgm2": unsure}})
-    times, parameters = np.arange(1, 400) * 1e-6, np.exp(TRUTH)
+    times, parameters = np.linspace(1e-6, 4e-4, 400), np.exp(TRUTH)
     assert gripper_functions(posed, times, parameters, inertia=False).shape == (0, len(times))
     (row,) = gripper_functions(posed, times, parameters, inertia=True)
     heavy, light = (
