@@ -1,4 +1,4 @@
-"""How the paper's genetic algorithm is read."""
+"""Settings of the paper's genetic algorithm."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ _MOST = 1_000_000
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """How the population evolves (section 4)."""
+    """Settings of the genetic algorithm (section 4)."""
 
     population: Annotated[int, Key("Individuals in a generation.", low=4, high=_MOST)]
     survivors: Annotated[
@@ -75,7 +75,7 @@ class GeneticSettings:
     ] = "children"
 
     def problems(self) -> Iterator[Problem]:
-        """Find what leaves no children, and a stop before the start."""
+        """Find settings that leave no children, or whose limits of generations conflict."""
         if self.survivors >= self.population:
             text = f"found {self.survivors}, allowed is less than population"
             yield ("survivors",), f"{text}, which is {self.population}."
@@ -84,7 +84,7 @@ class GeneticSettings:
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
 
     def problems_of(self, genes: int) -> Iterator[Problem]:
-        """Find cuts that a chromosome of some length cannot have."""
+        """Find crossover cuts that a chromosome of `genes` genes cannot have."""
         last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
         if genes and not 1 <= self.first_cut <= last:
             text = f"found {self.first_cut}, allowed is 1 to last_cut, "
