@@ -1,4 +1,4 @@
-"""What is known of a sample beforehand, and how long its posterior may be sampled."""
+"""Settings of posterior sampling: priors of parameters, and numbers of walkers and steps."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -51,18 +51,18 @@ class PosteriorSettings:
     ] = False
 
     def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
-        """Find too few walkers, and priors of what a model lacks or tells by its order.
+        """Find too few walkers, and priors of parameters that are not searched or are ordered.
 
         Parameters
         ----------
         model
-            Of the sample.
+            Sample model.
         known
-            Parameters that are not identified.
+            Names of parameters that are fixed.
         """
         searched = [name for name in model.names if name not in known]
         if self.walkers < 2 * len(searched):
-            # As emcee wants them: their differences have to span all directions.
+            # emcee requires it: differences of walkers have to span all directions.
             text = f"found {self.walkers}, allowed are at least {2 * len(searched)}"
             yield ("walkers",), f"{text} to identify {counted(len(searched), 'parameter')}."
         branches = [name for pair in model.branches for name in pair] * (len(model.branches) > 1)

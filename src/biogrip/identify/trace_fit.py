@@ -72,12 +72,12 @@ class TraceFit:
         colour, left_out = self.colour, int(np.count_nonzero(self.outliers))
         parts = [f"{_percent(colour.white)} white"]
         if colour.relaxing >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.relaxing)} remembered for some {colour.time_s:.2g} s")
+            parts.append(f"{_percent(colour.relaxing)} correlated over some {colour.time_s:.2g} s")
         if colour.flicker >= _WORTH_SAYING:
             parts.append(f"{_percent(colour.flicker)} of spectrum 1/f")
         said = [
-            f"Noise model: {', '.join(parts)} of the variance; an offset and a drift of the "
-            "instrument are fitted along, and the intervals allow for all of it."
+            f"Noise model: of the variance, {', '.join(parts)}. An offset and a drift of the "
+            "instrument are fitted, too, and the intervals allow for all of it."
         ]
         if left_out:
             samples = counted(left_out, "sample")
