@@ -98,7 +98,7 @@ def told_at(
     Parameters
     ----------
     gripper, model, torque
-        What is simulated.
+        Arms, sample model and protocol of the simulation.
     time_s : (n_times,)
         When the rotation is read, ascending.
     parameters : (n, n_parameters)

@@ -20,7 +20,7 @@ def ramps(shares: Array, limits: Limits) -> Waveform:
     Parameters
     ----------
     shares : (SHARES,)
-        As of `steps`, the duty shared between rise with high level and fall with low one; then
+        As in `steps`, the duty shared between rise with high level and fall with low one; then
         which share of the first of these is the rise, and of the second the fall (nearly one: all
         of it, a triangle).
     limits

@@ -48,7 +48,7 @@ def cycles(
     Parameters
     ----------
     shares : (7,)
-        As of `steps`, from the length to the low level.
+        As in `steps`, from the length to the low level.
     count
         How many cycles there are.
     shortest_s, longest_s

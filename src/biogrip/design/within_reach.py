@@ -29,7 +29,7 @@ def planned_within_reach(
     Parameters
     ----------
     wanted, tried, rng, progress
-        As of `best_torques`.
+        As in `best_torques`.
 
     Returns
     -------

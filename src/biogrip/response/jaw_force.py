@@ -40,12 +40,12 @@ from biogrip.response.nonlinear import FINE, computed_correction
 def jaw_force_response(
     gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
 ) -> StepResponse:
-    """Jaw force of n samples after unit torque steps, in N per N m.
+    """Compute the jaw force of n samples after unit torque steps, in N per N m.
 
     Parameters
     ----------
     gripper, network, symmetric, inertia
-        As of `step_response`. Without inertia a parallel damper makes the force jump
+        As in `step_response`. Without inertia a parallel damper makes the force jump
         with the torque.
 
     Returns
@@ -69,7 +69,7 @@ def jaw_force_response(
 
 
 def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
-    """Jaw force in N, shape (n, n_times), at any times, of the linear model.
+    """Compute the jaw force of the linear model in N, shape (n, n_times), at any times.
 
     Parameters
     ----------
@@ -111,18 +111,18 @@ def jaw_force(
     nonlinear: bool,
     inertia: bool = True,
 ) -> Array:
-    """Force that the jaws exert on the sample in N, positive while they press, (n, n_times).
+    """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
 
     Parameters
     ----------
     gripper, network, torque
-        What is simulated.
+        Arms, samples and protocol of the simulation.
     time_s : (n_times,)
         Ascending times; at the instant of a step: what follows it.
     nonlinear
-        Whether to solve corrected eqs. (1)-(3), or the linear (4)-(6).
+        True to solve corrected eqs. (1)-(3), False to solve the linear (4)-(6).
     inertia
-        Whether the arms ring for milliseconds after a step; if they do not, the force may jump.
+        True to include the arms' inertia; without it, the force may jump.
 
     Raises
     ------
