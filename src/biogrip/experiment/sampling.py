@@ -1,4 +1,4 @@
-"""When the rotation is sampled."""
+"""Sampling times of the rotation."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -26,16 +26,16 @@ class Burst:
 
 @dataclass(frozen=True)
 class Sampling:
-    """When the rotation is sampled.
+    """Sampling of the rotation: a uniform rate, listed times, or bursts.
 
     Parameters
     ----------
     rate_Hz
         Uniform rate, from 0 to the end of the protocol.
     times_s
-        Instants, instead.
+        Sampling times, instead of a rate.
     bursts
-        Bursts, instead.
+        Bursts, instead of a rate.
     """
 
     rate_Hz: float = 0.0
@@ -43,7 +43,7 @@ class Sampling:
     bursts: tuple[Burst, ...] = ()
 
     def over(self, end_s: float) -> Array:
-        """Sampling instants in s, (n_samples,), of a protocol that ends then."""
+        """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""
         if self.bursts:
             return np.concatenate([burst.times_s for burst in self.bursts])
         if self.times_s:
