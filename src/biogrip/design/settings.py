@@ -1,4 +1,4 @@
-"""What is asked of a design, as the config says it."""
+"""Settings of a design, as in the config."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
-# Of a step: as long as generators need, readings by default, and as few as there must be.
+# Shortest duration of a step by default, readings in it by default, and its fewest readings.
 _SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
 
 _Value = Annotated[float, Key(above=0, high=1e12)]
@@ -17,7 +17,7 @@ _Value = Annotated[float, Key(above=0, high=1e12)]
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """The experiment that `biogrip design` looks for: torque, and when to look."""
+    """Settings of `biogrip design`, which searches for the best torque and sampling times."""
 
     noise_rad: Annotated[
         float, Key("Standard deviation of the sensor's noise.", "rad", low=1e-15, high=1.0)
@@ -114,13 +114,13 @@ class DesignSettings:
 
     @property
     def unit_s(self) -> float:
-        """What all steps, ramps and sinusoids last whole multiples of."""
+        """Unit of time, of which the durations of steps, ramps and sinusoids are multiples."""
         if self.shortest_step_s is not None:
             return self.shortest_step_s
         return max(_SHORTEST_S, _READINGS / self.fastest_Hz)
 
     def problems(self) -> Iterator[Problem]:
-        """Find keys that do not go together."""
+        """Find keys whose values conflict."""
         if self.sequence and not self.ranges:
             text = "found no design.ranges, which cells are drawn from; allowed is one at least."
             yield ("sequence",), text
@@ -141,7 +141,7 @@ class DesignSettings:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."
 
     def _instead(self, longest_s: float) -> str:
-        """Say what else to change where steps, as long as by default, have to be shorter."""
+        """Name the key to change instead if the default length of steps is too long."""
         if self.shortest_step_s is not None:
             return ""
         fastest_Hz = _FEWEST / longest_s
