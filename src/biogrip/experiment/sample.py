@@ -122,7 +122,7 @@ class SampleModel:
 
     @property
     def free_branches(self) -> tuple[tuple[int, int], ...]:
-        """Indices of spring and damper of each branch of which both are to be identified."""
+        """Indices of spring and damper of each branch whose spring and damper are both free."""
         places = {name: index for index, name in enumerate(self.names)}
         return tuple(
             (places[spring], places[damper])

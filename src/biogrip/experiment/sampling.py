@@ -12,7 +12,7 @@ from biogrip.keys import Key
 
 @dataclass(frozen=True)
 class Burst:
-    """Samples that follow one another at a rate of their own."""
+    """Successive readings at a rate of their own."""
 
     from_s: Annotated[float, Key("Its first sample.", "s", low=0, high=1e9)]
     rate_Hz: Annotated[float, Key("Rate within the burst.", "Hz", low=1e-9, high=1e9)]
@@ -20,7 +20,7 @@ class Burst:
 
     @property
     def times_s(self) -> Array:
-        """Sampling instants in s, (n_samples,)."""
+        """Sampling times in s, (n_samples,)."""
         return self.from_s + np.arange(self.samples) / self.rate_Hz
 
 

@@ -69,5 +69,5 @@ class Truth:
         return self.sample.model
 
     def target(self, quantity: list[Parameter]) -> float | None:
-        """Return the true value of a parameter or a sum, unless the trace was recorded."""
+        """Return the true value of a parameter or a sum; None if the trace was recorded."""
         return sum(self.parameters[p.name] for p in quantity) if self.parameters else None

@@ -145,6 +145,6 @@ class HeldFits:
         information = self._fits.normal(self._optima, np.arange(len(self._optima))).information
         information = information * self._ratio[:, None, None]
         slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self._optima])
-        # The prior keeps this regular.
+        # The prior keeps the matrix regular.
         spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)
         return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0)).ravel()

@@ -65,8 +65,8 @@ class Marginal:
         if verdict == DIFFERS:
             return (
                 f"{label}: the profile has {low:.3g} to {high:.3g}. It takes the best fit at every "
-                "value; the posterior counts how much of the prior fits, and much of it does "
-                "where other parameters are free."
+                "value; the posterior integrates over all other parameters, and so favours values "
+                "at which more of them fit."
             )
         ends = {"lower": low, "upper": high}
         free = " and ".join(name for name, limit in ends.items() if limit is None)

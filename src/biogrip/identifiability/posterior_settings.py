@@ -12,7 +12,7 @@ from biogrip.keys import Key, Problem
 
 @dataclass(frozen=True)
 class LogNormal:
-    """A parameter whose logarithm is normal beforehand, within the search range."""
+    """Log-normal prior of a parameter, truncated to the search range."""
 
     median: Annotated[float, Key("Median, SI units.", above=0, high=1e12)]
     spread: Annotated[float, Key("Standard deviation of the natural logarithm.", above=0, high=100)]
@@ -20,7 +20,7 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class PosteriorSettings:
-    """Samples of the posterior of the first trace; nothing is sampled without this block."""
+    """Sampling of the posterior of the first trace; nothing is sampled without this block."""
 
     prior: Annotated[
         Mapping[str, LogNormal],

@@ -81,7 +81,7 @@ class Prior:
 
     @cached_property
     def _largest(self) -> float:
-        """Logarithm of the density at the centre."""
+        """Logarithm of the prior density at its centre."""
         below, above = self._within
         told = self.precision > 0
         of_normal = np.log(self.precision[told] / np.sqrt(2 * np.pi) / (above - below)[told])

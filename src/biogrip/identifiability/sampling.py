@@ -194,7 +194,7 @@ class _Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
 
 
 class _AlongValley(DEMove):  # type: ignore[misc]
-    """Differential evolution in coordinates whose Jacobian determinant is one."""
+    """Differential evolution moves in coordinates whose Jacobian determinant is one."""
 
     def __init__(self, axes: Straightened, gamma0: float | None = None) -> None:
         super().__init__(gamma0=gamma0)

@@ -61,6 +61,6 @@ class Straightened:
 
 
 def straightened(model: SampleModel) -> Straightened:
-    """Return the coordinates for a model's parameters."""
+    """Return the coordinates in which a model's exchangeable parameters have a straight valley."""
     named = enumerate(model.names)
     return Straightened(tuple(index for index, name in named if name in model.exchangeable))

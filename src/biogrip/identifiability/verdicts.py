@@ -40,7 +40,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """One of the four verdicts."""
+        """Verdict: determined, bounded below or above, or not determined."""
         below, above = self.profile.low is not None, self.profile.high is not None
         if below and above:
             return DETERMINED
@@ -50,7 +50,7 @@ class Finding:
 
     @property
     def value(self) -> float:
-        """Best estimate in SI units; means little unless the quantity is determined."""
+        """Best estimate in SI units, meaningful only if the quantity is determined."""
         return math.exp(self.profile.best)
 
     @property
@@ -74,7 +74,7 @@ class Finding:
         return self.verdict != NOT_DETERMINED
 
     def words(self) -> str:
-        """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
         words = self._limits_in_words() + (f", except {but}{self._unit}" if but else "")
         provided = self.quantity.provided

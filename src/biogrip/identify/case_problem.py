@@ -75,7 +75,7 @@ class CaseProblem:
 
     @cached_property
     def searched(self) -> SampleModel:
-        """Sample model without the parameters that are known."""
+        """Sample model without the fixed parameters."""
         return with_fixed(self.model, self.fixed)
 
     def searched_for(self, *others: SampleModel) -> "CaseProblem":

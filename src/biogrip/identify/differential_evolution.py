@@ -1,4 +1,4 @@
-"""SciPy's differential evolution on log-parameters, a whole generation evaluated at once.
+"""SciPy's differential evolution on log-parameters, which evaluates a generation at once.
 
 References
 ----------

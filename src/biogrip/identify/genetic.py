@@ -145,7 +145,7 @@ class _Populations:
         )
 
     def at(self, *places: int) -> "_Populations":
-        # Copies, for a part of an array keeps all of it.
+        # Copies, for a view would keep the whole array in memory.
         return _Populations(self.codes.take(places, axis=2), self.ranking.take(places, axis=1))
 
     def only(self, which: NDArray[np.bool_]) -> "_Populations":

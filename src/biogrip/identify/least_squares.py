@@ -16,7 +16,7 @@ from biogrip.keys import Key
 
 @dataclass(frozen=True)
 class LeastSquaresSettings:
-    """Local fits from random points; also what identifiability is judged with."""
+    """Local fits from random points, the method of identifiability analyses, too."""
 
     candidates: Annotated[
         int,

@@ -313,5 +313,5 @@ def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
-    """Product of a matrix and a vector in each problem."""
+    """Multiply the matrix and the vector of each problem."""
     return (matrices @ vectors[:, :, None])[:, :, 0]

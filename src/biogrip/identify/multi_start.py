@@ -190,7 +190,7 @@ def _descents(found: Minima, before: Row) -> list[Row]:
 
 
 def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
-    """Return the last row of a history as the answer."""
+    """Return an identification with a history, whose last row is its result."""
     parameters, misfit_rad, _, evaluations = rows[-1]
     steps, why = len(rows) - 1, "all starts fitted"
     return Identification(

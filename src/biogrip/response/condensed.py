@@ -40,7 +40,7 @@ _SPACING = 0.25
 _SLOWEST, _FASTEST = 1e-6, 1e3
 # Most values of a correction: a mesh that follows a sinusoid of the torque may have thousands.
 _MOST_FUNCTIONS = 1000
-# Directions that matter less than this are rounding.
+# Directions with a smaller relative singular value are rounding errors.
 _RANK = 1e-14
 
 
@@ -208,8 +208,8 @@ class Condensed:
 
     @cached_property
     def _chosen(self) -> IntArray:
-        """Nodes at which the functions of the span differ most."""
-        # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
+        """Indices of the best interpolation nodes of the span, by QR with column pivoting."""
+        # Imported here: the genetic algorithm does not need it, and loading takes long.
         from scipy.linalg import qr
 
         span = self.dense.values_of_rows(self._span.T)

@@ -1,4 +1,4 @@
-"""Sums of decaying exponentials as functions of the rate, tabulated.
+"""Tables of sums of decaying exponentials as functions of the rate.
 
 However many terms it has, f(r) = sum_i a_i exp(r t_i) is a smooth function of
 the rate r alone. So it is computed once at some hundred rates, and from then on

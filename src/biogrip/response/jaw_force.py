@@ -10,9 +10,9 @@ b F = tau - Z phi, but where a liquid has given way that is a difference of near
 equal torques; here the constant and every mode are products of what is positive,
 and late in a phase only what is left of the slow modes is summed.
 
-What the nonlinear model adds follows from its correction, divided by the lever:
-F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction, all of
-them of second order, so that again no large terms cancel.
+In the nonlinear model, the arm's equation, divided by its lever, gives
+F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction. All of
+them are of second order, so that again no large terms cancel.
 """
 
 from math import factorial

@@ -36,7 +36,7 @@ _LEAST_DIFFERENCE = 1e-30
 
 @dataclass(frozen=True)
 class Impedance:
-    """H = Z + b^2 G of n samples.
+    """Impedance H = Z + b^2 G of n samples between the arms.
 
     Parameters
     ----------

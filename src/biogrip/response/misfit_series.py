@@ -61,14 +61,14 @@ class SeriesMisfit:
         # Change of each drive at the start of each phase, and level after it.
         self._heights = heights[:, :, None, None]
         self._levels = np.cumsum(heights, axis=1)[:, :, None]
-        # Times in samples; rounding must not keep a sample from the step that it falls on.
+        # Times in sampling intervals; a reading at a step must not precede it by rounding.
         steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
         steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
         starts = np.minimum(np.ceil(steps), self._samples)
         self._first_samples = starts.astype(np.int64)
         # Time from a step to the first reading of its phase.
         self._late = np.maximum(starts - steps, 0)
-        # One sample, and all of each phase.
+        # Numbers of readings: one, and those of each phase.
         lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
         self._lengths = lengths[:, None, None]
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])

@@ -107,7 +107,7 @@ def _carried_on(
     phase: IntArray,
     elapsed: Array,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """One mode of each sample, (n, n_drives, n_times), from what it has done at each step."""
+    """Return a mode of each sample, (n, n_drives, n_times), from its responses at the steps."""
     growing = _expm1(rates[:, None] * elapsed)[:, None]
     growth = (reached + levels).take(phase, axis=2)
     slope = growth * elapsed

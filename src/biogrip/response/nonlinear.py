@@ -100,7 +100,7 @@ class Correction:
     converged: np.ndarray
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
-        """Evaluate at ascending times, shape (n, n_times)."""
+        """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
         own = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
         return self._interpolated(own, time_s)
 

@@ -68,7 +68,7 @@ class Residuals:
             noise_rad = noise_of(self._rotation_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
-        # Rows of the trace without arms that ring, and with: of all models the same.
+        # Rows of the trace by inclusion of inertia, shared by all models.
         self._trace_rows: dict[bool, Array] = {}
 
     @property
@@ -82,7 +82,7 @@ class Residuals:
         return grip_of(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
     def of_model(self, model: SampleModel) -> "Residuals":
-        """Return the same trace for another model."""
+        """Return the residuals of another model against the same trace."""
         other = copy(self)
         other.model = model
         return other

@@ -1,4 +1,4 @@
-"""Roots of polynomials whose coefficients are all positive, a batch at a time.
+"""Root finding for polynomials with positive coefficients, many at once.
 
 The coefficients of a gripper-sample polynomial span dozens of decades. An
 eigenvalue solver loses the small roots there; iterating on the polynomial
