@@ -14,4 +14,4 @@ class SequenceSettings:
         int,
         Key("Cells, drawn uniformly in the logarithms within `design.ranges`.", low=2, high=10_000),
     ]
-    experiments: Annotated[int, Key("Experiments with each, in every way.", low=2, high=20)]
+    experiments: Annotated[int, Key("Experiments with each, by every strategy.", low=2, high=20)]

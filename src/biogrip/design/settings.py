@@ -22,9 +22,9 @@ class DesignSettings:
     noise_rad: Annotated[
         float, Key("Standard deviation of the sensor's noise.", "rad", low=1e-15, high=1.0)
     ]
-    samples: Annotated[int, Key("How often the rotation is read, in all.", low=10, high=1_000_000)]
-    fastest_Hz: Annotated[float, Key("How often at most in a second.", "Hz", low=1e-3, high=1e9)]
-    longest_s: Annotated[float, Key("How long the experiment lasts.", "s", low=1e-6, high=1e6)]
+    samples: Annotated[int, Key("Total number of readings.", low=10, high=1_000_000)]
+    fastest_Hz: Annotated[float, Key("Most readings in a second.", "Hz", low=1e-3, high=1e9)]
+    longest_s: Annotated[float, Key("Duration of the experiment.", "s", low=1e-6, high=1e6)]
     largest_torque_Nm: Annotated[
         float | None,
         Key(
@@ -51,7 +51,7 @@ class DesignSettings:
     most_steps: Annotated[
         int,
         Key(
-            "How many steps, ramps and sinusoids there are at most. By default 40.",
+            "Largest number of steps, ramps and sinusoids. By default 40.",
             low=2,
             high=1000,
         ),
@@ -59,7 +59,7 @@ class DesignSettings:
     shapes: Annotated[
         tuple[Annotated[str, Key(choices=tuple(SHAPES))], ...],
         Key(
-            "What the generator can make: trains of `steps`, trains of `ramps` that never jump, "
+            "Torques that the generator can make: trains of `steps`, of `ramps` that never jump, "
             "`sinusoids` on held torques; the best of them is taken. By default steps.",
             fewest=1,
             unique=True,
@@ -68,7 +68,7 @@ class DesignSettings:
     criterion: Annotated[
         str,
         Key(
-            "What is to be small, of the covariance of the logarithms asked for: `largest`, the "
+            "Function of the covariance of the logarithms asked for to minimize: `largest`, the "
             "largest relative bound (the default); `D`, its determinant; `A`, the mean of the "
             "squared bounds; `E`, its largest eigenvalue.",
             choices=CRITERIA,
@@ -77,7 +77,7 @@ class DesignSettings:
     over: Annotated[
         str,
         Key(
-            "Of several plausible samples: the `worst` (the default), or their `mean`.",
+            "Plausible sample that counts, the `worst` (the default), or `mean` over all samples.",
             choices=OVER,
         ),
     ] = "worst"

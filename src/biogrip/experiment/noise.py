@@ -22,9 +22,7 @@ from biogrip.keys import Key, Problem
 class Noise:
     """Noise added to the noise-free rotation; components beside white noise can be combined."""
 
-    kind: Annotated[
-        str, Key("Distribution of what is white of the noise.", choices=("gaussian", "uniform"))
-    ]
+    kind: Annotated[str, Key("Distribution of white noise.", choices=("gaussian", "uniform"))]
     level: Annotated[
         float,
         Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
@@ -32,7 +30,7 @@ class Noise:
     reference: Annotated[
         str,
         Key(
-            "What `level` is a share of. `peak`: the largest rotation of the noise-free trace, the "
+            "Reference of `level`. `peak`: the largest rotation of the noise-free trace, the "
             "same noise everywhere; `signal`: the noise-free rotation at each instant.",
             choices=("peak", "signal"),
         ),
@@ -48,10 +46,10 @@ class Noise:
         ),
     ] = None
     relaxing: Annotated[
-        Relaxing | None, Key("A part that remembers, AR(1); Gaussian. By default none.")
+        Relaxing | None, Key("Autocorrelated component, AR(1); Gaussian. By default none.")
     ] = None
     flicker: Annotated[
-        Flicker | None, Key("A part of spectrum 1/f; Gaussian. By default none.")
+        Flicker | None, Key("Component of spectrum 1/f; Gaussian. By default none.")
     ] = None
     drift: Annotated[Drift | None, Key("A drift in addition. By default none.")] = None
     outliers: Annotated[Outliers | None, Key("Outliers in addition. By default none.")] = None

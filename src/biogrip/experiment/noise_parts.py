@@ -46,8 +46,7 @@ class Drift:
     rise: Annotated[
         float,
         Key(
-            "By how much it changes from the first sample to the last, in standard deviations of "
-            "the noise.",
+            "Change from the first reading to the last, in standard deviations of the noise.",
             above=0,
             high=1000,
         ),
@@ -62,8 +61,7 @@ class Outliers:
     size: Annotated[
         float,
         Key(
-            "Standard deviation of what they have in addition, in standard deviations of the "
-            "noise.",
+            "Standard deviation of their additional noise, in standard deviations of the noise.",
             above=0,
             high=1000,
         ),

@@ -14,9 +14,9 @@ from biogrip.keys import Key
 class Burst:
     """Successive readings at a rate of their own."""
 
-    from_s: Annotated[float, Key("Its first sample.", "s", low=0, high=1e9)]
+    from_s: Annotated[float, Key("Time of its first reading.", "s", low=0, high=1e9)]
     rate_Hz: Annotated[float, Key("Rate within the burst.", "Hz", low=1e-9, high=1e9)]
-    samples: Annotated[int, Key("How many there are.", low=1, high=10_000_000)]
+    samples: Annotated[int, Key("Number of readings.", low=1, high=10_000_000)]
 
     @property
     def times_s(self) -> Array:

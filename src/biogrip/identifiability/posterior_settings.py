@@ -25,13 +25,13 @@ class PosteriorSettings:
     prior: Annotated[
         Mapping[str, LogNormal],
         Key(
-            "What is known beforehand, by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
+            "Log-normal priors by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
             "being the standard deviation of the natural logarithm. All others are uniform in "
             "their logarithms over the search range."
         ),
     ] = field(default_factory=dict)
     walkers: Annotated[
-        int, Key("Samples that move together. By default 100.", low=20, high=10_000)
+        int, Key("Number of walkers in the ensemble. By default 100.", low=20, high=10_000)
     ] = 100
     most_steps: Annotated[
         int,
@@ -45,7 +45,7 @@ class PosteriorSettings:
     evidence: Annotated[
         bool,
         Key(
-            "Whether the models of `model_selection` are sampled, too, and their evidence is "
+            "If true, the models of `model_selection` are sampled, too, and their evidence is "
             "compared. By default false."
         ),
     ] = False

@@ -26,12 +26,12 @@ class Polishing:
     first: Annotated[
         int,
         Key(
-            "How many survivors of the initial population are polished, the best.",
+            "Number of the best survivors of the initial population that are polished.",
             low=0,
             high=10_000,
         ),
     ]
-    last: Annotated[int, Key("The same of the last population.", low=1, high=10_000)]
+    last: Annotated[int, Key("The same for the last population.", low=1, high=10_000)]
 
 
 @dataclass(frozen=True)

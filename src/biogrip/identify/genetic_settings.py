@@ -18,7 +18,7 @@ class GeneticSettings:
     survivors: Annotated[
         int,
         Key(
-            "The best so many live on unchanged and are the parents of the others.",
+            "Number of the best, which survive unchanged and are the parents of the others.",
             low=2,
             high=_MOST,
         ),
@@ -51,7 +51,7 @@ class GeneticSettings:
     mutated_genes: Annotated[
         int,
         Key(
-            "How many times a gene of such a child is chosen and redrawn from its range.",
+            "Number of times that a gene of such a child is chosen and redrawn from its range.",
             low=1,
             high=50,
         ),
@@ -59,17 +59,17 @@ class GeneticSettings:
     patience: Annotated[
         int,
         Key(
-            "Stop after so many generations in which the best misfit has not improved.",
+            "Stop after this number of generations without improvement of the best misfit.",
             low=1,
             high=_MOST,
         ),
     ]
-    min_generations: Annotated[int, Key("Do not stop earlier.", low=0, high=_MOST)]
-    max_generations: Annotated[int, Key("Stop then at the latest.", low=1, high=_MOST)]
+    min_generations: Annotated[int, Key("Fewest generations.", low=0, high=_MOST)]
+    max_generations: Annotated[int, Key("Most generations.", low=1, high=_MOST)]
     mutants: Annotated[
         str,
         Key(
-            "Who may mutate. `children`; or `all`: survivors, too, but for the best of them.",
+            "Individuals that may mutate: `children`; or `all`, survivors except the best, too.",
             choices=("children", "all"),
         ),
     ] = "children"
