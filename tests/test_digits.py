@@ -23,7 +23,7 @@ def test_notes_on_one_of_something_are_sentences() -> None:
     residual = np.random.default_rng(3).standard_normal(60)
     residual[30] = 30.0
     said = " ".join(doubts_about_noise(residual))
-    assert "from the samples around: 1 outlier, as of Gaussian noise once in" in said
+    assert "from the samples around: 1 outlier, as of Gaussian noise only once in" in said
 
 
 @pytest.mark.parametrize(

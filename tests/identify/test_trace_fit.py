@@ -135,7 +135,7 @@ def test_noise_is_found_and_said() -> None:
     assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
     assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
     model, outliers = fit.notes()
-    assert "remembered for some" in model
+    assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
     other = posed.for_model(fit.problem, POSED.searched)

@@ -1,1 +1,1 @@
-"""Which torque to apply and when to look, so that every parameter shows."""
+"""Optimal experimental design: torque and sampling that determine the parameters best."""

@@ -1,4 +1,4 @@
-"""Readings of cells as bursts of a camera."""
+"""Conversion of numbers of readings in cells to bursts of a camera."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,7 +13,7 @@ _Run = tuple[int, int, int]
 
 
 def whole(samples: Array, capacity: Array) -> IntArray:
-    """Round numbers of samples, so that their sum stays."""
+    """Round numbers of readings to integers with the same sum."""
     counts = np.floor(samples + 1e-9)
     missing = round(float(samples.sum() - counts.sum()))
     # A linear program may have overfilled cells by its tolerance; these get no more.
@@ -27,7 +27,7 @@ def whole(samples: Array, capacity: Array) -> IntArray:
 def bursts_of(
     each: Sequence[Cells], starts: IntArray, counts: IntArray, fastest_Hz: float
 ) -> tuple[Burst, ...]:
-    """Put readings into bursts; cells that are full and follow one another share one.
+    """Convert readings of cells to bursts; successive full cells share a burst.
 
     Parameters
     ----------
@@ -36,9 +36,9 @@ def bursts_of(
     starts : (n_steps,)
         Slots at which steps begin.
     counts : (n_cells,)
-        Readings of all their cells.
+        Numbers of readings in all cells.
     fastest_Hz
-        How many slots a second has.
+        Number of slots per second.
     """
     runs: list[_Run] = []
     place = 0
@@ -59,7 +59,7 @@ def bursts_of(
 
 
 def _once(own: Cells, counts: IntArray) -> Iterator[_Run]:
-    """Readings of cells that follow one another, in the middle of each."""
+    """Yield runs of readings in the middle of successive cells."""
     for first, slots, count in zip(
         own.first.tolist(), own.slots.tolist(), counts.tolist(), strict=True
     ):
@@ -69,7 +69,7 @@ def _once(own: Cells, counts: IntArray) -> Iterator[_Run]:
 
 
 def _repeated(own: Cells, counts: IntArray) -> list[_Run]:
-    """Readings of cells that come again after every period; of few, one cell's after another's."""
+    """Return runs of readings of cells that repeat in every period, cells in turn if few."""
     slots: list[int] = []
     place, used = -1, 0
     for first, length, repeats, count in zip(

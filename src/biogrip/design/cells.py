@@ -1,9 +1,9 @@
-"""Stretches of time after a step in which what is seen hardly changes.
+"""Cells: stretches of time after a step in which responses hardly change.
 
-A step is divided into slots, one for every reading that the sampling is fast enough for. At first
-a cell is a slot, for arms ring; then cells grow by the same factor. Where the torque swings, a
-cell is a part of a period, and from the second period on the same part of several that follow one
-another: once the ring is over, they show the same.
+A step is divided into slots, one for every reading at the fastest rate. At first a cell is a
+slot, for arms ring; then cells grow by the same factor. Under a sinusoidal torque, a cell is a
+part of a period, and from the second period on the same part of several successive periods:
+once ringing has decayed, their responses are the same.
 """
 
 from dataclasses import dataclass
@@ -24,11 +24,11 @@ class Cells:
     first : (n_cells,)
         First slot of each; slot j is j slots after the step.
     slots : (n_cells,)
-        How many slots that follow one another each has.
+        Number of successive slots in each.
     repeats : (n_cells,)
-        How often a cell has so many.
+        Number of repetitions of these slots in each.
     stride
-        After how many slots it has them again.
+        Number of slots from one repetition to the next.
     """
 
     first: IntArray
@@ -38,27 +38,27 @@ class Cells:
 
     @property
     def capacity(self) -> IntArray:
-        """How many readings a cell has room for, (n_cells,)."""
+        """Largest number of readings in each cell, (n_cells,)."""
         return self.slots * self.repeats
 
     @property
     def middle(self) -> Array:
-        """Geometric means of the first and the last slot, in the middle period, (n_cells,)."""
+        """Geometric mean of first and last slot, in the middle repetition, (n_cells,)."""
         first = self.first + self.stride * ((self.repeats - 1) // 2)
         return np.sqrt(first * (first + self.slots - 1.0))
 
 
 def cells(slots: int, growth: float, longest: int | None = None) -> Cells:
-    """Divide the first so many slots after a step, of which the last is the next step's.
+    """Divide the slots after a step into cells of growing length.
 
     Parameters
     ----------
     slots
-        How many there are.
+        Number of slots to the next step, whose own slot is left out.
     growth
         Factor by which cells become longer.
     longest
-        How long at most.
+        Length of cells at most.
     """
     firsts = list(range(1, min(_SINGLE, slots)))
     place = float(_SINGLE)
@@ -72,18 +72,18 @@ def cells(slots: int, growth: float, longest: int | None = None) -> Cells:
 
 
 def swinging_cells(slots: int, period: int, parts: int, growth: float) -> Cells:
-    """Divide the slots after a step from which on the torque swings.
+    """Divide the slots of a sinusoidal torque into cells that repeat in successive periods.
 
     Parameters
     ----------
     slots
-        How many there are.
+        Number of slots.
     period
-        How many a period has.
+        Number of slots in a period.
     parts
-        Into how many a period is divided.
+        Number of cells in a period.
     growth
-        Factor by which the number of periods grows that cells are spread over.
+        Factor by which the number of periods grows over which cells repeat.
     """
     part = max(1, period // parts)
     begun = cells(min(slots, period), growth, part)

@@ -1,10 +1,10 @@
-"""What a good experiment is: one number of the covariances of plausible samples' log-parameters.
+"""Optimality criteria: functions of the covariances of plausible samples' log-parameters.
 
 With M the Fisher information of the log-parameters and C the part of its inverse that belongs to
-the parameters asked for, criteria are of C: D its determinant, A its mean diagonal, E its largest
-eigenvalue, or its largest diagonal, the largest relative bound. All but D are the largest of
-tr(Z C) over some matrices Z of trace one, which is what makes a bound for the optimum out of a
-gradient, see `biogrip.design.sampling`.
+the parameters asked for, the criteria are D, the determinant of C, A, its mean diagonal element,
+E, its largest eigenvalue, and its largest diagonal element, which is the largest squared relative
+bound. All but D are maxima of tr(Z C) over matrices Z of trace one; so gradients give bounds on
+the optimum, see `biogrip.design.sampling`.
 
 References
 ----------
@@ -20,7 +20,7 @@ from biogrip.arrays import Array
 CRITERIA = ("D", "A", "E", "largest")
 OVER = ("worst", "mean")
 
-# Of the information that a parameter has by itself, what is rounding.
+# Rounding errors of information, relative to that of each parameter by itself.
 _ROUNDING = 1e-13
 
 
@@ -33,7 +33,7 @@ class Criterion:
     name
         One of `CRITERIA`.
     over
-        Whether the worst of the samples counts, or their mean.
+        ``"worst"`` for the maximum over the samples, ``"mean"`` for their mean.
     asked : (n_asked,)
         Indices of the parameters that are asked for.
     """
@@ -43,7 +43,7 @@ class Criterion:
     asked: tuple[int, ...]
 
     def values(self, covariances: Array) -> Array:
-        """Criterion of every sample, (n,), from covariances of shape (n, n_asked, n_asked)."""
+        """Return the criterion of every sample, (n,), from covariances (n, n_asked, n_asked)."""
         if self.name == "D":
             value: Array = np.linalg.slogdet(covariances)[1]
             return value
@@ -57,7 +57,7 @@ class Criterion:
         return _eigenvalues(covariances)[:, -1]
 
     def smooth(self, covariances: Array, sharpness: float) -> float:
-        """Criterion in logarithms, with power means for largest values: `weights` go with it."""
+        """Return the log criterion with p-norms in place of maxima, as in `weights`."""
         if self.name in ("D", "A"):
             values = self.values(covariances)
             logs = values / len(self.asked) if self.name == "D" else np.log(values)
@@ -70,7 +70,7 @@ class Criterion:
         return float(_power_mean(np.exp(logs)[None], sharpness)[0])
 
     def typical_bound(self, covariances: Array) -> float:
-        """Criterion as a relative standard deviation, by which designs are compared."""
+        """Return the criterion as a relative standard deviation, for comparison of designs."""
         values = self.values(covariances)
         count = len(self.asked) if self.name == "D" else 1
         logs = values / count if self.name == "D" else np.log(values)
@@ -81,21 +81,21 @@ class Criterion:
         return float(logs.mean() if self.name == "D" else np.log(np.exp(logs).mean()))
 
     def weights(self, covariances: Array, sharpness: float) -> tuple[Array, Array]:
-        """Weigh samples, and what is in their covariances, as the criterion does there.
+        """Return the derivatives of the criterion by samples and by elements of covariances.
 
         Parameters
         ----------
         covariances : (n, n_asked, n_asked)
         sharpness
-            How sharply a largest value is singled out. What that leaves of the optimum is the
-            logarithm of their number over it.
+            Power p of the p-norm that replaces a maximum; the error of its logarithm is at
+            most the logarithm of the number of values over p.
 
         Returns
         -------
         of_samples : (n,)
-            Their sum is one.
+            Weights of the samples, whose sum is one.
         of_covariances : (n, n_asked, n_asked)
-            Z: the derivative of the criterion, D, or of what it is the largest of.
+            Z: the derivative of a sample's criterion, with p-norms in place of maxima.
         """
         if self.name == "D":
             z = np.linalg.inv(covariances).astype(float)
@@ -111,7 +111,7 @@ class Criterion:
         values = self.values(covariances)
         if self.over == "mean":
             return np.full(len(values), 1 / len(values)), z
-        # Logarithms of determinants are compared as they are.
+        # The values of D are logarithms already.
         scale = values if self.name != "D" else np.exp(values / len(self.asked))
         return _singled_out(scale[None], sharpness)[0], z
 
@@ -121,7 +121,7 @@ def _eigenvalues(covariances: Array) -> Array:
 
 
 def _power_mean(values: Array, power: float) -> Array:
-    """Logarithm of what the power mean of positive values is, along the last axis."""
+    """Return the logarithm of the p-norm of positive values, along the last axis."""
     largest = values.max(axis=-1)
     sums = np.sum((values / largest[..., None]) ** power, axis=-1)
     logs: Array = np.log(largest) + np.log(sums) / power
@@ -129,9 +129,9 @@ def _power_mean(values: Array, power: float) -> Array:
 
 
 def _singled_out(values: Array, sharpness: float) -> Array:
-    """Shares of the largest of positive values, along the last axis; of others nearly none.
+    """Return weights of positive values along the last axis, nearly one for the largest.
 
-    The gradient of the power mean of that power.
+    They are normalized powers of the values, as in the gradient of the p-norm.
     """
     shares: Array = (values / values.max(axis=-1, keepdims=True)) ** sharpness
     return shares / shares.sum(axis=-1, keepdims=True)
@@ -140,7 +140,7 @@ def _singled_out(values: Array, sharpness: float) -> Array:
 def inverted(information: Array) -> Array:
     """Invert information matrices, (n, n_parameters, n_parameters), of log-parameters.
 
-    What rounding leaves of a singular one has an inverse, too, as large as rounding allows.
+    A matrix that is singular up to rounding errors gets an inverse of their reciprocal size.
     """
     correlations, length = _correlations(information)
     size = length[:, :, None] * length[:, None, :]
@@ -148,9 +148,9 @@ def inverted(information: Array) -> Array:
 
 
 def whitened(information: Array, told: Array) -> Array:
-    """Return sensitivities in units in which the information is one in all directions.
+    """Transform sensitivities such that the information becomes the identity matrix.
 
-    In directions of which only rounding has information, they are next to nothing.
+    In directions whose information is only rounding errors, they become tiny.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def whitened(information: Array, told: Array) -> Array:
 
 
 def _correlations(information: Array) -> tuple[Array, Array]:
-    """Information with a unit diagonal, and the roots of its own, (n, n_parameters)."""
+    """Return information scaled to unit diagonal, and roots of its diagonal, (n, n_parameters)."""
     length = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     length = np.where(length > 0, length, 1.0)
     return information / (length[:, :, None] * length[:, None, :]), length

@@ -1,4 +1,4 @@
-"""What an experiment may be, and which samples it is for."""
+"""The design problem: limits of an experiment, and the plausible samples it is designed for."""
 
 from dataclasses import dataclass
 
@@ -17,43 +17,43 @@ Experiment = tuple[tuple[Phase, ...], Sampling]
 """Protocol and sampling."""
 
 NO_BOUND = 10.0
-"""Of which nobody would say that something is known: a factor of e to the tenth."""
+"""Standard deviation of a logarithm that counts as no bound: a factor of e to the tenth."""
 
-# Information that rounding leaves of none; its bound is a thousand times what none is.
+# Least information on a parameter above rounding; its bound is a thousand times `NO_BOUND`.
 _NOTHING = 1e-6 * NO_BOUND**-2
 
 
 @dataclass(frozen=True, eq=False)
 class Wanted:
-    """What is to be designed.
+    """The design problem: simulated system, limits of the experiment, and criterion.
 
     Parameters
     ----------
     gripper, model
-        What is simulated, both arms driven alike.
+        Arms and sample model of the simulation; both arms are driven alike.
     parameters : (n, n_parameters)
-        Of the plausible samples.
+        Parameters of the plausible samples.
     noise_rad
         Standard deviation of the sensor's noise.
     samples
-        How often the rotation is read.
+        Number of readings of the rotation.
     fastest_Hz
-        How often at most in a second.
+        Largest number of readings per second.
     limits
-        Of the torque's steps, ramps and sinusoids.
+        Limits of the torque's steps, ramps and sinusoids.
     shapes
-        Which of `biogrip.design.shapes.SHAPES` the torque may be of.
+        Names in `biogrip.design.shapes.SHAPES` of the torque's allowed families.
     largest_Nm
-        Torque.
+        Largest torque.
     stroke_rad
-        How far the arms may turn.
+        Largest rotation of the arms.
     criterion
-        What is to be small.
+        Criterion to be minimized.
     before : (n, n_parameters, n_parameters) or (1, n_parameters, n_parameters)
-        Information on the log-parameters that earlier experiments gave; and of those out of reach,
-        that they are known within a factor of e to the `NO_BOUND`.
+        Information on the log-parameters from earlier experiments; for those out of reach, also
+        a prior standard deviation of `NO_BOUND`.
     out_of_reach
-        Indices of parameters that no torque tells, see `biogrip.design.within_reach`.
+        Indices of parameters that no torque determines, see `biogrip.design.within_reach`.
     """
 
     gripper: Gripper
@@ -71,12 +71,12 @@ class Wanted:
     out_of_reach: tuple[int, ...] = ()
 
     def bounds(self, information: Array) -> Array:
-        """Return `relative_bounds`, without what is taken to be known of those out of reach.
+        """Return `relative_bounds` without the prior on parameters that are out of reach.
 
         Parameters
         ----------
         information : (n, n_parameters, n_parameters)
-            With what is in `before`.
+            Fisher information, including `before`.
         """
         found = relative_bounds(information)
         apart = list(self.out_of_reach)
@@ -93,16 +93,16 @@ def told_at(
     parameters: Array,
     noise_rad: float,
 ) -> Array:
-    """Sensitivities to the log-parameters, with inertia, in units of the noise.
+    """Compute sensitivities to the log-parameters, with inertia, in units of the noise.
 
     Parameters
     ----------
     gripper, model, torque
-        What is simulated.
+        Arms, sample model and protocol of the simulation.
     time_s : (n_times,)
-        When the rotation is read, ascending.
+        Ascending sampling times.
     parameters : (n, n_parameters)
-        Of the samples.
+        Parameters of the samples.
     noise_rad
         Standard deviation of the noise.
 
@@ -115,13 +115,13 @@ def told_at(
 
 
 def information_of(told: Array) -> Array:
-    """Fisher information, (n, n_parameters, n_parameters), of readings that tell so much."""
+    """Return the Fisher information, (n, n_parameters, n_parameters), of sensitivities."""
     information: Array = told @ told.swapaxes(1, 2)
     return information
 
 
 def relative_bounds(information: Array) -> Array:
-    """Cramer-Rao bounds of log-parameters, none of them taken as known.
+    """Compute the Cramer-Rao bounds of log-parameters, none of them fixed.
 
     Parameters
     ----------
@@ -131,8 +131,8 @@ def relative_bounds(information: Array) -> Array:
     Returns
     -------
     (n, n_parameters)
-        Standard deviations; infinite where a parameter, and what it trades against, is lost in
-        rounding.
+        Standard deviations; infinite where the information on a parameter, or on a combination
+        with it, is lost in rounding.
     """
     length = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     bounds = np.full(length.shape, np.inf)

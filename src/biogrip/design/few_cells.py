@@ -1,8 +1,8 @@
-"""The same information from readings in few cells: all of a cell's readings, or none.
+"""Concentration of readings in few cells without loss of information.
 
-Of all ways to spread readings over cells that tell as much, one in a corner of their polytope has
-no more cells filled in part than there are numbers in the information (Caratheodory). A linear
-program finds it, the one with the earliest readings after each step.
+All distributions of readings with the same information form a polytope. At its vertices, no more
+cells are filled in part than there are numbers in the information (Caratheodory). A linear program
+finds the vertex with the earliest readings after each step.
 
 References
 ----------
@@ -15,32 +15,32 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.criteria import whitened
 
-# By which the information may differ, as a share of what it is in any direction.
+# Share by which the information may change in any direction.
 _AS_GOOD = 1e-3
 
 
 def in_few_cells(
     told: Array, samples: Array, capacity: Array, cost: Array, before: Array | float = 0.0
 ) -> Array:
-    """Spread samples over few cells, without telling less.
+    """Distribute readings over few cells, with the same information.
 
     Parameters
     ----------
     told : (n, n_parameters, n_cells)
         Sensitivities in units of the noise.
     samples : (n_cells,)
-        How they are spread.
+        Given numbers of readings in cells.
     capacity : (n_cells,)
-        How many a cell has room for.
+        Largest number of readings in each cell.
     cost : (n_cells,)
-        What a sample costs there.
+        Cost of a reading in each cell.
     before : (n or 1, n_parameters, n_parameters)
-        Information that is there already.
+        Information from earlier experiments.
 
     Returns
     -------
     (n_cells,)
-        As many in all; as given if no other way was found.
+        Numbers of readings with the same sum; those given if the linear program fails.
     """
     from scipy.optimize import linprog
 
@@ -49,7 +49,7 @@ def in_few_cells(
     first, second = np.triu_indices(told.shape[1])
     rows = (white[:, first] * white[:, second]).reshape(-1, told.shape[2])
     wanted = rows @ samples
-    # In units of all samples, that numbers are near one.
+    # In units of all readings, so that numbers are near one.
     total = samples.sum()
     upper = np.minimum(capacity / total, 1.0)
     found = linprog(

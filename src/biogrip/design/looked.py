@@ -1,4 +1,4 @@
-"""What the search sees of plausible samples under a torque, in cells of time."""
+"""Sensitivities, rotations and forces of plausible samples under a torque, in cells of time."""
 
 from dataclasses import dataclass
 
@@ -9,28 +9,28 @@ from biogrip.design.cells import Cells, swinging_cells
 from biogrip.design.views import Moving, Views
 from biogrip.design.waveform import Waveform
 
-# Where the torque swings: parts of a period, and how the number of periods of a cell grows.
+# Under sinusoids: parts of a period, and growth of the number of periods of a cell.
 _PARTS, _PERIODS = 12, 2.0
-# By how much of half its height a sinusoid may be higher than in the middle of the nearest part.
+# Largest excess of a sinusoid over its value in the middle of the nearest part, per amplitude.
 _BETWEEN = 1 - np.cos(np.pi / _PARTS)
-# While only few instants are looked at, the force must not come nearer to zero than this.
+# Least force relative to the largest: a margin, for the force is computed at few instants.
 _MARGIN = 2e-3
 
 
 @dataclass(frozen=True)
 class Looked:
-    """What is seen under a torque whose largest is 1 N m.
+    """Responses of plausible samples to a torque whose largest is 1 N m, in cells.
 
     Parameters
     ----------
     sensitivity : (n, n_parameters, n_cells)
         d phi / d log p in rad.
     capacity : (n_cells,)
-        How many readings a cell has room for.
+        Largest number of readings in each cell.
     turned_rad
         Largest rotation.
     pull
-        How far the force of a sample comes below its margin, as a share of its largest.
+        Largest shortfall of a sample's force below its margin, relative to its largest.
     """
 
     sensitivity: Array
@@ -41,7 +41,7 @@ class Looked:
 
 @dataclass(frozen=True)
 class _Part:
-    """Some steps: where they stand, what is told, and forces of each sample in each of them."""
+    """Responses in some steps: their indices, sensitivities, and forces of each sample."""
 
     steps: IntArray
     sensitivity: Array
@@ -52,18 +52,18 @@ class _Part:
 
 
 def looked(views: Views, cells: Cells, waveform: Waveform, fastest_Hz: float) -> Looked:
-    """Look at plausible samples under a torque.
+    """Compute the responses of plausible samples to a torque, in cells.
 
     Parameters
     ----------
     views
-        Of the samples, at the middle of the cells.
+        Modes of the samples, with responses in the middle of the cells.
     cells
-        After any step, longer than any.
+        Cells after a step, longer than any step.
     waveform
-        In N m, if its largest is 1.
+        Torque, in N m if its largest is 1.
     fastest_Hz
-        How many slots a second has.
+        Number of slots per second.
     """
     moving = views.under(waveform)
     slots = np.round(waveform.durations_s * fastest_Hz).astype(np.intp)
@@ -93,7 +93,7 @@ def looked(views: Views, cells: Cells, waveform: Waveform, fastest_Hz: float) ->
 def _looked(
     moving: Moving, steps: IntArray, cells: Cells, slots: IntArray, times_s: Array | None = None
 ) -> _Part:
-    """Look at steps that have so many slots each; at sinusoids if times are given."""
+    """Compute responses in steps with given numbers of slots; in sinusoids if times are given."""
     view = moving.seen(steps, times_s)
     seen = cells.middle < slots
     turned = float(np.max(np.abs(view.rotation), where=seen, initial=0.0))

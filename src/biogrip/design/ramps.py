@@ -11,25 +11,25 @@ SHARES = 11
 
 
 def ramps(shares: Array, limits: Limits) -> Waveform:
-    """Turn numbers between 0 and 1 into a train of trapezia or triangles, and a hold.
+    """Convert numbers between 0 and 1 to a train of trapezia or triangles, and a hold.
 
     A cycle rises to its high level, stays, falls to its low level, and stays. The torque never
-    jumps: no ramp is shorter than the shortest stretch, which is how long the last one takes, to
-    the hold.
+    jumps: no ramp is shorter than the shortest stretch, which is also the duration of the last
+    ramp, to the hold.
 
     Parameters
     ----------
     shares : (SHARES,)
-        As of `steps`, the duty shared between rise with high level and fall with low one; then
-        which share of the first of these is the rise, and of the second the fall (nearly one: all
-        of it, a triangle).
+        As in `steps`, the duty shared between rise with high level and fall with low one; then
+        the share of the rise in the first of these, and of the fall in the second (nearly one:
+        all of it, a triangle).
     limits
-        What is allowed.
+        Limits of the torque's stretches.
     """
     rise, fall = (min(1.0, share / 0.9) for share in shares[9:])
     unit = limits.shortest_s
     parts = 2 + (rise < 1) + (fall < 1)
-    # Besides the cycles there are the last ramp and the hold, and ramps are rounded up.
+    # Room for the last ramp and the hold beside the cycles, whose ramps are rounded up.
     room = (limits.longest_s / unit - 2) / (parts + 2)
     count = how_many(shares[0], min((limits.most_steps - 2) // parts, int(room)))
     whole = limits.longest_s - 2 * unit * (1 + count)

@@ -1,14 +1,14 @@
-"""When to look: the best sampling of a given experiment, with a proof of how good it is.
+"""Optimal sampling times of a given experiment, with a bound on the distance from the optimum.
 
-Times are taken in cells, stretches in which sensitivities hardly change; of the samples a share
-w_i falls into each, at most as many as the sampling is fast. The information is linear in w and
-the criterion convex in the information, so the best w is a convex problem. It is solved by
-simplicial decomposition [1]_: the linear problem of filling the cells that tell most is solved by
-sorting, and of all fillings so far the best mixture is found by a multiplicative algorithm [2]_.
+Time is divided into cells in which sensitivities hardly change. A share w_i of the readings falls
+into each, limited by the fastest sampling. The information is linear in w and the criterion
+convex in the information, so the best w solves a convex problem. It is solved by simplicial
+decomposition [1]_: the linear problem of filling the most informative cells is solved by sorting,
+and the best mixture of all fillings so far is found by a multiplicative algorithm [2]_.
 
 The equivalence theorem for designs with bounded weights [3]_ says that w is optimal if no other
-filling tells more at its gradient. How much more it tells is the gap: the criterion exceeds its
-optimum by no more.
+filling has a larger value of the gradient. The gap is the excess of the best filling over w:
+the criterion exceeds its optimum by no more.
 
 References
 ----------
@@ -27,9 +27,9 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion, inverted
 
-# Mixtures are improved so often before a filling is added.
+# Iterations that improve a mixture before a filling is added.
 _MIXED = 15
-# How sharply a largest value is singled out: at first, by how much more each time, in the end.
+# Power p of the p-norm that replaces a maximum: at first, its growth per round, in the end.
 _BLUNT, _SHARPER, _SHARP = 10.0, 1.5, 1000.0
 # A filling with less than this share of a mixture is dropped.
 _DROPPED = 1e-9
@@ -37,16 +37,16 @@ _DROPPED = 1e-9
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best sampling.
+    """The optimal sampling.
 
     Parameters
     ----------
     samples : (n_cells,)
-        How many samples each cell has; not whole.
+        Numbers of readings in each cell, not integer.
     covariances : (n, n_asked, n_asked)
-        Of the logarithms of the parameters asked for, of each plausible sample.
+        Covariances of the log-parameters asked for, of each plausible sample.
     gap
-        By what share the typical relative bound may exceed that of the best sampling.
+        Share by which the typical relative bound may exceed that of the best sampling.
     """
 
     samples: Array
@@ -64,24 +64,24 @@ def best_sampling(
     most: int,
     before: Array | float = 0.0,
 ) -> Optimum:
-    """Spread samples over cells.
+    """Distribute readings over cells such that a criterion is minimal.
 
     Parameters
     ----------
     told : (n, n_parameters, n_cells)
         Sensitivities of n plausible samples to their log-parameters, in units of the noise.
     capacity : (n_cells,)
-        How many samples a cell has room for.
+        Largest number of readings in each cell.
     samples
-        How many there are; with less room, as many as there is room for.
+        Number of readings, reduced to the total capacity if that is less.
     criterion
-        What is to be small.
+        Criterion to be minimized.
     gap
-        Small enough.
+        Gap at which to stop.
     most
-        Fillings that are tried at most.
+        Largest number of fillings.
     before : (n or 1, n_parameters, n_parameters)
-        Information that is there already, from other experiments.
+        Information from earlier experiments.
     """
     room = min(float(samples), float(capacity.sum()))
     first = _even(capacity, room)
@@ -115,7 +115,7 @@ def best_sampling(
 
 
 def _even(capacity: Array, room: float) -> Array:
-    """As many samples in every cell, as far as there is room."""
+    """Distribute readings evenly over cells, within their capacity."""
     level = room / np.count_nonzero(capacity)
     for _ in range(20):
         filled = np.minimum(capacity, level)
@@ -127,7 +127,7 @@ def _even(capacity: Array, room: float) -> Array:
 
 
 def _filled(worth: Array, capacity: Array, room: float) -> Array:
-    """Fill the cells that are worth most."""
+    """Fill the cells of largest worth."""
     order = np.argsort(-worth, kind="stable")
     before = np.cumsum(capacity[order]) - capacity[order]
     filling = np.zeros_like(capacity)
@@ -136,12 +136,12 @@ def _filled(worth: Array, capacity: Array, room: float) -> Array:
 
 
 def _information(told: Array, samples: Array) -> Array:
-    """Fisher information, (n, n_parameters, n_parameters)."""
+    """Return the Fisher information, (n, n_parameters, n_parameters)."""
     return (told * samples) @ told.swapaxes(1, 2)
 
 
 def _seen(inverse: Array, criterion: Criterion, sharpness: float) -> tuple[Array, Array, Array]:
-    """Covariances of what is asked for, weights of the samples, and of their information."""
+    """Return covariances of the parameters asked for, weights of samples, and of information."""
     columns = inverse[:, :, criterion.asked]
     covariances = columns[:, criterion.asked]
     of_samples, z = criterion.weights(covariances, sharpness)
@@ -149,7 +149,7 @@ def _seen(inverse: Array, criterion: Criterion, sharpness: float) -> tuple[Array
 
 
 def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float) -> float:
-    """Share by which the typical relative bound may exceed the best, from what a step gains.
+    """Return the share by which the typical relative bound may exceed the best one.
 
     With weights pi and Z, sum pi tr(Z C) is convex, and nowhere larger than the criterion.
     """
@@ -168,7 +168,7 @@ def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float
 def _mixed(
     known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
 ) -> Array:
-    """Improve a mixture of fillings, whose information is known, (n_fillings, n, p, p)."""
+    """Improve the shares of fillings, given their information, (n_fillings, n, p, p)."""
     flat = known.reshape(len(known), -1)
 
     def at(shares: Array) -> tuple[Array, float]:

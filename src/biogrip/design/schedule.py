@@ -1,4 +1,4 @@
-"""From the best torque to an experiment that can be set: whole readings, in bursts after steps."""
+"""Experiment plan from the best torque: values that can be set, and readings in bursts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,29 +21,29 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 
 _GROWTH, _GAP, _FILLINGS = 1.12, 0.005, 200
-# Where the torque swings: parts of a period, and how the number of periods of a cell grows.
+# Under sinusoids: parts of a period, and growth of the number of periods of a cell.
 _PARTS, _PERIODS = 24, 1.4
-# Instants after a step at which the force is looked at, and what of the largest is rounding.
+# Instants after a step at which the force is computed, and rounding relative to the largest.
 _INSTANTS, _EARLIEST_S, _NOTHING = 400, 1e-8, 1e-9
-# Of a period, and how the number of periods between those that are looked at grows.
+# Instants in a period, and growth of the distance between periods at which it is computed.
 _OF_A_PERIOD, _FURTHER = 64, 1.3
 
 
 @dataclass(frozen=True)
 class Plan:
-    """An experiment.
+    """A designed experiment: protocol and sampling, with their information.
 
     Parameters
     ----------
     phases
         Torques of both arms.
     bursts
-        When the rotation is read.
+        Sampling times of the rotation.
     information : (n, n_parameters, n_parameters)
-        Fisher information of the log-parameters of the plausible samples, with what earlier
-        experiments gave.
+        Fisher information of the log-parameters of the plausible samples, including that of
+        earlier experiments.
     gap
-        By what share the typical relative bound may exceed that of the best sampling of this
+        Share by which the typical relative bound may exceed that of the best sampling of this
         torque.
     """
 
@@ -59,13 +59,13 @@ class Plan:
 
     @property
     def time_s(self) -> Array:
-        """When the rotation is read, (n_samples,)."""
+        """Sampling times of the rotation, (n_samples,)."""
         return Sampling(bursts=self.bursts).over(self.torque.end_s)
 
 
 @dataclass(frozen=True)
 class SamplingProblem:
-    """Cells of time of an experiment, among which readings are to be spread.
+    """Cells of time of an experiment, over which readings are to be distributed.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class SamplingProblem:
     told : (n, n_parameters, n_cells)
         Sensitivities to the log-parameters in units of the noise.
     capacity : (n_cells,)
-        How many readings a cell has room for.
+        Largest number of readings in each cell.
     """
 
     each: tuple[Cells, ...]
@@ -86,14 +86,14 @@ class SamplingProblem:
 
 
 def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
-    """Sample the first torque with which the jaws press throughout, as well as can be.
+    """Find the best sampling of the first torque with which the jaws press throughout.
 
     Parameters
     ----------
     wanted
-        What is to be designed.
+        Design problem.
     torques
-        From `best_torques`, which looked at fewer instants.
+        From `best_torques`, which checks contact at fewer instants.
 
     Raises
     ------
@@ -111,14 +111,14 @@ def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
 
 
 def presses(wanted: Wanted, phases: Sequence[Phase]) -> bool:
-    """Whether the jaws press plausible samples at all instants that are looked at."""
+    """Return True if the jaws press all plausible samples at all instants that are checked."""
     network = wanted.model.network(wanted.parameters)
     _, force = forces(wanted.gripper, network, phases)
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
 def sampling_problem(wanted: Wanted, phases: tuple[Phase, ...]) -> SamplingProblem:
-    """Divide the time of an experiment, and see what a reading tells there."""
+    """Divide the time of an experiment into cells, and compute the sensitivities there."""
     slots = [round(phase.duration_s * wanted.fastest_Hz) for phase in phases]
     each = tuple(
         _cells(count, phase, wanted.fastest_Hz) for count, phase in zip(slots, phases, strict=True)
@@ -161,7 +161,7 @@ def _sampled(wanted: Wanted, phases: tuple[Phase, ...]) -> Plan:
 
 
 def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:
-    """Jaw force of samples, with inertia, at instants dense after each step.
+    """Compute the jaw force of samples, with inertia, at instants dense after each step.
 
     Returns
     -------
@@ -185,7 +185,7 @@ def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple
 
 
 def _swings(period_s: float, duration_s: float) -> Array:
-    """Instants dense in some periods, ever fewer of them, and in the last."""
+    """Return instants dense in some periods, at growing distances, and in the last."""
     count = duration_s / period_s
     begins = np.unique(np.floor(_FURTHER ** np.arange(np.log(count + 1) / np.log(_FURTHER))) - 1)
     begins = np.append(begins, count - 1)
@@ -195,7 +195,7 @@ def _swings(period_s: float, duration_s: float) -> Array:
 
 
 def _late(each: Sequence[Cells]) -> Array:
-    """How late after their steps cells are, from 0 to 1."""
+    """Return the relative positions of cells within their steps, from 0 to 1."""
     return np.concatenate([np.arange(len(own.first)) / len(own.first) for own in each])
 
 

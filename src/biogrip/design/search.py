@@ -1,4 +1,4 @@
-"""The best torque: a global search over families of torques, each with its best sampling.
+"""Global search for the best torque over families of torques, each with its best sampling.
 
 References
 ----------
@@ -21,13 +21,13 @@ from biogrip.design.views import Views
 from biogrip.design.waveform import Waveform
 from biogrip.errors import BiogripError
 
-# Cells of the search are this much longer than those before, and its samplings this far from the
-# best; the torque that it finds is sampled more finely.
+# Growth of cells, gap and fillings of samplings during the search; the final torque is sampled
+# more finely.
 _GROWTH, _GAP, _FILLINGS = 1.35, 0.03, 8
-# Torques that are tried in a round; of Sobol's sequence, a power of two.
+# Torques in a round; a power of two, for the first are from a Sobol sequence.
 _CROWD = 128
 _LOST = 1e3
-# Of a logarithm, so that the last bits of a processor decide nothing.
+# Decimals of a logarithm, so that the last bits of a processor decide nothing.
 _DECIMALS = 8
 
 
@@ -38,9 +38,9 @@ class Torque:
     Parameters
     ----------
     waveform
-        In shares of the largest.
+        Torque in shares of the largest.
     largest_Nm
-        The largest.
+        Largest torque.
     """
 
     waveform: Waveform
@@ -48,14 +48,14 @@ class Torque:
 
 
 class TorqueSearch:
-    """Torques of a family, and how good they are with their best sampling.
+    """Objective of the search: torques of a family, rated with their best sampling.
 
     Parameters
     ----------
     wanted
-        What is to be designed.
+        Design problem.
     shape
-        The family.
+        Family of torques.
     """
 
     def __init__(self, wanted: Wanted, shape: Shape) -> None:
@@ -65,12 +65,12 @@ class TorqueSearch:
         self._views = Views(wanted.gripper, wanted.model, wanted.parameters, elapsed_s)
 
     def torque(self, shares: Array) -> Torque:
-        """Return the torque of so many shares, as large as torque and stroke allow."""
+        """Return the torque of some shares, as large as limits of torque and stroke allow."""
         waveform = self._shape.waveform(shares, self._wanted.limits)
         return self._scaled(waveform, self._looked(waveform))
 
     def logarithm(self, shares: Array) -> float:
-        """Logarithm of the typical relative bound; where contact is lost, more than any of them."""
+        """Return the log of the typical relative bound; where contact is lost, a larger penalty."""
         wanted = self._wanted
         waveform = self._shape.waveform(shares, wanted.limits)
         if not waveform.highest:
@@ -108,18 +108,18 @@ def best_torques(
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
 ) -> list[Torque]:
-    """Search for torques with which plausible samples show best; the best comes first.
+    """Search for the torques with the lowest typical relative bounds; the best comes first.
 
     Parameters
     ----------
     wanted
-        What is to be designed.
+        Design problem.
     tried
-        How many torques are tried, about, as many of each shape.
+        Approximate number of torques to try, as many of each shape.
     rng
         The only source of randomness.
     progress
-        Is told how many were tried, and the lowest typical relative bound.
+        Called with the number tried, and the lowest typical relative bound.
 
     Raises
     ------

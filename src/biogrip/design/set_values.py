@@ -1,4 +1,4 @@
-"""Torques as they can be set: few digits, and whole slots of the camera."""
+"""Rounding of torques to values that can be set: few digits, and whole slots of the camera."""
 
 import numpy as np
 
@@ -10,14 +10,14 @@ _DIGITS = 4
 
 
 def set_values(wanted: Wanted, torque: Torque) -> tuple[Phase, ...]:
-    """Round a torque to what can be set, both arms alike; none becomes larger.
+    """Round a torque to values that can be set, both arms alike; no torque becomes larger.
 
     Parameters
     ----------
     wanted
-        What is designed, and how fast is read.
+        Design problem, which gives the fastest sampling rate.
     torque
-        To be rounded.
+        Torque to be rounded.
     """
     waveform, rate = torque.waveform, wanted.fastest_Hz
     levels, ends, amplitudes = (
@@ -30,7 +30,7 @@ def set_values(wanted: Wanted, torque: Torque) -> tuple[Phase, ...]:
         duration_s = round(lasting_s * rate) / rate
         one = load(duration_s, level, end)
         if amplitude > 0:
-            # Of as many digits as are written.
+            # With as many digits as are written to files.
             frequency_Hz = float(f"{rate / round(period_s * rate):.12g}")
             one = load(duration_s, level, end, min(amplitude, level), frequency_Hz)
         phases.append(Phase(duration_s, one, one))
@@ -38,7 +38,7 @@ def set_values(wanted: Wanted, torque: Torque) -> tuple[Phase, ...]:
 
 
 def _rounded_down(value: float) -> float:
-    """So many digits of a torque, which must not become larger."""
+    """Round a torque down to a few digits."""
     if value <= 0:
         return 0.0
     exponent = int(np.floor(np.log10(value))) - _DIGITS + 1

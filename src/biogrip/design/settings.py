@@ -1,4 +1,4 @@
-"""What is asked of a design, as the config says it."""
+"""Settings of a design, as in the config."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.keys import Key, Problem
 
-# Of a step: as long as generators need, readings by default, and as few as there must be.
+# Shortest duration of a step by default, readings in it by default, and its fewest readings.
 _SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
 
 _Value = Annotated[float, Key(above=0, high=1e12)]
@@ -17,14 +17,14 @@ _Value = Annotated[float, Key(above=0, high=1e12)]
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings:
-    """The experiment that `biogrip design` looks for: torque, and when to look."""
+    """Settings of `biogrip design`, which searches for the best torque and sampling times."""
 
     noise_rad: Annotated[
         float, Key("Standard deviation of the sensor's noise.", "rad", low=1e-15, high=1.0)
     ]
-    samples: Annotated[int, Key("How often the rotation is read, in all.", low=10, high=1_000_000)]
-    fastest_Hz: Annotated[float, Key("How often at most in a second.", "Hz", low=1e-3, high=1e9)]
-    longest_s: Annotated[float, Key("How long the experiment lasts.", "s", low=1e-6, high=1e6)]
+    samples: Annotated[int, Key("Total number of readings.", low=10, high=1_000_000)]
+    fastest_Hz: Annotated[float, Key("Most readings in a second.", "Hz", low=1e-3, high=1e9)]
+    longest_s: Annotated[float, Key("Duration of the experiment.", "s", low=1e-6, high=1e6)]
     largest_torque_Nm: Annotated[
         float | None,
         Key(
@@ -51,7 +51,7 @@ class DesignSettings:
     most_steps: Annotated[
         int,
         Key(
-            "How many steps, ramps and sinusoids there are at most. By default 40.",
+            "Largest number of steps, ramps and sinusoids. By default 40.",
             low=2,
             high=1000,
         ),
@@ -59,7 +59,7 @@ class DesignSettings:
     shapes: Annotated[
         tuple[Annotated[str, Key(choices=tuple(SHAPES))], ...],
         Key(
-            "What the generator can make: trains of `steps`, trains of `ramps` that never jump, "
+            "Torques that the generator can make: trains of `steps`, of `ramps` that never jump, "
             "`sinusoids` on held torques; the best of them is taken. By default steps.",
             fewest=1,
             unique=True,
@@ -68,7 +68,7 @@ class DesignSettings:
     criterion: Annotated[
         str,
         Key(
-            "What is to be small, of the covariance of the logarithms asked for: `largest`, the "
+            "Function of the covariance of the logarithms asked for to minimize: `largest`, the "
             "largest relative bound (the default); `D`, its determinant; `A`, the mean of the "
             "squared bounds; `E`, its largest eigenvalue.",
             choices=CRITERIA,
@@ -77,7 +77,7 @@ class DesignSettings:
     over: Annotated[
         str,
         Key(
-            "Of several plausible samples: the `worst` (the default), or their `mean`.",
+            "Plausible sample that counts, the `worst` (the default), or `mean` over all samples.",
             choices=OVER,
         ),
     ] = "worst"
@@ -114,13 +114,13 @@ class DesignSettings:
 
     @property
     def unit_s(self) -> float:
-        """What all steps, ramps and sinusoids last whole multiples of."""
+        """Unit of time, of which the durations of steps, ramps and sinusoids are multiples."""
         if self.shortest_step_s is not None:
             return self.shortest_step_s
         return max(_SHORTEST_S, _READINGS / self.fastest_Hz)
 
     def problems(self) -> Iterator[Problem]:
-        """Find keys that do not go together."""
+        """Find keys whose values conflict."""
         if self.sequence and not self.ranges:
             text = "found no design.ranges, which cells are drawn from; allowed is one at least."
             yield ("sequence",), text
@@ -141,7 +141,7 @@ class DesignSettings:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."
 
     def _instead(self, longest_s: float) -> str:
-        """Say what else to change where steps, as long as by default, have to be shorter."""
+        """Name the key to change instead if the default length of steps is too long."""
         if self.shortest_step_s is not None:
             return ""
         fastest_Hz = _FEWEST / longest_s

@@ -1,4 +1,4 @@
-"""Families of torques that are searched: what a generator may be able to make."""
+"""Families of torques that the search can use, depending on the generator."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -15,9 +15,9 @@ class Shape:
     Parameters
     ----------
     shares
-        How many numbers between 0 and 1 make one.
+        Number of numbers between 0 and 1 that define a torque.
     waveform
-        Makes it of them.
+        Function that converts them to a torque.
     """
 
     shares: int
@@ -29,4 +29,4 @@ SHAPES: Mapping[str, Shape] = {
     "ramps": Shape(ramps.SHARES, ramps.ramps),
     "sinusoids": Shape(sinusoids.SHARES, sinusoids.sinusoids),
 }
-"""By name; a family that is added here is searched where it is asked for."""
+"""Families by name; an added family can be selected by its name in the config."""

@@ -9,14 +9,14 @@ from biogrip.design.waveform import Limits, Waveform, swinging, until_the_end
 SHARES = 10
 """Numbers between 0 and 1 that make a train of sinusoids."""
 
-# The information of four parameters has ten numbers: more frequencies than that tell no more.
+# The information matrix of four parameters has ten numbers: more frequencies add nothing.
 _MOST = 10
 _MOST_PERIODS = 10_000
 _FEWEST_SLOTS = 8
 
 
 def sinusoids(shares: Array, limits: Limits) -> Waveform:
-    """Turn numbers between 0 and 1 into sinusoids on held torques, and a hold until the end.
+    """Convert numbers between 0 and 1 to sinusoids on held torques, and a hold until the end.
 
     Periods grow or shrink by the same factor from one sinusoid to the next, as in a chirp; held
     torques and amplitudes change linearly. A torque stays between zero and the largest.
@@ -30,20 +30,20 @@ def sinusoids(shares: Array, limits: Limits) -> Waveform:
         first and the last one; amplitudes there, as shares of the largest possible; torque of the
         hold.
     limits
-        What is allowed.
+        Limits of the torque's stretches.
     """
     length, period_0, period_1, growing, mean_0, mean_1, swing_0, swing_1, last = shares[1:]
     unit, slot = limits.shortest_s, limits.slot_s
     count = how_many(shares[0], min(_MOST, limits.most_steps - 1, int(limits.longest_s / unit) - 1))
     along = np.linspace(0.0, 1.0, count) if count > 1 else np.zeros(1)
-    # A sinusoid that would not last a unit lasts that long.
+    # A sinusoid lasts a unit at least.
     length_s = between(length, unit * count, limits.longest_s - unit * (1 + count))
     shortest = _FEWEST_SLOTS * slot
     periods = shortest * max(1.0, length_s / shortest) ** (period_0 + (period_1 - period_0) * along)
     durations = np.floor(periods**growing / np.sum(periods**growing) * length_s / unit) * unit
     durations = np.maximum(durations, unit)
     periods = np.maximum(periods, durations / _MOST_PERIODS)
-    # Of an even number of slots, that a burst can have opposite halves in turn.
+    # An even number of slots, so that a burst can sample opposite half-periods in turn.
     periods = 2 * np.ceil(periods / (2 * slot) * (1 - 1e-9)) * slot
     mean = mean_0 + (mean_1 - mean_0) * along
     amplitudes = (swing_0 + (swing_1 - swing_0) * along) * np.minimum(mean, 1 - mean)

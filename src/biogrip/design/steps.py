@@ -5,7 +5,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.waveform import Limits, Waveform, held, until_the_end
 
-# How much longer the last cycle of a train is than its first, at most.
+# Largest ratio of the lengths of the last and the first cycle of a train, or its reciprocal.
 _STRETCHED = 1e3
 
 SHARES = 9
@@ -13,7 +13,7 @@ SHARES = 9
 
 
 def steps(shares: Array, limits: Limits) -> Waveform:
-    """Turn numbers between 0 and 1 into a train of cycles, and a hold until the end.
+    """Convert numbers between 0 and 1 to a train of cycles, and a hold until the end.
 
     A cycle is a high level and a low one. Both change linearly over the train, cycles become
     longer or shorter by the same factor.
@@ -26,7 +26,7 @@ def steps(shares: Array, limits: Limits) -> Waveform:
         high level at the beginning and the end; low level there, as a share of the high one;
         torque of the hold.
     limits
-        What is allowed.
+        Limits of the torque's stretches.
     """
     count = how_many(shares[0], (limits.most_steps - 1) // 2)
     whole = limits.longest_s - limits.shortest_s
@@ -36,23 +36,23 @@ def steps(shares: Array, limits: Limits) -> Waveform:
 
 
 def how_many(share: float, most: int) -> int:
-    """Turn a share into a number from one to the most, logarithmically."""
+    """Convert a share between 0 and 1 to an integer from one to `most`, logarithmically."""
     return round(float(max(1, most) ** share))
 
 
 def cycles(
     shares: Array, count: int, shortest_s: float, longest_s: float
 ) -> tuple[Array, Array, Array]:
-    """Divide a train into cycles, and each into a part for its high level and one for its low one.
+    """Divide a train into cycles, each with one part at its high and one at its low level.
 
     Parameters
     ----------
     shares : (7,)
-        As of `steps`, from the length to the low level.
+        As in `steps`, from the length to the low level.
     count
-        How many cycles there are.
+        Number of cycles.
     shortest_s, longest_s
-        How long the train is.
+        Shortest and longest duration of the train.
 
     Returns
     -------
@@ -71,5 +71,5 @@ def cycles(
 
 
 def between(share: float, low: float, high: float) -> float:
-    """Turn a share into what lies between two numbers, logarithmically."""
+    """Interpolate logarithmically between two numbers."""
     return low * (high / low) ** share if low < high else high

@@ -1,9 +1,9 @@
-"""What traces have told already, for the experiment that comes next.
+"""Information of earlier traces, as input for the design of the next experiment.
 
-Which samples are plausible is drawn from the likelihood. What traces tell well is taken for
-Gaussian around the best fit. Of what they tell badly, a damper that only has to be small, say, a
-Gaussian says nothing: such parameters are drawn from anywhere, the others fitted with these held,
-and a draw is kept as often as it is as likely as the best.
+Plausible samples are drawn from the likelihood, which is taken as Gaussian around the best fit
+for parameters that are determined well. For others, e.g. a damper that only has an upper bound,
+this fails: they are drawn log-uniformly over their range, the others are fitted with these held,
+and a draw is kept with a probability of its likelihood relative to the best.
 
 References
 ----------
@@ -25,22 +25,22 @@ from biogrip.identify.problem import Problem
 
 # Standard deviation of a logarithm from which on a Gaussian is not trusted.
 _BADLY = 0.25
-# Draws of what is told badly, of which some are kept.
+# Draws of parameters that are badly determined, of which some are kept.
 _TRIED = 128
 
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """What traces told.
+    """Information of earlier traces: plausible samples and their Fisher information.
 
     Parameters
     ----------
     parameters : (n, n_parameters)
-        Samples that are plausible after them, the best fit first.
+        Plausible samples, the best fit first.
     information : (n, n_parameters, n_parameters)
-        Fisher information of the log-parameters that these experiments give of each of them.
+        Fisher information on the log-parameters of each from these experiments.
     misfit_rad
-        Of the best fit.
+        RMS misfit of the best fit.
     """
 
     parameters: Array
@@ -63,7 +63,7 @@ def told_by(
     rng: np.random.Generator,
     before: Earlier | None = None,
 ) -> Earlier:
-    """Fit a trace, or several at once, and draw samples from what is plausible after that.
+    """Fit a trace, or several at once, and draw plausible samples from the likelihood.
 
     Parameters
     ----------
@@ -72,15 +72,15 @@ def told_by(
     noise_rad
         Standard deviation of the noise, the same in all of them.
     identify
-        Finds the global optimum.
+        Function that finds the global optimum.
     within : (n_parameters,) each
-        Logarithms between which parameters are plausible of which traces tell little.
+        Lowest and highest logarithms of parameters that are badly determined.
     drawn
-        How many samples; fewer where fewer are found.
+        Number of samples; fewer are returned if too few draws are kept.
     rng
-        Of the draws.
+        Random generator of the draws.
     before
-        What all but the last trace told; the fit starts from there, too.
+        Information of all but the last trace; the fit starts from its samples, too.
     """
     found = identify(problem)
     if before is not None:
@@ -94,16 +94,16 @@ def told_by(
 
 
 def information_at(problem: Problem, noise_rad: float, log_parameters: Array) -> Array:
-    """Fisher information of log-parameters, that of several traces being the sum of each one's.
+    """Compute the Fisher information of log-parameters from the traces of a problem.
 
     Parameters
     ----------
     problem
-        The traces.
+        One trace or several, whose information is summed.
     noise_rad
         Standard deviation of the noise.
     log_parameters : (n, n_parameters)
-        At which samples.
+        Samples at which it is computed.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def _drawn(
     count: int,
     rng: np.random.Generator,
 ) -> Array:
-    """Draw log-parameters, (at most count, n_parameters)."""
+    """Draw plausible log-parameters, (at most count, n_parameters)."""
     best = np.log(found.parameters)
     held = _told_badly(information_at(problem, noise_rad, best[None])[0], problem)
     tried = _TRIED if held.any() else count
@@ -139,7 +139,7 @@ def _drawn(
     free = ~held
     if not free.any():
         return x
-    # Of R with R^T R the precision, R^-1 z has its covariance.
+    # With R^T R the precision, R^-1 z has its inverse as covariance.
     told = information_at(problem, noise_rad, x)[:, free][:, :, free]
     roots = np.linalg.cholesky(told + np.eye(int(free.sum()))).swapaxes(1, 2)
     z = rng.standard_normal((len(x), int(free.sum()), 1))
@@ -149,9 +149,9 @@ def _drawn(
 
 
 def _told_badly(information: Array, problem: Problem) -> BoolArray:
-    """Find parameters with which held, the others are told well; those told worst first."""
+    """Mark the worst determined parameters in turn, until the others are determined well."""
     held = np.zeros(len(information), dtype=bool)
-    # Nothing lies further away than the search range is long.
+    # The search range acts as a prior.
     precision = information + np.diag((problem.high - problem.low) ** -2)
     while not held.all():
         free = np.flatnonzero(~held)

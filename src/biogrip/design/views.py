@@ -1,10 +1,10 @@
-"""What plausible samples show under many torques: sensitivities, rotation and jaw force.
+"""Fast responses of plausible samples to many torques: sensitivities, rotation and jaw force.
 
-Their modes do not depend on the torque (`biogrip.response.ringing`). From step to step a mode is
-carried on as in `biogrip.response.mode_growth`, and within a step everything is a product of what
-it has done before and of functions of the time since, which are known before any torque is.
-With r a rate, v, s and a the torque, its slope and its amplitude at a step, w the angular
-frequency, e the time since, G what the mode has done before, and q = r / (r^2 + w^2), it has done
+Modes do not depend on the torque (`biogrip.response.ringing`). From step to step a mode is
+carried on as in `biogrip.response.mode_growth`. Within a step, its response is a product of its
+state at the step and of functions of the time since, which are the same for all torques. With r
+a rate, v, s and a the torque, its slope and its amplitude at a step, w the angular frequency,
+e the time since, G the mode's response at the step, and q = r / (r^2 + w^2), the response is
 
     g = G + (G + v) (e^(r e) - 1) + s [(e^(r e) - 1) / r - e]
           + a q [w e^(r e) - r sin(w e) - w cos(w e)]
@@ -28,7 +28,7 @@ from biogrip.response.ringing import ringing_modes
 
 @dataclass(frozen=True)
 class View:
-    """What is seen after some steps of a torque whose largest is 1 N m.
+    """Responses after some steps of a torque whose largest is 1 N m.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class View:
 
 @dataclass(frozen=True)
 class _Factors:
-    """By what functions of the time since a step are to be multiplied.
+    """Coefficients of the functions of the time since a step.
 
     Parameters
     ----------
@@ -67,16 +67,16 @@ class _Factors:
 
 
 class Views:
-    """Plausible samples, of which something is to be seen.
+    """Modes of plausible samples, prepared for responses to many torques.
 
     Parameters
     ----------
     gripper, model
-        What is simulated, with inertia, both arms driven alike.
+        Arms and sample model of the simulation, with inertia; both arms are driven alike.
     parameters : (n, n_parameters)
-        Of the plausible samples.
+        Parameters of the plausible samples.
     elapsed_s : (n_times,)
-        Times after a step at which it is looked at, if nothing else is said.
+        Default times after a step at which responses are computed.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Views:
         self.rates, self.weights, rate_slopes, weight_slopes = _side_by_side(
             gripper, model, parameters
         )
-        # By which what a mode does, and how that changes with its rate, is seen: (n, p, m).
+        # Factors of a mode's response, and of its derivative by the rate: (n, p, m).
         self.by_growth, self.by_slope = weight_slopes, self.weights[:, None] * rate_slopes
         self.inert = self.weights * (
             arm.inertia_kgm2 * self.rates**2 + arm.damping_Nms_per_rad * self.rates
@@ -96,24 +96,24 @@ class Views:
         self.functions = self.functions_at(elapsed_s)
 
     def functions_at(self, elapsed_s: Array) -> Array:
-        """e^(r e) - 1, e^(r e), e e^(r e): real parts, then imaginary ones, (n, 6 m, n_times)."""
+        """Return e^(r e) - 1, e^(r e), e e^(r e), real then imaginary parts, (n, 6 m, n_times)."""
         z = self.rates[..., None] * elapsed_s
         decay = np.exp(z)
         functions = np.concatenate((np.expm1(z), decay, elapsed_s * decay), axis=1)
         return np.concatenate((functions.real, -functions.imag), axis=1)
 
     def under(self, waveform: Waveform) -> "Moving":
-        """Move the samples."""
+        """Return the responses of the samples to a torque."""
         return Moving(self, waveform)
 
 
 class Moving:
-    """Samples under a torque.
+    """Responses of samples to a torque.
 
     Parameters
     ----------
     views
-        Of the samples.
+        Modes of the samples.
     waveform
         The torque in N m.
     """
@@ -130,7 +130,7 @@ class Moving:
         q, q_slope = r / squares, (w**2 - r**2) / squares**2
         growing = np.expm1(r * d)
         sine, cosine = np.sin(w * d), np.cos(w * d)
-        # What a step adds by itself, whatever came before.
+        # Response to a step's own slope and sinusoid, whatever came before.
         swung = a * (q * w * (1 + growing) - q * r * sine - q * w * cosine)
         added = s * (growing / r - d) + swung
         added_slope = s * (d * (1 + growing) / r - growing / r**2) + a * (
@@ -164,17 +164,17 @@ class Moving:
         torque = (v + s * d + a * sine)[..., 0]
         force = torque - np.sum(views.inert * pushed, axis=2).real - views.stiffness * rotation
         self.last_rotation: Array = rotation.T
-        """At the end of each step, (n, n_steps)."""
+        """Rotation at the end of each step, (n, n_steps)."""
         self.last_force: Array = force.T / views.lever_m
-        """Jaw force there."""
+        """Jaw force at the end of each step, (n, n_steps)."""
 
     def seen(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
-        """See them after some steps.
+        """Compute the responses after some steps.
 
         Parameters
         ----------
         steps : (n_seen,)
-            Which steps.
+            Indices of the steps.
         elapsed_s : (n_times,)
             Times since each; by default those of all views.
         """
@@ -225,7 +225,7 @@ class Moving:
 def _carried(
     waveform: Waveform, growing: ComplexArray, added: ComplexArray, added_slope: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
-    """What modes have done when a step comes, and its derivative, (n_steps, n, n_modes)."""
+    """Return responses of modes at each step, and derivatives, (n_steps, n, n_modes)."""
     reached = np.zeros(growing.shape, dtype=complex)
     slanted = np.zeros_like(reached)
     before = zip(waveform.durations_s[:-1].tolist(), waveform.levels[:-1].tolist(), strict=True)
@@ -239,7 +239,7 @@ def _carried(
 def _side_by_side(
     gripper: Gripper, model: SampleModel, parameters: Array
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-    """Modes of all samples, with as many that do nothing as some have fewer."""
+    """Return the modes of all samples, padded with modes of zero weight to equal numbers."""
     each: list[list[Modes]] = [[] for _ in parameters]
     for rows, modes in ringing_modes(gripper, model, parameters, symmetric=True):
         for place, row in enumerate(rows):

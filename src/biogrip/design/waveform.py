@@ -1,4 +1,4 @@
-"""Torque against time, before it is scaled: stretches that are held, change linearly, or swing."""
+"""Unscaled torque against time: stretches that are constant, linear or sinusoidal."""
 
 from dataclasses import dataclass, fields, replace
 
@@ -9,16 +9,16 @@ from biogrip.arrays import Array, BoolArray
 
 @dataclass(frozen=True)
 class Limits:
-    """What an actuator and the patience of the experimenter allow.
+    """Limits of the torque's stretches.
 
     Parameters
     ----------
     longest_s
         Duration of the experiment.
     shortest_s
-        Of a stretch; all durations are whole multiples of it.
+        Shortest duration of a stretch; all durations are whole multiples of it.
     most_steps
-        How many stretches there are at most.
+        Largest number of stretches.
     slot_s
         Time between two readings at the fastest; periods are whole multiples of it.
     """
@@ -31,7 +31,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Waveform:
-    """Stretches that follow one another.
+    """Torque against time as successive stretches.
 
     Parameters
     ----------
@@ -40,9 +40,9 @@ class Waveform:
         Torque at the beginning and at the end of a stretch, linear between, in shares of the
         largest.
     amplitudes : (n_steps,)
-        Of a sinusoid on top of it, which starts at its mean, rising.
+        Amplitudes of sinusoids on top, which start at their mean, rising.
     periods_s : (n_steps,)
-        Of the sinusoids; infinite where nothing swings.
+        Periods of the sinusoids; infinite where there is none.
     """
 
     durations_s: Array
@@ -53,12 +53,12 @@ class Waveform:
 
     @property
     def slopes(self) -> Array:
-        """Change of the torque in a second, (n_steps,)."""
+        """Change of the torque per second, (n_steps,)."""
         return (self.ends - self.levels) / self.durations_s
 
     @property
     def swings(self) -> BoolArray:
-        """Which stretches swing, (n_steps,)."""
+        """True for stretches with a sinusoid, (n_steps,)."""
         return self.amplitudes > 0
 
     @property
@@ -68,7 +68,7 @@ class Waveform:
 
     @property
     def in_shares(self) -> "Waveform":
-        """The same, with 1 as the largest torque."""
+        """The same waveform, scaled to a largest torque of 1."""
         parts = {name: getattr(self, name) / self.highest for name in _TORQUES}
         return replace(self, **parts)
 
@@ -77,23 +77,23 @@ _TORQUES = ("levels", "ends", "amplitudes")
 
 
 def held(durations_s: Array, levels: Array) -> Waveform:
-    """Hold torques one after the other."""
+    """Return a waveform that holds torques one after the other."""
     return linear(durations_s, levels, levels)
 
 
 def linear(durations_s: Array, levels: Array, ends: Array) -> Waveform:
-    """Change torques linearly, one after the other."""
+    """Return a waveform of torques that change linearly, one after the other."""
     return Waveform(durations_s, levels, ends, np.zeros_like(levels), np.full_like(levels, np.inf))
 
 
 def swinging(durations_s: Array, levels: Array, amplitudes: Array, periods_s: Array) -> Waveform:
-    """Hold torques one after the other, with a sinusoid on top where the amplitude is not zero."""
+    """Return a waveform of held torques, with a sinusoid on top where the amplitude is not zero."""
     periods_s = np.where(amplitudes > 0, periods_s, np.inf)
     return Waveform(durations_s, levels, levels, amplitudes, periods_s)
 
 
 def tidied(waveform: Waveform) -> Waveform:
-    """Leave out stretches that do not last, and join what is held at the same torque."""
+    """Remove stretches of no duration, and join successive holds of the same torque."""
     there = waveform.durations_s > 0
     parts = {field.name: getattr(waveform, field.name)[there] for field in fields(waveform)}
     levels, ends = parts["levels"], parts["ends"]

@@ -1,9 +1,9 @@
-"""A design that asks for what can be told.
+"""Designs that only ask for parameters that some torque can determine.
 
-A camera that is slow beside what a damper does reads nothing of it, whatever the torque. Its bound
-is then rounding, and the largest of all: a search for what makes it small would be one among
-roundings. So what no torque tells is left out of what is asked, one parameter after the other. It
-stays free, within a factor that nobody would call known, and the others' bounds allow for that.
+A camera that is slow compared with a damper gives no information on it, whatever the torque. Its
+bound would be a rounding error, and the largest of all, so that a search would minimize rounding
+errors. Such parameters are removed from the criterion one after the other. They stay free, with a
+very wide prior (`NO_BOUND`), and the others' bounds account for that.
 """
 
 from collections.abc import Callable
@@ -24,24 +24,24 @@ def planned_within_reach(
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
 ) -> tuple[Wanted, Plan]:
-    """Search for torques, and sample the best, asking only for what can be told.
+    """Design an experiment, removing parameters from the criterion that no torque determines.
 
     Parameters
     ----------
     wanted, tried, rng, progress
-        As of `best_torques`.
+        As in `best_torques`.
 
     Returns
     -------
     wanted
-        What is asked in the end.
+        Design problem with the remaining parameters.
     plan
-        The experiment, in which everything that is asked has a bound.
+        Experiment in which all parameters asked for have a bound.
 
     Raises
     ------
     BiogripError
-        If no torque keeps contact, or none tells anything of what is asked.
+        If no torque keeps contact, or none determines any parameter asked for.
     """
     while True:
         plan = planned(wanted, best_torques(wanted, tried, rng, progress))
@@ -52,8 +52,8 @@ def planned_within_reach(
 
 
 def _without_worst(wanted: Wanted, plan: Plan) -> Wanted:
-    """Leave out the parameter that is told worst, asked for or not."""
-    # What trades against it has no bound either, but moves less: k and c against a small c_p.
+    """Remove the worst determined parameter from the criterion, whether asked for or not."""
+    # Parameters that trade off against it have no bound either, but vary less.
     variances = np.diagonal(inverted(plan.information), axis1=1, axis2=2).max(axis=0)
     variances[list(wanted.out_of_reach)] = 0.0
     worst = int(np.argmax(variances))

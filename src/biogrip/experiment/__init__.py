@@ -1,1 +1,1 @@
-"""The experiment: what is gripped, with which torque, and what noise adds."""
+"""The experiment: sample models, torque protocols, sampling and noise."""

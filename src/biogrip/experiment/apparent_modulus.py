@@ -1,17 +1,17 @@
-"""What a force and a shortening say of a sample's material, if it is a sphere.
+"""Apparent Young's modulus of a spherical sample from force and shortening (Hertz).
 
 Biologists compare moduli, in Pa; springs and dampers, in N/m and N s/m, belong to one
-sample and its size. Between them stands a contact model. Here it is Hertz's: a sphere
-of an incompressible elastic material between two flat rigid jaws that do not stick,
-each of which indents it by half the shortening,
+sample and its size. A contact model relates them. Here it is Hertz's: a sphere of an
+incompressible elastic material between two flat rigid jaws that do not stick, each of
+which indents it by half the shortening,
 
     F = 4/3 E/(1 - nu^2) R^(1/2) (delta/2)^(3/2)
 
 (K. L. Johnson, Contact Mechanics, 1985, section 4.2). A cell in suspension and a drop
 are round, and the jaws are flat and far stiffer; a cylinder's E = F L/(A delta) would
-need an area that nobody measures. The force grows faster than the shortening, so a
-spring has another modulus at every shortening: it is called apparent, and told with
-the shortening at which it holds. Hertz's theory is one of small strains.
+need an area that is rarely measured. The force grows faster than the shortening, so a
+spring has another modulus at every shortening: the modulus is called apparent, and is
+given with its shortening. Hertz's theory is one of small strains.
 """
 
 import math
@@ -22,14 +22,14 @@ INCOMPRESSIBLE = 0.5
 def apparent_modulus(
     force_N: float, shortening_m: float, size_m: float, poisson: float = INCOMPRESSIBLE
 ) -> float:
-    """Return the modulus in Pa of the sphere that a force shortens by so much.
+    """Return Young's modulus in Pa of a sphere from a force and the shortening it causes.
 
     Parameters
     ----------
     force_N
         Force between the jaws.
     shortening_m
-        How much nearer they are than when they first touched.
+        Decrease of the distance between the jaws since first contact.
     size_m
         Diameter of the sphere.
     poisson

@@ -1,8 +1,8 @@
-"""Power-law samples: a springpot with a spring beside it, or a damper behind it.
+"""Fractional (power-law) models: a springpot with a parallel spring, or a damper in series.
 
 A springpot (`biogrip.experiment.springpot`) has a modulus k_alpha (N/m, at 1 rad/s) and an
-exponent alpha. Both models come out as Maxwell branches, as all others, so that whatever
-follows from a `Network` holds for them.
+exponent alpha. Both models are represented by Maxwell branches, as a `Network` like all other
+models.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ from biogrip.interlacing import interlaced_zeros
 
 
 def fractional_kelvin_voigt(parameters: ArrayLike) -> Network:
-    r"""Fractional Kelvin-Voigt solid; columns k_p, k_alpha, alpha.
+    r"""Return fractional Kelvin-Voigt solids; columns k_p, k_alpha, alpha.
 
-    Its creep compliance is t^alpha/k_alpha E_(alpha,1+alpha)(-(k_p/k_alpha) t^alpha); with k_p
-    = 0 it is a springpot, the power law that cells creep by. The spring is what brings
-    them back.
+    Their creep compliance is t^alpha/k_alpha E_(alpha,1+alpha)(-(k_p/k_alpha) t^alpha); with
+    k_p = 0 it is that of a springpot, the power law of creeping cells. The spring makes them
+    recover.
 
     ::
 
@@ -38,15 +38,14 @@ def fractional_kelvin_voigt(parameters: ArrayLike) -> Network:
 
 
 def fractional_maxwell(parameters: ArrayLike) -> Network:
-    r"""Fractional Maxwell liquid, a springpot and a damper in series; columns k_alpha, alpha, c.
+    r"""Return fractional Maxwell liquids, springpot and damper in series; k_alpha, alpha, c.
 
-    Of the two elements that may stand behind a springpot cells ask for the damper [1]: they
-    follow a power law for short, and flow in the end. A spring there would show before the
-    power law does, where no cell was seen to have one. The creep compliance is
-    t^alpha/(k_alpha Gamma(1+alpha)) + t/c, the modulus that relaxes k_alpha t^-alpha
-    E_(1-alpha,1-alpha)(-(k_alpha/c) t^(1-alpha)).
+    Cells follow a power law at short times and flow at long ones, as with a damper in series
+    with the springpot [1]. A spring in series would show before the power law, where none has
+    been observed in cells. The creep compliance is t^alpha/(k_alpha Gamma(1+alpha)) + t/c, the
+    relaxation modulus k_alpha t^-alpha E_(1-alpha,1-alpha)(-(k_alpha/c) t^(1-alpha)).
 
-    With L the springpot's impedance this one's is c s - (c s)^2 / (c s + L), so its branches
+    With L the springpot's impedance, the model's is c s - (c s)^2 / (c s + L), so its branches
     relax at the zeros of c s + L.
 
     ::

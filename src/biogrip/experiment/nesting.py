@@ -1,10 +1,9 @@
-"""Which sample models contain which others, and where.
+"""Nested sample models: limits in which a model becomes a simpler one.
 
-Where an element vanishes, a model becomes a simpler one: a spring or damper beside others at
-zero, one in series with others rigid, at infinity; a springpot is a spring at an exponent of
-zero, and a damper at one. The simpler model's parameters are turned into those of the richer
-one, zeros and infinities among them (`biogrip.experiment.sample` gives such samples the same
-response).
+A model becomes a simpler one if an element vanishes: a parallel spring or damper of zero, one
+in series at infinity; a springpot is a spring at an exponent of zero, and a damper at one. The
+simpler model's parameters are converted to those of the richer one, zeros and infinities among
+them (`biogrip.experiment.sample` gives such samples the same response).
 """
 
 from collections.abc import Callable, Collection, Mapping
@@ -18,19 +17,19 @@ from biogrip.experiment.network import MOST_BRANCHES
 from biogrip.experiment.sample import burgers
 
 Turned: TypeAlias = Callable[..., tuple[Array | float, ...]]
-"""Of the simpler model's parameters, one by one, those of the richer one."""
+"""Function from the simpler model's parameters, one by one, to the richer model's."""
 
 INF = np.inf
 
 
 def _to_kelvin(k: Array, k_p: Array, c: Array) -> tuple[Array, ...]:
-    """Zener solid: from Maxwell's form, k and c beside k_p, to Kelvin's."""
+    """Convert a Zener solid from Maxwell's form, k and c beside k_p, to Kelvin's."""
     share = k_p / k
     return k + k_p, k_p * (1 + share), c * (1 + share) ** 2
 
 
 def _to_maxwell(k_s: Array, k_v: Array, c_v: Array) -> tuple[Array, ...]:
-    """Zener solid: from Kelvin's form to Maxwell's."""
+    """Convert a Zener solid from Kelvin's form to Maxwell's."""
     share = 1 / (1 + k_v / k_s)
     return share * k_s, share * k_v, share**2 * c_v
 
@@ -88,15 +87,15 @@ _DIRECTLY: dict[str, dict[str, Turned]] = {
         for n in range(3, MOST_BRANCHES + 1)
     },
 }
-# By candidate, the candidates that it contains; those in these are in it as well.
+# By candidate, the candidates nested in it directly; those nested in these are nested in it, too.
 
 Way: TypeAlias = tuple[Turned, ...]
-"""How parameters are turned, from one model to the next."""
+"""Conversions of parameters, from one model to the next."""
 
 
 @cache
 def contained(candidate: str) -> Mapping[str, Way]:
-    """Find all models that one contains, by candidate; the shortest way from each to it."""
+    """Return the candidates nested in one, each with the shortest way of conversions to it."""
     found: dict[str, Way] = {candidate: ()}
     ahead = [candidate]
     for richer in ahead:
@@ -109,12 +108,12 @@ def contained(candidate: str) -> Mapping[str, Way]:
 
 
 def contained_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Name those of other candidates that one contains."""
+    """Return the names of those candidates among `others` that are nested in one."""
     return [name for name in contained(candidate) if name in others]
 
 
 def different_in(candidate: str, others: Collection[str]) -> list[str]:
-    """Name them but for those that are the same model, in other parameters, as another one."""
+    """Return the same names, with only one of models that are equivalent in other parameters."""
     found: list[str] = []
     for name in contained_in(candidate, others):
         if not any(name in contained(other) and other in contained(name) for other in found):
@@ -123,7 +122,7 @@ def different_in(candidate: str, others: Collection[str]) -> list[str]:
 
 
 def as_richer(candidate: str, simpler: str, parameters: Array) -> Array:
-    """Turn a simpler model's parameters, (n_parameters,), into those of one that contains it."""
+    """Convert a nested model's parameters, (n_parameters,), to those of a richer model."""
     with np.errstate(invalid="ignore", divide="ignore"):
         for turned in contained(candidate)[simpler]:
             parameters = np.array(turned(*parameters), dtype=float)

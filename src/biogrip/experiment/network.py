@@ -1,4 +1,4 @@
-"""The elements of samples: what any constitutive model comes down to."""
+"""Networks of springs and dampers, the common form of all constitutive models."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 
 @dataclass(frozen=True)
 class Network:
-    """The elements of n samples.
+    """Springs and dampers of n samples.
 
     Parameters
     ----------
@@ -26,16 +26,16 @@ class Network:
     c: Array
 
 
-# Of an element that is rigid, in N/m or N s/m: no response shows that it gives way.
+# Stiffness or damping of a rigid element, in N/m or N s/m, too large to affect a response.
 _RIGID = 1e18
 
 
 def columns_of(parameters: ArrayLike) -> Array:
-    """Columns of parameters, (n, n_parameters), those that are infinite as good as rigid."""
+    """Return columns of parameters, (n, n_parameters), with infinite ones replaced by rigid."""
     columns = np.atleast_2d(np.asarray(parameters) * 1.0).T
     rigid = np.isinf(columns)
     return np.where(rigid, _RIGID, columns) if np.any(rigid) else columns
 
 
 MOST_BRANCHES = 8
-"""More are too many for polynomials: those of a power law (`biogrip.experiment.springpot`)."""
+"""Most branches for which polynomials are used; springpots have more of them."""

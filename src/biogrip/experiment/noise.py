@@ -1,4 +1,4 @@
-"""What the instrument records: the rotation with noise on it."""
+"""Noise that is added to simulated rotations."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -20,11 +20,9 @@ from biogrip.keys import Key, Problem
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise added to the noise-free rotation; what it has beside white noise can be combined."""
+    """Noise added to the noise-free rotation; components beside white noise can be combined."""
 
-    kind: Annotated[
-        str, Key("Distribution of what is white of the noise.", choices=("gaussian", "uniform"))
-    ]
+    kind: Annotated[str, Key("Distribution of white noise.", choices=("gaussian", "uniform"))]
     level: Annotated[
         float,
         Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
@@ -32,7 +30,7 @@ class Noise:
     reference: Annotated[
         str,
         Key(
-            "What `level` is a share of. `peak`: the largest rotation of the noise-free trace, the "
+            "Reference of `level`. `peak`: the largest rotation of the noise-free trace, the "
             "same noise everywhere; `signal`: the noise-free rotation at each instant.",
             choices=("peak", "signal"),
         ),
@@ -48,16 +46,16 @@ class Noise:
         ),
     ] = None
     relaxing: Annotated[
-        Relaxing | None, Key("A part that remembers, AR(1); Gaussian. By default none.")
+        Relaxing | None, Key("Autocorrelated component, AR(1); Gaussian. By default none.")
     ] = None
     flicker: Annotated[
-        Flicker | None, Key("A part of spectrum 1/f; Gaussian. By default none.")
+        Flicker | None, Key("Component of spectrum 1/f; Gaussian. By default none.")
     ] = None
     drift: Annotated[Drift | None, Key("A drift in addition. By default none.")] = None
     outliers: Annotated[Outliers | None, Key("Outliers in addition. By default none.")] = None
 
     def problems(self) -> Iterator[Problem]:
-        """Find parts that are more than the whole."""
+        """Find components whose shares exceed one together."""
         shares = [part.share for part in (self.relaxing, self.flicker) if part is not None]
         if sum(shares) > 1:
             text = f"found {sum(shares):g} with that of relaxing, allowed is at most 1 together."
@@ -65,12 +63,12 @@ class Noise:
 
     @property
     def white(self) -> bool:
-        """Whether samples are independent and alike in distribution."""
+        """True if readings have independent noise without drift and outliers."""
         return not (self.relaxing or self.flicker or self.drift or self.outliers)
 
     @property
     def absent(self) -> bool:
-        """Whether there is none."""
+        """True if the noise level is zero."""
         return not (self.level if self.level_rad is None else self.level_rad)
 
 
@@ -84,11 +82,11 @@ def add_noise(
     rotation_rad : (n_samples,)
         Noise-free rotation.
     noise
-        What to add.
+        Noise to add.
     rng
-        The stream to draw from.
+        Random generator.
     time_s : (n_samples,), optional
-        Sampling times, ascending, which only noise that is not white asks for.
+        Ascending sampling times, required unless the noise is white.
 
     Returns
     -------
@@ -97,7 +95,7 @@ def add_noise(
     Raises
     ------
     ValueError
-        If the times are needed.
+        If the times are required and missing.
     """
     if noise.kind == "uniform":
         half_width = np.sqrt(3.0)
@@ -113,7 +111,7 @@ def add_noise(
 
 
 def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generator) -> Array:
-    """Let parts that remember take the place of white noise, and add drift and outliers."""
+    """Replace shares of white noise by autocorrelated noise, and add drift and outliers."""
     shares = [part.share for part in (noise.relaxing, noise.flicker) if part is not None]
     unit = np.sqrt(max(0.0, 1 - sum(shares))) * unit
     if noise.relaxing is not None:
@@ -134,16 +132,16 @@ def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generat
 
 
 def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
-    """Return the noise's standard deviation in rad at every sample of a noise-free trace.
+    """Return the noise's standard deviation in rad at every reading of a noise-free trace.
 
-    Without what drift and outliers add.
+    Drift and outliers are not included.
 
     Parameters
     ----------
     rotation_rad : (n_samples,)
         Noise-free rotation.
     noise
-        What is added to it.
+        Noise that is added to it.
 
     Returns
     -------
@@ -158,5 +156,5 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
 
 
 def rms(values: Array) -> float:
-    """Root mean square over the samples."""
+    """Return the root mean square of values."""
     return float(np.sqrt(np.mean(np.square(values))))

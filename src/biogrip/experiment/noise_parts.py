@@ -1,4 +1,4 @@
-"""What noise has beside white noise: parts that remember, a drift, and outliers."""
+"""Components of noise beside white noise: autocorrelated noise, a drift, and outliers."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -11,13 +11,13 @@ from biogrip.keys import Key
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
 _EFOLDS = 1.5
-# The slowest relaxes in so many times the trace: all that is slower is an offset.
+# Longest relaxation time over the length of the trace: slower processes are offsets.
 _SLOWEST = 3.0
 
 
 @dataclass(frozen=True)
 class Relaxing:
-    """Noise that is forgotten with one time constant, of spectrum 1/(1 + (2 pi f tau)^2)."""
+    """Ornstein-Uhlenbeck noise of one relaxation time, of spectrum 1/(1 + (2 pi f tau)^2)."""
 
     share: Annotated[float, Key("Share of the noise's variance.", above=0, high=1)]
     time_s: Annotated[
@@ -34,20 +34,19 @@ class Relaxing:
 
 @dataclass(frozen=True)
 class Flicker:
-    """Noise of spectrum 1/f, over all frequencies that the trace has."""
+    """Noise of spectrum 1/f over all frequencies of the trace."""
 
     share: Annotated[float, Key("Share of the noise's variance.", above=0, high=1)]
 
 
 @dataclass(frozen=True)
 class Drift:
-    """A drift linear in time, upwards or downwards as chance has it."""
+    """A drift linear in time, upwards or downwards at random."""
 
     rise: Annotated[
         float,
         Key(
-            "By how much it changes from the first sample to the last, in standard deviations of "
-            "the noise.",
+            "Change from the first reading to the last, in standard deviations of the noise.",
             above=0,
             high=1000,
         ),
@@ -56,14 +55,13 @@ class Drift:
 
 @dataclass(frozen=True)
 class Outliers:
-    """Samples with far more noise than others."""
+    """Readings with far more noise than others."""
 
     share: Annotated[float, Key("Share of the samples, at random.", above=0, high=0.5)]
     size: Annotated[
         float,
         Key(
-            "Standard deviation of what they have in addition, in standard deviations of the "
-            "noise.",
+            "Standard deviation of their additional noise, in standard deviations of the noise.",
             above=0,
             high=1000,
         ),
@@ -75,7 +73,7 @@ def remembering(
 ) -> Array:
     """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times.
 
-    Each goes from sample to sample as an AR(1) process [1]_.
+    From reading to reading, each is an AR(1) process [1]_.
 
     Parameters
     ----------
@@ -84,7 +82,7 @@ def remembering(
     weights, rates_per_s : (n_processes,)
         Variance of each, and the inverse of its relaxation time.
     rng
-        The stream to draw from.
+        Random generator.
 
     Returns
     -------
@@ -101,23 +99,23 @@ def remembering(
     left = np.empty(len(weights))
     for before, kept, state in zip(states[:-1], np.exp(-elapsed), states[1:], strict=True):
         state += np.multiply(kept, before, out=left)
-    # A product a sample, as whose sums the order does not depend on how many there are.
+    # One product per reading: the order of its sums does not depend on the number of readings.
     total: Array = (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
     return total
 
 
 def flicker_rates(time_s: Array) -> Array:
-    """Return relaxation rates whose processes, of equal variance, make noise of spectrum 1/f [1]_.
+    """Return rates of Ornstein-Uhlenbeck processes whose sum has the spectrum 1/f [1]_.
 
     Parameters
     ----------
     time_s : (n_times,)
-        Ascending times, of which the processes take in all frequencies.
+        Ascending times, whose whole range of frequencies the processes cover.
 
     Returns
     -------
     (n_processes,)
-        In 1/s, geometric.
+        In 1/s, a geometric series; all processes have the same variance.
 
     References
     ----------

@@ -1,4 +1,4 @@
-"""What the experiment does: the torque of both arms against time, and when the rotation is sampled.
+"""Protocol of the experiment: torque of both arms against time, and sampling times.
 
 Within a phase a torque is a quadratic in time plus sinusoids, which covers holds,
 ramps and sinusoids given as torque or, since torque goes with the square of the
@@ -27,7 +27,7 @@ class Harmonic:
 
     @property
     def frequency_Hz(self) -> float:
-        """Periods in a second."""
+        """Frequency in Hz."""
         return self.omega_rad_per_s / (2 * math.pi)
 
 
@@ -49,7 +49,7 @@ class Load:
     harmonics: tuple[Harmonic, ...] = ()
 
     def at(self, elapsed: ArrayLike) -> Array:
-        """Torque in N m so many s after the start of the phase."""
+        """Return the torque in N m at times in s after the start of the phase."""
         t = np.asarray(elapsed, dtype=float)
         torque = self.value_Nm + self.slope_Nm_per_s * t + self.curvature_Nm_per_s2 * t**2 / 2
         for h in self.harmonics:
@@ -64,7 +64,7 @@ class Phase:
     Parameters
     ----------
     duration_s
-        How long it lasts.
+        Duration.
     left, right
         Closing torques tau_2 and tau_4, as increments on those that close the
         arms onto the sample.
@@ -77,18 +77,18 @@ class Phase:
 
 @dataclass(frozen=True)
 class TorqueHistory:
-    """A protocol as what sets in when: linear responses to it superpose.
+    """A protocol as a list of torque changes, to which linear responses superpose.
 
     Parameters
     ----------
     time_s : (n_events,)
         Starts of the phases.
     left, right : (n_events, 3)
-        By how much value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2
-        and tau_4 jump then.
+        Jumps of value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2 and
+        tau_4 at these times.
     harmonic_time_s, omega_rad_per_s : (n_harmonics,)
-        When a sinusoid Re(a e^(i omega (t - start))) sets in; switching off is
-        setting in with the opposite sign, and follows each.
+        Start and angular frequency of sinusoids Re(a e^(i omega (t - start))); each is
+        followed by one of opposite sign, which switches it off.
     harmonic_left, harmonic_right : (n_harmonics,)
         Complex amplitudes a in N m.
     end_s
@@ -106,13 +106,13 @@ class TorqueHistory:
 
     @cached_property
     def symmetric(self) -> bool:
-        """Whether both arms are driven alike."""
+        """True if both arms are driven alike."""
         same = np.array_equal(self.left, self.right)
         return bool(same and np.array_equal(self.harmonic_left, self.harmonic_right))
 
     @cached_property
     def jumps(self) -> list[tuple[float, int, Array]]:
-        """What sets in as a power of time: when, t^order/order!, height of each drive."""
+        """Torque changes proportional to t^order/order!: start, order, height of each drive."""
         heights = drives(self.left, self.right, self.symmetric)
         return [
             (float(start), order, heights[:, event, order])
@@ -123,7 +123,7 @@ class TorqueHistory:
 
     @cached_property
     def swings(self) -> list[tuple[float, float, ComplexArray]]:
-        """What sets in as a sinusoid: when, angular frequency, amplitude of each drive."""
+        """Sinusoids that start: time, angular frequency, complex amplitude of each drive."""
         amplitudes = drives(self.harmonic_left, self.harmonic_right, self.symmetric)
         rows = zip(self.harmonic_time_s, self.omega_rad_per_s, amplitudes.T, strict=True)
         return [(float(start), float(omega), a) for start, omega, a in rows]
@@ -147,7 +147,7 @@ class TorqueHistory:
 
     @cached_property
     def only_steps(self) -> bool:
-        """Whether the torque is piecewise constant."""
+        """True if the torque is piecewise constant."""
         ramps = np.any(self.left[:, 1:]) or np.any(self.right[:, 1:])
         return not ramps and len(self.harmonic_time_s) == 0
 
@@ -170,11 +170,11 @@ def load(
     Parameters
     ----------
     duration_s, torque_Nm
-        Of the phase; at its start.
+        Duration of the phase, and torque at its start.
     to_torque_Nm
-        At its end, where it changes.
+        Torque at its end, if it changes linearly.
     amplitude_Nm, frequency_Hz
-        Of a sinusoid that starts at its mean, rising.
+        Those of a sinusoid that starts at its mean, rising.
     """
     slope = ((torque_Nm if to_torque_Nm is None else to_torque_Nm) - torque_Nm) / duration_s
     harmonics: tuple[Harmonic, ...] = ()
@@ -184,7 +184,7 @@ def load(
 
 
 def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
-    """Combine what the two arms do into the drives of `step_response`.
+    """Combine the torques of the two arms into the drives of `step_response`.
 
     One drive, the common one, if both arms are driven alike; else that of the
     left arm, and left minus right.
@@ -194,7 +194,7 @@ def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[
     left, right : (...)
         Torques, or jumps of torque, of the arms.
     symmetric
-        Whether they are the same.
+        True if they are the same.
 
     Returns
     -------
@@ -204,7 +204,7 @@ def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[
 
 
 def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:
-    """Turn phases that follow one another from t = 0 into what sets in when."""
+    """Convert phases that follow one another from t = 0 into a list of torque changes."""
     ends = np.cumsum([phase.duration_s for phase in phases])
     starts = np.concatenate(([0.0], ends[:-1]))
     jumps, harmonics = [], []
@@ -231,7 +231,7 @@ def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:
 
 
 def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, complex, complex]]:
-    """Switching on, and at the end of the phase off, of its sinusoids."""
+    """Return the events that switch the sinusoids of a phase on, and at its end off."""
     events = []
     for arm in ("left", "right"):
         for h in getattr(phase, arm).harmonics:
@@ -246,7 +246,7 @@ def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, com
 def _merged(
     events: list[tuple[float, float, complex, complex]],
 ) -> list[tuple[float, float, complex, complex]]:
-    """Join what both arms do at the same time with the same frequency."""
+    """Merge the events of both arms that have the same time and frequency."""
     merged: dict[tuple[float, float], list[complex]] = {}
     for time, omega, left, right in events:
         pair = merged.setdefault((time, omega), [0j, 0j])
@@ -256,7 +256,7 @@ def _merged(
 
 
 def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> Array:
-    """Torque of an arm in N m; at the instant of a step, its value after it."""
+    """Return the torque of an arm in N m; at the instant of a step, its value after the step."""
     t = np.asarray(time_s, dtype=float)
     torque = np.zeros_like(t)
     for start, (value, slope, curvature) in zip(history.time_s, getattr(history, arm), strict=True):
@@ -273,7 +273,7 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
 
 
 def largest_torque(history: TorqueHistory) -> float:
-    """Largest torque of either arm in N m, to what a thousand instants of every phase show."""
+    """Return the largest torque of either arm in N m, over a thousand instants of every phase."""
     starts = np.append(history.time_s, history.end_s)
     inside = np.concatenate(
         [np.linspace(start, np.nextafter(end, 0), 1000) for start, end in pairwise(starts)]
@@ -282,6 +282,6 @@ def largest_torque(history: TorqueHistory) -> float:
 
 
 def sample_times(duration_s: float, rate_Hz: float) -> Array:
-    """Uniform sampling instants in s, both ends included where they fall on one."""
+    """Return uniform sampling times in s from 0, including the end if it falls on one."""
     count = int(np.floor(duration_s * rate_Hz * (1 + 1e-12))) + 1
     return np.arange(count) / rate_Hz

@@ -47,11 +47,11 @@ class Parameter:
     meaning
         A few words for tables.
     range_name
-        Which entry of the search range holds for it.
+        Entry of the search ranges that holds for it.
     may_vanish
-        Whether zero is a possible value: the element is then not there.
+        True if zero is a possible value: the element is then absent.
     below
-        What all its values are below, if anything.
+        Upper bound of its values, exclusive.
     """
 
     name: str
@@ -87,12 +87,12 @@ class SampleModel:
     name, title
         Name in the config; name in print.
     parameters
-        What there is to identify, in the order of the columns of a population.
+        Parameters to identify, in the order of the columns of a population.
     network
-        Turns parameters of shape (n, n_parameters) into a `Network`.
+        Function from parameters of shape (n, n_parameters) to a `Network`.
     exchangeable
-        Parameters whose sum deserves a row of its own in tables, because stiff
-        branches make them trade against each other.
+        Parameters whose sum has a row of its own in tables, because with stiff branches
+        only the sum is determined.
     branches
         Spring and damper of each Maxwell branch, by name; with several, the fastest first.
     """
@@ -111,18 +111,18 @@ class SampleModel:
 
     @property
     def power_law(self) -> bool:
-        """Whether there is a springpot in it, which stands for branches of all times."""
+        """True if the model has a springpot, which is represented by many branches."""
         return any(parameter.kind == "springpot" for parameter in self.parameters)
 
     @property
     def quantities(self) -> list[list[Parameter]]:
-        """What tables have a row for: every parameter, and the sum of the exchangeable ones."""
+        """Rows of tables: every parameter, and the sum of the exchangeable ones."""
         together = [p for p in self.parameters if p.name in self.exchangeable]
         return [[p] for p in self.parameters] + ([together] if together else [])
 
     @property
     def free_branches(self) -> tuple[tuple[int, int], ...]:
-        """Indices of spring and damper of each branch of which both are to be identified."""
+        """Indices of spring and damper of each branch whose spring and damper are both free."""
         places = {name: index for index, name in enumerate(self.names)}
         return tuple(
             (places[spring], places[damper])
@@ -131,20 +131,20 @@ class SampleModel:
         )
 
     def in_order(self, parameters: Array) -> IntArray:
-        """Order in which branches relax one after the other, the fastest first.
+        """Return the column order that sorts branches by relaxation time, the fastest first.
 
-        A trace is the same whichever branch is called which; so that samples and fits
-        can be compared, branches are counted by their relaxation times c/k.
+        Exchanging branches does not change a trace. For comparison of samples and fits,
+        branches are counted in the order of their relaxation times c/k.
 
         Parameters
         ----------
         parameters : (n, n_parameters)
-            Of n samples.
+            Parameters of n samples.
 
         Returns
         -------
         (n, n_parameters)
-            For every column the one that belongs there, as of `numpy.take_along_axis`.
+            Indices of the columns, for `numpy.take_along_axis`.
         """
         order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
         if len(self.free_branches) > 1:
@@ -155,13 +155,13 @@ class SampleModel:
         return order
 
     def named_in_order(self, parameters: Mapping[str, float]) -> dict[str, float]:
-        """Return a sample's parameters, by name, with its branches in their order."""
+        """Return a sample's parameters by name, with branches sorted by relaxation time."""
         values = np.array([[parameters[name] for name in self.names]])
         order = self.in_order(values)[0]
         return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
 
     def sample(self, parameters: Mapping[str, float]) -> Network:
-        """Return the elements of the one sample that has these parameters, by name."""
+        """Return the network of one sample with these parameters, by name."""
         return self.network([[parameters[name] for name in self.names]])
 
 
@@ -171,17 +171,17 @@ C = Parameter("c", "damping", "Maxwell damper", "c")
 C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
 
 SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
-"""The paper's parameters, which every file of identifications has columns for."""
+"""The paper's parameters, which have columns in every file of identifications."""
 
 
-# A spring or damper of a branch that is gone, in N/m or N s/m: no response shows it.
+# Spring or damper of an absent branch, in N/m or N s/m, too small to affect a response.
 _GONE = 1e-18
 
 
 def _branches(springs: Array, dampers: Array) -> tuple[Array, Array]:
-    """Springs and dampers of branches, columns in rows; of one that is gone, next to nothing.
+    """Return springs and dampers of branches, (n, n_branches), tiny where a branch is absent.
 
-    Of several that are gone none relaxes with another: equal rates cost digits.
+    Absent branches get different rates, since equal rates cost digits.
     """
     if not (np.all(springs) and np.all(dampers)):
         weak = _GONE * 10.0 ** np.arange(len(dampers))[:, None]
@@ -190,7 +190,7 @@ def _branches(springs: Array, dampers: Array) -> tuple[Array, Array]:
 
 
 def generalized_maxwell(parameters: ArrayLike) -> Network:
-    r"""Generalized Maxwell-Wiechert model, Figure 5 (2).
+    r"""Return generalized Maxwell-Wiechert samples, Figure 5 (2).
 
     With one branch the columns are k, k_p, c, c_p; with more they are
     k_1 ... k_n, k_p, c_1 ... c_n, c_p.
@@ -213,7 +213,7 @@ def generalized_maxwell(parameters: ArrayLike) -> Network:
 
 
 def liquid_drop(parameters: ArrayLike) -> Network:
-    r"""Maxwell liquid drop with membrane stiffness, Figure 5 (1); columns k, k_p, c.
+    r"""Return Maxwell liquid drops with membrane stiffness, Figure 5 (1); columns k, k_p, c.
 
     ::
 
@@ -227,7 +227,7 @@ def liquid_drop(parameters: ArrayLike) -> Network:
 
 
 def kelvin_voigt(parameters: ArrayLike) -> Network:
-    r"""Kelvin-Voigt solid; columns k_p, c_p.
+    r"""Return Kelvin-Voigt solids; columns k_p, c_p.
 
     ::
 
@@ -242,7 +242,7 @@ def kelvin_voigt(parameters: ArrayLike) -> Network:
 
 
 def damper(parameters: ArrayLike) -> Network:
-    r"""Bare damper, a Newtonian liquid; column c_p.
+    r"""Return bare dampers, Newtonian liquids; column c_p.
 
     ::
 
@@ -255,7 +255,7 @@ def damper(parameters: ArrayLike) -> Network:
 
 
 def maxwell(parameters: ArrayLike) -> Network:
-    r"""Maxwell liquid; columns k, c.
+    r"""Return Maxwell liquids; columns k, c.
 
     ::
 
@@ -268,9 +268,9 @@ def maxwell(parameters: ArrayLike) -> Network:
 
 
 def zener_kelvin(parameters: ArrayLike) -> Network:
-    r"""Zener solid (standard linear solid) in Kelvin's form; columns k_s, k_v, c_v.
+    r"""Return Zener (standard linear) solids in Kelvin's form; columns k_s, k_v, c_v.
 
-    Its Maxwell form has k_p = k_s k_v/(k_s + k_v), k = k_s^2/(k_s + k_v) and
+    Their Maxwell form has k_p = k_s k_v/(k_s + k_v), k = k_s^2/(k_s + k_v) and
     c = c_v [k_s/(k_s + k_v)]^2.
 
     ::
@@ -291,12 +291,12 @@ def zener_kelvin(parameters: ArrayLike) -> Network:
 
 
 def burgers(parameters: ArrayLike) -> Network:
-    r"""Burgers fluid; columns k_s, c_s, k_v, c_v.
+    r"""Return Burgers fluids; columns k_s, c_s, k_v, c_v.
 
     A Maxwell liquid and a Kelvin-Voigt element in series have the compliance
     1/k_s + 1/(c_s s) + 1/(k_v + c_v s). Its inverse is two Maxwell branches, their
     rates the roots of a r^2 - b r + k_v with a = c_s c_v/k_s, e = c_s k_v/k_s and
-    b = c_s + c_v + e; their springs share k_s. Written without differences.
+    b = c_s + c_v + e; their springs share k_s. The formulas have no cancellation.
 
     ::
 
@@ -374,7 +374,7 @@ MODELS: dict[str, SampleModel] = {
 
 
 def model_named(name: str, branches: int = 1) -> SampleModel:
-    """Return a model, the generalized one with a number of Maxwell branches."""
+    """Return a model by name, the generalized one with a number of Maxwell branches."""
     model = MODELS[name]
     if branches == 1:
         return model
@@ -394,7 +394,7 @@ def model_named(name: str, branches: int = 1) -> SampleModel:
 
 
 def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
-    """Return the model with some parameters at known values, and only the others to identify."""
+    """Return a model with some parameters fixed at known values, and only the others free."""
     if not fixed:
         return model
     free = tuple(p for p in model.parameters if p.name not in fixed)
@@ -412,7 +412,7 @@ def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
 
 @dataclass(frozen=True)
 class Sample:
-    """Which constitutive model a sample has.
+    """Name of a sample's constitutive model, and its number of branches.
 
     Parameters
     ----------
@@ -427,7 +427,7 @@ class Sample:
 
     @property
     def model(self) -> SampleModel:
-        """The model itself."""
+        """The constitutive model."""
         return model_named(self.name, self.branches)
 
     @property
@@ -443,4 +443,4 @@ CANDIDATES: dict[str, Sample] = {
         *(Sample("generalized_maxwell", n) for n in range(2, MOST_BRANCHES + 1)),
     )
 }
-"""What a trace may be fitted with, by a name that tells the number of branches, too."""
+"""Models that a trace may be fitted with, by name with the number of branches."""

@@ -1,4 +1,4 @@
-"""When the rotation is sampled."""
+"""Sampling times of the rotation."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -12,30 +12,30 @@ from biogrip.keys import Key
 
 @dataclass(frozen=True)
 class Burst:
-    """Samples that follow one another at a rate of their own."""
+    """Successive readings at a rate of their own."""
 
-    from_s: Annotated[float, Key("Its first sample.", "s", low=0, high=1e9)]
+    from_s: Annotated[float, Key("Time of its first reading.", "s", low=0, high=1e9)]
     rate_Hz: Annotated[float, Key("Rate within the burst.", "Hz", low=1e-9, high=1e9)]
-    samples: Annotated[int, Key("How many there are.", low=1, high=10_000_000)]
+    samples: Annotated[int, Key("Number of readings.", low=1, high=10_000_000)]
 
     @property
     def times_s(self) -> Array:
-        """Sampling instants in s, (n_samples,)."""
+        """Sampling times in s, (n_samples,)."""
         return self.from_s + np.arange(self.samples) / self.rate_Hz
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """When the rotation is sampled.
+    """Sampling of the rotation: a uniform rate, listed times, or bursts.
 
     Parameters
     ----------
     rate_Hz
         Uniform rate, from 0 to the end of the protocol.
     times_s
-        Instants, instead.
+        Sampling times, instead of a rate.
     bursts
-        Bursts, instead.
+        Bursts, instead of a rate.
     """
 
     rate_Hz: float = 0.0
@@ -43,7 +43,7 @@ class Sampling:
     bursts: tuple[Burst, ...] = ()
 
     def over(self, end_s: float) -> Array:
-        """Sampling instants in s, (n_samples,), of a protocol that ends then."""
+        """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""
         if self.bursts:
             return np.concatenate([burst.times_s for burst in self.bursts])
         if self.times_s:

@@ -5,7 +5,7 @@ a damper V t_0 for alpha = 1. In
 
     s^alpha = sin(pi alpha)/pi int_-inf^inf e^(alpha u) s / (s + e^u) du
 
-the trapezoidal rule of step h [2] makes springs h sin(pi alpha)/pi e^(alpha u_j), each with a
+the trapezoidal rule of step h [2] gives springs h sin(pi alpha)/pi e^(alpha u_j), each with a
 damper in series. They relax at the rates e^(u_j), whatever alpha is. For the poles of
 the integrand, at a distance of pi from the real axis if s is real and of pi/2 if it is
 imaginary, the relative error is about e^(-2 pi^2/h) or 2 e^(-pi^2/h). Of the infinite
@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array
 
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
-"""Times between which a springpot is one, to 1e-6 of the response; so are 1/s of its rates."""
+"""Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
 
 _STEP, _WHOLE = 0.6, 45
 _SLOWEST_PER_S = 0.5e-5
@@ -48,7 +48,7 @@ BRANCH_RATES_PER_S: Array = np.concatenate(
 
 
 def _interpolation(places: Array) -> Array:
-    """Coefficients, ascending, of the polynomials that are 1 at one place, 0 at the others."""
+    """Return ascending coefficients of the Lagrange polynomials of some places."""
     rows = np.zeros((len(places), len(places)))
     rows[:, 0] = 1.0
     for row, place in zip(rows, places, strict=True):
@@ -65,16 +65,16 @@ _ROUNDING = 2.0**-44
 
 @dataclass(frozen=True)
 class Ladder:
-    """What n springpots are made of, side by side.
+    """Parallel spring, damper and Maxwell branches that represent n springpots.
 
     Parameters
     ----------
     spring : (n,)
-        In N/m.
+        Parallel spring in N/m.
     damper : (n,)
-        In N s/m.
+        Parallel damper in N s/m.
     springs : (n_branches, n)
-        Of the Maxwell branches, in N/m; their rates are `BRANCH_RATES_PER_S`.
+        Springs of the Maxwell branches, in N/m; their rates are `BRANCH_RATES_PER_S`.
     """
 
     spring: NDArray[Any]
@@ -83,16 +83,16 @@ class Ladder:
 
 
 def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
-    """Return the elements of springpots V (s t_0)^alpha.
+    """Return the springs and dampers that represent springpots V (s t_0)^alpha.
 
     Parameters
     ----------
     modulus_N_per_m : (n,)
         V, the modulus at 1 rad/s.
     exponent : (n,)
-        alpha, between 0 and 1. Both may be complex: what is done to them is analytic.
+        alpha, between 0 and 1. Both may be complex: the result is an analytic function.
     """
-    # At its ends, where tails would be infinite, the next exponent gives the same response.
+    # At 0 and 1, where tails would be infinite, the next exponent gives the same response.
     exponent = np.where(exponent == 0, _ROUNDING, exponent)
     exponent = np.where(exponent == 1, 1 - _ROUNDING, exponent)
     # sin(pi alpha), with all digits near one, too.
@@ -106,6 +106,6 @@ def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
 
 
 def _tail(exponent: NDArray[Any]) -> NDArray[Any]:
-    """Weights at the nodes with the moments of e^(-a j h), j = 1, 2, ..., at e^(-j h)."""
+    """Return weights at the nodes with the moments of e^(-a j h), j = 1, 2, ..., at e^(-j h)."""
     powers = exponent + np.arange(_NODES + 1)[:, None]
     return np.einsum("mk,kn->mn", _TO_WEIGHTS, 1 / np.expm1(_STEP * powers))

@@ -1,4 +1,4 @@
-"""What is known of a sample beforehand: its true values, and what the paper says of it."""
+"""True parameters of simulated samples, and the paper's results for comparison."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ _SIGNED = Key(
 
 @dataclass(frozen=True)
 class Published:
-    """What the paper reports of a sample; data to compare with."""
+    """Results of the paper for a sample, to compare with."""
 
     table: Annotated[
         int | None, Key("Number of the paper's table.", low=1, high=1000, needed=True)
@@ -44,7 +44,7 @@ class Published:
 
 @dataclass(frozen=True)
 class Truth:
-    """What is known of a sample that was simulated, and what the paper says of it.
+    """Model and true parameters of a simulated sample, and the paper's results for it.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ class Truth:
     parameters
         True values by name, SI units; empty if the trace was recorded.
     published
-        What the paper reports.
+        Results of the paper.
     """
 
     title: str
@@ -69,5 +69,5 @@ class Truth:
         return self.sample.model
 
     def target(self, quantity: list[Parameter]) -> float | None:
-        """Return the true value of a parameter or a sum, unless the trace was recorded."""
+        """Return the true value of a parameter or a sum; None if the trace was recorded."""
         return sum(self.parameters[p.name] for p in quantity) if self.parameters else None

@@ -1,1 +1,1 @@
-"""What a trace tells about a sample, and what it does not."""
+"""Identifiability analysis: which quantities a trace determines, and how precisely."""

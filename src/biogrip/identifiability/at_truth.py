@@ -1,4 +1,4 @@
-"""How precisely a simulated case can be identified at all: bounds at its true parameters."""
+"""Cramer-Rao bounds of a simulated case, computed at its true parameters."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,23 +14,23 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.response.sensitivity import rotation_and_sensitivity
 
 DETERMINED_PERCENT = 100.0
-"""Bound from which on a quantity does not count as determined."""
+"""Bound in percent from which on a quantity does not count as determined."""
 
 
 def bounds_percent(
     problem: CaseProblem, noise: Noise, parameters: Mapping[str, float], time_s: Array
 ) -> list[tuple[Quantity, float]]:
-    """Bound of everything that is identified of a case, with the noise that it has.
+    """Compute the Cramer-Rao bounds of all identified quantities of a case with its noise.
 
     Parameters
     ----------
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     noise
-        What is added to the rotation.
+        Noise that is added to the rotation.
     parameters
-        Where the bounds are taken, SI units. What is zero there comes out as
-        undetermined, for the trace does not know its logarithm.
+        Parameters at which the bounds are computed, SI units. A parameter of zero comes
+        out as undetermined, for its logarithm has no effect on the trace.
     time_s : (n_samples,)
         Sampling times.
 
@@ -67,9 +67,9 @@ def bounds_percent(
 def headlines(bounds: Sequence[tuple[str, float]]) -> list[str]:
     """Return the best and the worst determined quantity of several points.
 
-    Only those count whose bound is below `DETERMINED_PERCENT` at half of the points or more. A sum
-    stands for its parts: that they trade against each other, far from where they
-    are, no bound of first order shows.
+    Quantities count if their bound is below `DETERMINED_PERCENT` at half of the points or more.
+    Parts of a sum do not count beside it: a first-order bound does not show that they trade
+    against each other far from their values.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Whether samples of a posterior have converged, and how much they tell.
+"""Convergence diagnostics of posterior samples: R-hat and effective sample sizes.
 
 References
 ----------
@@ -16,29 +16,29 @@ from biogrip.arrays import Array
 from biogrip.identifiability.straightened import Straightened
 
 MOST_R_HAT = 1.02
-"""Above it, walkers do not agree on where the samples are.
+"""Largest R-hat of samples that have converged.
 
-1.01 is recommended of four long chains [1]. A hundred walkers are short ones: with m independent
-samples each, R-hat is 1 + 1/m although nothing is wrong.
+1.01 is recommended for four long chains [1]. A hundred walkers are short chains: with m
+independent samples each, R-hat is 1 + 1/m even if they have converged.
 """
 
 FEWEST = 2000
-"""Independent samples: the share of them beyond a 95 % limit is then known to 0.5 %."""
+"""Least effective sample size: it gives the share beyond a 95 % limit to 0.5 %."""
 
-# What the tails are effective for: the ends of 95 % intervals.
+# Quantiles for the effective sample size of the tails: the ends of 95 % intervals.
 _TAILS = (0.025, 0.975)
 
 
 @dataclass(frozen=True)
 class Convergence:
-    """What is known of how samples were taken, each number the worst of all parameters.
+    """Convergence diagnostics of posterior samples, each the worst of all parameters.
 
     Parameters
     ----------
     r_hat
-        Split R-hat of ranks, the walkers being chains: by how much they differ from one another.
+        Rank-normalized split R-hat, with the walkers as chains.
     bulk, tail
-        How many independent samples would tell the middle, and the tails, as well.
+        Effective sample sizes of the middle and of the tails.
     """
 
     r_hat: float
@@ -47,14 +47,14 @@ class Convergence:
 
     @property
     def reached(self) -> bool:
-        """Whether the samples can be relied on."""
+        """True if the samples have converged."""
         return self.r_hat <= MOST_R_HAT and min(self.bulk, self.tail) >= FEWEST
 
     def words(self) -> str:
-        """Say so in a sentence."""
+        """Describe the diagnostics in a sentence."""
         told = (
-            f"R-hat is {self.r_hat:.3f}, and the samples tell as much as {self.bulk:.2g} "
-            f"independent ones, of the tails as {self.tail:.2g}"
+            f"R-hat is {self.r_hat:.3f}, and the effective sample size is {self.bulk:.2g}, in the "
+            f"tails {self.tail:.2g}"
         )
         if self.reached:
             return f"The samples have converged: {told}."
@@ -66,18 +66,18 @@ class Convergence:
 
 
 def convergence_of(log_parameters: Array, axes: Straightened) -> Convergence:
-    """Judge the samples of all parameters, and of what they are straight in.
+    """Compute convergence diagnostics over all parameters and straightened coordinates.
 
     Parameters
     ----------
     log_parameters : (n_steps, n_walkers, n_parameters)
         Samples.
     axes
-        Coordinates that tell more of them than parameters do, sums among others.
+        Straightened coordinates, sums among others.
     """
     steps, walkers, size = log_parameters.shape
     turned = axes.of(log_parameters.reshape(-1, size)).reshape(steps, walkers, size)
-    # Of the coordinates, those that are no parameters themselves.
+    # Coordinates that are not parameters themselves.
     own = sorted(axes.members) if len(axes.members) > 1 else []
     by_chain = np.concatenate([log_parameters, turned[:, :, own]], axis=2).transpose(2, 1, 0)
     return Convergence(

@@ -1,7 +1,7 @@
-"""Where profiles reach their thresholds, for any number of brackets at once.
+"""Root finding for the values at which profiles cross their thresholds, many at once.
 
-By the Illinois rule (Dowell & Jarratt 1971) on the square root of the rise of
-chi^2, which is nearly linear in the quantity's logarithm: a few fits suffice.
+The Illinois rule [1]_ is applied to the square root of the increase of chi^2, which is
+nearly linear in the quantity's logarithm: a few fits suffice.
 
 References
 ----------
@@ -23,20 +23,20 @@ _CLOSEST = 1e-7
 
 @dataclass
 class Brackets:
-    """Stretches of n profiles in which they cross the threshold, between an inner and an outer end.
+    """Intervals in which n profiles cross their thresholds, each with an inner and an outer end.
 
     Parameters
     ----------
     profile : (n,)
-        Which profile of the `HeldFits`.
+        Index of the profile in `HeldFits`.
     values : (2, n)
-        Logarithms of the quantity below and above the threshold, on either side of each other.
+        Logarithms of the quantity at the inner end, below the threshold, and the outer, above.
     rises : (2, n)
-        Rises of chi^2 there.
+        Increases of chi^2 there.
     x : (2, n, n_parameters)
         Log-parameters fitted there.
     elsewhere : (n_starts, n, n_parameters) or None
-        Log-parameters from which fits are tried as well, where what they lead to may be deeper.
+        Log-parameters of additional starts that may lead to deeper basins.
     """
 
     profile: IntArray
@@ -47,24 +47,24 @@ class Brackets:
 
 
 def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: float) -> Array:
-    """Find where the rise equals the threshold.
+    """Find the values of quantities at which the increase of chi^2 equals the threshold.
 
     Parameters
     ----------
     fits
         The traces and quantities.
     brackets
-        Where to look; what is found to be lower at outer ends replaces what they have, in place.
+        Intervals to search; lower fits that are found at outer ends replace theirs, in place.
     tolerance
         Of the fits, see `biogrip.identify.local_fits`.
     accuracy
-        Of the square root of the rise.
+        Of the square root of the increase of chi^2.
 
     Returns
     -------
     (n,)
-        Logarithms of the quantities; NaN where a basin seen on the way is below the threshold
-        at the outer end, so that the crossing lies further out.
+        Logarithms of the quantities; NaN where a deeper basin turns out to be below the
+        threshold at the outer end, so that the crossing lies further out.
     """
     profile, threshold = brackets.profile, fits.threshold[brackets.profile]
     wanted = np.sqrt(threshold)
@@ -78,27 +78,27 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
             break
         share = excess[0, left] / (excess[0, left] - excess[1, left])
         tried = ends[0, left] + share * (ends[1, left] - ends[0, left])
-        # The fits of the two ends may lie in different basins: what counts is the deeper one.
+        # The fits of the two ends may lie in different basins: the deeper one counts.
         between = x[0, left] + share[:, None] * (x[1, left] - x[0, left])
         starts = np.concatenate((between[None], x[:, left]))
-        # What the first fit finds from elsewhere is followed by the others.
+        # In the first round, the best fit from elsewhere is one more start.
         if not tries and brackets.elsewhere is not None:
             _, deepest = fits.from_each(profile, tried, brackets.elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
         rises, fitted = fits.from_each(profile[left], tried, starts, tolerance)
         over = np.sqrt(np.maximum(np.min(rises, axis=0), 0.0)) - wanted[left]
-        # What is deeper than the basin of the outer end may be so at the outer end, too.
+        # A basin deeper than that of the outer end may be deeper at the outer end, too.
         deeper = np.sqrt(np.maximum(rises[2], 0.0)) - wanted[left] > over + accuracy
         _lower(fits, brackets, left[deeper], fitted[deeper], tolerance)
         void = brackets.rises[1, left] < threshold[left]
         found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)
         ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
-        # An end that stays a second time counts half, so that it moves, too.
+        # The excess of an end that stays a second time is halved, so that the end moves, too.
         again = moved[left] == side
         excess[1 - side[again], left[again]] *= 0.5
         moved[left] = side
-        # Where a deeper basin begins the rise may jump past the threshold.
+        # Where a deeper basin begins, the increase may jump past the threshold.
         apart = np.abs(ends[1, left] - ends[0, left]) > _CLOSEST
         left = left[(np.abs(over) > accuracy) & apart & ~void]
     return found
@@ -107,7 +107,7 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
 def _lower(
     fits: HeldFits, brackets: Brackets, which: IntArray, starts: Array, tolerance: float
 ) -> None:
-    """Fit outer ends of some brackets from other starts, too; in place, the lower fit counts."""
+    """Fit the outer ends of brackets from other starts and keep, in place, the lower fits."""
     if not len(which):
         return
     rises, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, tolerance)

@@ -1,4 +1,4 @@
-"""Everything that one trace tells: the best fit, a verdict on every quantity, and what to doubt."""
+"""Diagnosis of one trace: best fit, a verdict on every quantity, and doubts about the result."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,17 +15,17 @@ from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.response.grip import Grip
 
-# A misfit that exceeds what neighbouring samples scatter by so much is not noise.
+# A misfit larger than the scatter of neighbouring readings by this factor is not noise.
 _TOO_MUCH = 1.2
-# A residual so far below the noise is that of a trace without noise.
+# A misfit below this share of the noise is that of a trace without noise.
 _NOISE_FREE = 0.01
-# Nobody knows his noise to better than that, so that less of a misfit is worth a word.
+# A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What a trace tells about its sample.
+    """The diagnosis of one trace: best fit, verdicts, contact force and doubts.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ class Diagnosis:
     grip
         Force of the jaws on the sample of the best fit.
     notes
-        What should be doubted, in sentences.
+        Doubts about the result, in sentences.
     """
 
     likelihood: Likelihood
@@ -56,10 +56,10 @@ def diagnose(
     confidence: float,
     noise_rad: float | None = None,
 ) -> Diagnosis:
-    """Judge what is identified from one trace.
+    """Judge the identification of one trace by profile likelihoods.
 
-    Where a profile comes below the optimum, that was not the global one, and all
-    is judged again from there.
+    If a profile comes below the optimum, the optimum was not the global one, and all
+    is judged again from the lower one.
 
     Parameters
     ----------
@@ -92,31 +92,31 @@ def diagnose(
         found = deeper
     grip = problem.residuals.grip(likelihood.best)
     notes = [
-        f"The values of {finding.quantity.label} within confidence are in {1 + len(finding.gaps)} "
-        "parts; the limits are those of the outermost."
+        f"The confidence set of {finding.quantity.label} has {1 + len(finding.gaps)} separate "
+        "parts; the limits are the outermost ones."
         for finding in findings
         if finding.gaps
     ]
     notes += [*_noise(likelihood), *_pulling(grip, problem.residuals.duration_s)]
     if not found.converged:
         notes.append(
-            "The fit could not be brought to its last digits: steps that should lead on fit worse. "
-            "Rely on its verdicts, not on its digits."
+            "The fit has not converged to its last digits: further Newton steps increase "
+            "chi-squared. Rely on its verdicts, not on its digits."
         )
     return Diagnosis(likelihood, findings, trades, grip, notes)
 
 
 def _pulling(grip: Grip, last_s: float) -> Iterator[str]:
-    """Doubt samples at which the jaws would have to pull what was identified."""
+    """Yield a doubt if, with the best fit, the jaws would have to pull at the sample."""
     if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
         yield (
-            f"With the best fit {grip.words()}. Unless it sticks to them they left it there, and "
-            "what follows is no response of the sample: identify it from the samples before."
+            f"With the best fit {grip.words()}. Unless it sticks to the jaws, they lost contact "
+            "then: identify the sample from the part of the trace before that."
         )
 
 
 def _noise(likelihood: Likelihood) -> Iterator[str]:
-    """Doubt what a fit leaves of a trace."""
+    """Yield doubts about the residuals and about the noise that was given."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return
@@ -141,7 +141,7 @@ def _noise(likelihood: Likelihood) -> Iterator[str]:
 
 
 def _too_little(likelihood: Likelihood) -> bool:
-    """Whether the noise leaves so small a misfit by chance only, which a chi-squared test tells."""
+    """Return True if the misfit is too small for the given noise, by a chi-squared test."""
     from scipy.special import chdtr
 
     residuals = likelihood.problem.residuals

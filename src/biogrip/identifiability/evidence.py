@@ -1,4 +1,4 @@
-"""How well a model with its prior foretells a trace: the evidence, by importance sampling.
+"""Bayesian evidence of a model with its prior, computed by importance sampling.
 
 References
 ----------
@@ -18,23 +18,23 @@ from biogrip.identifiability.sampling import Samples
 from biogrip.identifiability.straightened import straightened
 
 MOST_K_HAT = 0.7
-"""Above it, the largest weights are too few to tell how large weights become [2]."""
+"""Largest Pareto k-hat of importance weights with a reliable mean [2]."""
 
 _DRAWN = 20_000
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """Integral of likelihood times prior.
+    """Bayesian evidence: the integral of likelihood times prior over the parameters.
 
     Parameters
     ----------
     log
-        Its natural logarithm, densities of the trace being per rad.
+        Its natural logarithm, with densities of the trace per rad.
     error
-        Standard deviation of that.
+        Standard deviation of `log`.
     k_hat
-        Shape of the tail of the importance weights.
+        Pareto shape of the tail of the importance weights.
     """
 
     log: float
@@ -43,19 +43,19 @@ class Evidence:
 
     @property
     def reliable(self) -> bool:
-        """Whether the weights allow a judgement."""
+        """True if the tail of the importance weights is light enough for a reliable mean."""
         return self.k_hat <= MOST_K_HAT
 
 
 def evidence_of(posterior: Posterior, samples: Samples, rng: np.random.Generator) -> Evidence:
-    """Weigh points of a mixture that follows the samples.
+    """Compute the evidence with points drawn from a mixture that is fitted to the samples.
 
     Parameters
     ----------
     posterior, samples
-        What was sampled.
+        The posterior and samples of it.
     rng
-        Draws the points.
+        Random generator of the points.
     """
     from arviz_stats.base import array_stats
 
@@ -67,7 +67,7 @@ def evidence_of(posterior: Posterior, samples: Samples, rng: np.random.Generator
     largest = np.max(weights)
     relative = np.exp(weights - largest)
     mean = float(np.mean(relative))
-    # It takes log-ratios the other way round.
+    # `psislw` takes the negative logarithms of the weights.
     _, k_hat = array_stats.psislw(-weights[np.isfinite(weights)])
     return Evidence(
         float(largest + np.log(mean)),

@@ -1,4 +1,4 @@
-"""How precisely a trace can determine parameters: Fisher information and Cramer-Rao bounds.
+"""Fisher information and Cramer-Rao bounds of the parameters of a trace.
 
 References
 ----------
@@ -14,22 +14,22 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
 
-# A share of a sum this small, and whatever uncertainty it has, does not show.
+# Members with a smaller share in a sum are neglected, whatever their uncertainty.
 _NEGLIGIBLE = 1e-2
 
 
 def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
-    """Covariance of the log-parameters that least squares finds, to first order.
+    """Compute the first-order covariance of log-parameters estimated by least squares.
 
     With the same Gaussian noise everywhere, it is the inverse of the Fisher
     information J J^T / sigma^2: the Cramer-Rao bound, which no unbiased
-    estimator undercuts. With noise that changes along the trace it is what
-    unweighted least squares comes to, A J diag(sigma^2) J^T A with
+    estimator undercuts. With noise that changes along the trace, it is the
+    covariance of unweighted least squares, A J diag(sigma^2) J^T A with
     A = (J J^T)^-1, and no longer a bound.
 
-    A parameter that would not be known to within a factor e even if all others
-    were known carries no information. It is taken as known: near zero on a
-    logarithmic scale, a straight line says nothing of it or of what it does to others.
+    A parameter whose standard deviation exceeds one e-fold even with all others known
+    carries no information. It is fixed for the others' covariance: near zero on a
+    logarithmic scale, the linear approximation of its effect fails.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     if len(told) == 0:
         return found
     j = relative[told]
-    # Columns of length one, for parameters may differ by decades in what is told of them.
+    # Rows of length one, for parameters may differ by decades in their information.
     length = np.sqrt(np.sum(j**2, axis=1))
     j = j / length[:, None]
     inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
@@ -66,7 +66,7 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
 def bound(
     sensitivity: Array, noise_rad: float | Array, log_parameters: Array, q: Quantity
 ) -> float:
-    """Standard deviation of the logarithm of a quantity, to first order; see `covariance`."""
+    """Return the first-order standard deviation of a quantity's logarithm, by `covariance`."""
     slope = q.gradient(log_parameters)
     members = np.abs(slope) > _NEGLIGIBLE
     if not np.any(members):

@@ -1,10 +1,10 @@
-"""Quantities held exactly at given values, in many fits at once.
+"""Constraints that hold quantities exactly at given values, in many fits at once.
 
-One member of a quantity is eliminated: it follows from the others and the value
-(generalized reduced gradients, Abadie & Carpentier 1969). It is the member that
-dominates the quantity, chosen anew at every step among those that are not at a
-bound: eliminating another, a small step would throw it far. A stiff residual in
-its place would yield to the trace, the more the better the trace knows.
+One member of a quantity, a parameter in it, is eliminated: it follows from the others
+and the value (generalized reduced gradients [1]_). The dominant member is eliminated,
+chosen anew at every step among those that are not at a bound: any other would move far
+in a small step. A stiff penalty residual instead would be violated, the more the better
+the trace determines the quantity.
 
 References
 ----------
@@ -22,28 +22,28 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.levenberg_marquardt import Normal
 
-# E-folds from a bound at which a member counts as free, and by which rounding may take it over.
+# E-folds from a bound at which a member counts as free, and by which rounding may exceed it.
 _FREE, _ROUNDING = 1e-9, 1e-7
-# Of members at a bound, for the choice of the one that is eliminated.
+# Factor on the weight of members at a bound in the choice of the eliminated one.
 _UNWILLING = 1e-9
 _SMALLEST = 1e-200
 
 
 class HeldQuantities:
-    """What holds each of n fits.
+    """A constraint on each of n fits, which holds one quantity at a given value.
 
     Parameters
     ----------
     quantities
-        Any number of them.
+        Quantities that may be held.
     which : (n,)
-        Which of them each fit is held to.
+        Index of the quantity that each fit holds.
     targets : (n,)
-        And at which logarithm, within the quantity's range.
+        Logarithm of its value, within the quantity's range.
     low, high : (n_parameters,)
         Bounds of the log-parameters.
     longest_s
-        Time within which branches have to relax for quantities that ask for it.
+        Time within which branches must relax for quantities that require it.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class HeldQuantities:
         self._most_members = max(len(quantity.members) for quantity in quantities)
 
     def started(self, x: Array) -> Array:
-        """Move points, (n, n_parameters), to where the quantities have their values."""
+        """Move points, (n, n_parameters), onto the constraint."""
         everyone = np.arange(len(x))
         powers, sense = self._form(everyone)
         by = (self._targets - self._log(x, powers, sense))[:, None]
@@ -85,7 +85,7 @@ class HeldQuantities:
         return restored
 
     def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
-        """Normal equations with residuals for branches that relax too late."""
+        """Return the normal equations with penalty residuals for branches that relax too late."""
         beyond, slopes = self._late(x, fit)
         if not slopes.size:
             return normal
@@ -97,14 +97,14 @@ class HeldQuantities:
         )
 
     def price(self, x: Array) -> Array:
-        """What branches that relax too late add to the sums of squares, (n,)."""
+        """Return the penalty on the sums of squares for branches that relax too late, (n,)."""
         return np.sum(self._late(x, np.arange(len(x)))[0] ** 2, axis=1)
 
     def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
-        """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
+        """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
         slopes = self._slopes(x, fit)
         basic = self._dominant(x, slopes)
-        # Of the eliminated parameter by the others, with a minus; by itself 1.
+        # Minus the derivative of the eliminated parameter by each other one; 1 by itself.
         ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
         pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
         across = np.sum(normal.information * basic[:, :, None], axis=1)
@@ -118,7 +118,7 @@ class HeldQuantities:
         return replace(normal, gradient=gradient, information=information), basic
 
     def restored(self, x: Array, fit: IntArray, eliminated: BoolArray) -> Array:
-        """Points, (n, n_parameters), with the relation restored; NaN if bounds forbid that."""
+        """Move points, (n, n_parameters), onto the constraint; NaN where bounds forbid that."""
         x, basic, tried = x.copy(), eliminated, eliminated.copy()
         left = np.arange(len(x))
         for _ in range(self._most_members):
@@ -129,7 +129,7 @@ class HeldQuantities:
             left = left[~reached]
             if not len(left):
                 return x
-            # That one stays at its bound, and the next has to follow.
+            # The eliminated member stays at its bound, and the next one is eliminated.
             basic = self._dominant(x[left], self._slopes(x[left], fit[left]), tried[left])
             tried[left] |= basic
         x[left] = np.nan
@@ -147,7 +147,7 @@ class HeldQuantities:
         return marked
 
     def _late(self, x: Array, fit: IntArray) -> tuple[Array, Array]:
-        """Residuals of hinges, (n, n_hinges), and their slopes by the log-parameters."""
+        """Return the residuals of hinges, (n, n_hinges), and their log-parameter derivatives."""
         which = self._which[fit]
         forms, stiffness = self._forms[which], self._stiffness[which]
         beyond = np.sum(forms * x[:, None], axis=2) - self._allowed[which]
@@ -156,13 +156,13 @@ class HeldQuantities:
         return np.where(late, stiffness * beyond, 0.0), slopes
 
     def _slopes(self, x: Array, fit: IntArray) -> Array:
-        """Derivatives of the quantities' logarithms by the log-parameters, where they hold."""
+        """Return the log-parameter derivatives of the quantities' logarithms on the constraint."""
         powers, sense = self._form(fit)
         shares = np.exp(np.minimum(sense * (x - self._targets[fit][:, None]), 0.0))
         return np.where(sense == 0, powers, np.maximum(shares, _SMALLEST) * (powers != 0))
 
     def _followed(self, x: Array, fit: IntArray, basic: BoolArray) -> Array:
-        """Values of the members marked at which the quantities have theirs; infinite beyond."""
+        """Solve the constraints for the marked members; infinite where there is no solution."""
         powers, sense = self._form(fit)
         target = self._targets[fit][:, None]
         others = np.where(basic, 0.0, powers)
@@ -174,7 +174,7 @@ class HeldQuantities:
 
     @staticmethod
     def _log(x: Array, powers: Array, sense: Array) -> Array:
-        """Logarithms of quantities of these forms, (n,)."""
+        """Return the logarithms of quantities with these powers and senses, (n,)."""
         member = powers != 0
         largest = np.max(np.where(member, sense * x, -np.inf), axis=1, keepdims=True)
         terms = np.where(member, np.exp(np.minimum(sense * x - largest, 0.0)), 0.0)
@@ -182,6 +182,6 @@ class HeldQuantities:
         return np.where(sense[:, 0] == 0, np.sum(powers * x, axis=1), of_sum)
 
     def _form(self, fit: IntArray) -> tuple[Array, Array]:
-        """Powers of the members, (n, n_parameters), and the sense of each sum, (n, 1)."""
+        """Return the powers of the members, (n, n_parameters), and each sum's sense, (n, 1)."""
         which = self._which[fit]
         return self._powers[which], self._senses[which][:, None]

@@ -1,4 +1,4 @@
-"""Rises of chi^2 with quantities held exactly, for many traces, quantities and values at once."""
+"""Increase of chi^2 with a quantity held at a value, for many traces and quantities at once."""
 
 from collections.abc import Sequence
 
@@ -12,37 +12,37 @@ from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.local_fits import LocalFits
 
 CLOSE = 1e-7
-"""Tolerance of fits whose chi^2, of some thousand samples, is to be known to 0.001.
+"""Tolerance of fits that give chi^2 of some thousand readings to 0.001.
 
 Along a valley, a fit to the last digit takes three times as many steps.
 """
 
 
 class HeldFits:
-    """Fits of any of a number of traces with any of a number of quantities held.
+    """Fits of several traces with one of several quantities held at given values.
 
-    A profile is a quantity of a trace; those of the first trace come first.
+    Each profile belongs to a trace and a quantity; those of the first trace come first.
 
     Parameters
     ----------
     likelihoods
-        One a trace; their problems have to be `alike`.
+        One per trace; their problems have to be `alike`.
     quantities
-        What may be held.
+        Quantities that may be held.
 
     Attributes
     ----------
     trace : (n_profiles,)
-        Which trace each profile is of.
+        Index of the trace of each profile.
     best : (n_profiles, n_parameters)
-        Log-parameters of its optimum.
+        Log-parameters of the trace's optimum.
     at_best : (n_profiles,)
         Logarithm of the quantity there.
     threshold, certainty : (n_profiles,)
-        As of `Likelihood`; certainty is no less than the threshold.
+        As in `Likelihood`; certainty is no less than the threshold.
     deeper
-        By trace, the lowest rise so far and its log-parameters, if that is so far below
-        zero that the trace's optimum was missed.
+        By trace, the lowest increase of chi^2 and its log-parameters, if it is so far
+        below zero that the trace's global optimum was missed.
     """
 
     def __init__(self, likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]) -> None:
@@ -62,31 +62,31 @@ class HeldFits:
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
         scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
-        # Of chi^2 to sums of squares in the unit of the fits' residuals.
+        # Ratio of chi^2 to the fits' sums of squares.
         self._ratio = (scale_rad / self._noise_rad) ** 2
 
     def at(
         self, profile: IntArray, targets: Array, near: Array, tolerance: float
     ) -> tuple[Array, Array]:
-        """Fit with quantities held.
+        """Minimize chi^2 over all parameters with one quantity held at a value.
 
         Parameters
         ----------
         profile : (n,)
-            Which trace is fitted, and which quantity held.
+            Index of the profile: the trace that is fitted and the quantity that is held.
         targets : (n,)
             Logarithms at which the quantities are held, within their ranges.
         near : (n, n_parameters)
-            Log-parameters to start from; moved to where the quantities have their values.
+            Starts, log-parameters; moved onto the constraint.
         tolerance
             Of the fits, see `biogrip.identify.local_fits`.
 
         Returns
         -------
         rises : (n,)
-            Of chi^2 over each trace's optimum.
+            Increase of chi^2 over each trace's optimum.
         log_parameters : (n, n_parameters)
-            Where the quantities have their values to rounding.
+            Fitted log-parameters, on the constraint up to rounding.
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high, last_s = self._fits.low, self._fits.high, self._residuals.duration_s
@@ -97,14 +97,14 @@ class HeldFits:
     def from_each(
         self, profile: IntArray, targets: Array, starts: Array, tolerance: float
     ) -> tuple[Array, Array]:
-        """Fit as `at`, each from several starts, (n_starts, n, n_parameters).
+        """Fit as `at` does, each from several starts, (n_starts, n, n_parameters).
 
         Returns
         -------
         rises : (n_starts, n)
-            From each start.
+            Increase of chi^2 from each start.
         log_parameters : (n, n_parameters)
-            Where the rise is lowest.
+            Those of the lowest increase.
         """
         count, near = len(starts), np.concatenate(starts)
         rises, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
@@ -112,14 +112,14 @@ class HeldFits:
         return rises, x.reshape(starts.shape)[np.argmin(rises, axis=0), range(len(profile))]
 
     def with_fixed(self, x: Array, fixed: BoolArray, tolerance: float) -> tuple[Array, Array]:
-        """Fit the first trace, some parameters fixed; tolerance and returns as of `at`.
+        """Fit the first trace with some parameters fixed; tolerance and results as in `at`.
 
         Parameters
         ----------
         x : (n, n_parameters)
-            Log-parameters to start from.
+            Starts, log-parameters.
         fixed : (n_parameters,)
-            Which of them stay, be they within the search range or not.
+            True for parameters fixed at their start, within the search range or not.
         """
         trace = np.zeros(len(x), dtype=np.int64)
         low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
@@ -136,15 +136,15 @@ class HeldFits:
         return rises
 
     def ranges(self) -> Array:
-        """Lowest and highest logarithm in each profile, (2, n_profiles)."""
+        """Return the lowest and highest logarithm of each profile's quantity, (2, n_profiles)."""
         ends = [quantity.range(self._fits.low, self._fits.high) for quantity in self.quantities]
         return np.array(ends * len(self._optima)).T
 
     def deviations(self) -> Array:
-        """Standard deviations of the logarithms to first order, at most 1, (n_profiles,)."""
+        """Return the logarithms' first-order standard deviations, at most 1, (n_profiles,)."""
         information = self._fits.normal(self._optima, np.arange(len(self._optima))).information
         information = information * self._ratio[:, None, None]
         slopes = np.array([[q.gradient(x) for q in self.quantities] for x in self._optima])
-        # The prior keeps this regular.
+        # The prior keeps the matrix regular.
         spread = np.linalg.solve(information, slopes.swapaxes(1, 2)).swapaxes(1, 2)
         return np.sqrt(np.clip(np.sum(spread * slopes, axis=2), 0.0, 1.0)).ravel()

@@ -1,8 +1,8 @@
-"""What the rise of chi^2 over a trace's best fit is measured against.
+"""Noise and thresholds that define the profile likelihoods of a trace.
 
-The rise of the sum of squares over its minimum, in units of the noise's
-variance, is the rise of chi^2. A quantity has a confidence limit where the rise
-is the threshold.
+The increase of chi^2 is that of the sum of squares over its minimum, in units of the
+noise's variance. A quantity has a confidence limit where the increase equals the
+threshold.
 
 References
 ----------
@@ -20,18 +20,18 @@ from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.problem import Problem
 
 CERTAIN = 0.999
-"""Confidence with which a profile has to rise, at an end of the range, for that side to close."""
+"""Confidence that a profile must reach at an end of the range to have a limit on that side."""
 
 MISSED = 0.05
-"""Chi^2 that the prior, by which optima are chosen where the trace says nothing, may cost.
+"""Largest increase of chi^2 that the weak prior of local fits may cause.
 
-What is deeper than an optimum by more says that it was not the global one.
+A fit that is deeper than an optimum by more shows that the optimum is not the global one.
 """
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """What the profiles of one trace are measured against.
+    """Optimum, noise and thresholds that define the profile likelihoods of one trace.
 
     Parameters
     ----------
@@ -44,14 +44,14 @@ class Likelihood:
     noise_rad
         Standard deviation of the noise, known or estimated from the residual.
     threshold
-        Rise of chi^2 at the confidence limits: chi-squared with one degree of
-        freedom where the noise is known, F where it, or its colour, is estimated. It is that of an
-        interval with two ends: a limit that stands alone is one of these ends, and
+        Increase of chi^2 at the confidence limits: a quantile of chi-squared with one degree
+        of freedom if the noise is known, of F if its variance or autocorrelation is estimated.
+        It is that of an interval with two ends. A single limit is one of these ends, and
         holds with more than the confidence.
     certainty
-        Rise that a profile must have reached at the end of the range to be closed
-        there; the same at `CERTAIN`. A profile that levels off between the two has
-        a confidence limit by the luck of the noise alone.
+        Increase that a profile must reach at an end of the range to have a limit on that side:
+        the quantile at `CERTAIN`. A profile that levels off between `threshold` and
+        `certainty` would have a limit by chance of the noise alone.
     """
 
     problem: Problem
@@ -62,16 +62,16 @@ class Likelihood:
     certainty: float
 
     def rise(self, misfit_rad: float) -> float:
-        """Rise of chi^2 over the optimum."""
+        """Return the increase of chi^2 over the optimum."""
         excess = misfit_rad**2 - self.misfit_rad**2
         return float(self.problem.residuals.samples * excess / self.noise_rad**2)
 
     def deviation(self, quantity: Quantity) -> float:
-        """Standard deviation of a quantity's logarithm to first order, some e-folds at most.
+        """Return the first-order standard deviation of a quantity's logarithm.
 
-        Every parameter counts as known to an e-fold beforehand: beyond that a
-        straight line says nothing of it, nor of what it does to others. Unlike a
-        `bound`, this has no threshold that a parameter's information may pass.
+        Every parameter has a prior standard deviation of one e-fold, beyond which the
+        linear approximation fails; so the result is some e-folds at most. Unlike in a
+        `bound`, no parameter is left out for want of information.
         """
         rows = self.problem.residuals.condensed_responses(self.best[None])[0]
         relative = rows[1:] / self.noise_rad
@@ -88,14 +88,14 @@ def likelihood_of(
     confidence: float,
     noise_rad: float | None = None,
 ) -> Likelihood:
-    """Set the scale of a trace's profiles.
+    """Compute the noise and the thresholds for the profile likelihoods of a trace.
 
     Parameters
     ----------
     problem, best, misfit_rad
-        As of `Likelihood`.
+        As in `Likelihood`.
     confidence
-        Of the limits, e.g. 0.95.
+        Confidence level of the limits, e.g. 0.95.
     noise_rad
         Standard deviation of the noise if it is known.
     """

@@ -1,7 +1,7 @@
 """Confidence limits of the optimum's own basin, for all quantities of many traces at once.
 
-To the last bit, the limits for a trace do not depend on which others there are. Where
-that basin leads over into a lower one, they are the limits of both.
+The limits of a trace do not depend, to the last bit, on the other traces. If the
+optimum's basin leads into a lower one, the limits are those of both basins.
 """
 
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fits import alike
 
-# Limits to a thousandth of a standard deviation.
+# Accuracy of limits, in standard deviations.
 _ACCURACY = 1e-3
 # The first step outwards, in standard deviations, and how often it may double.
 _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
@@ -24,22 +24,22 @@ _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
 def limits_and_deeper(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> tuple[Array, dict[int, Array]]:
-    """Find where the rise of chi^2 equals the threshold, and what is deeper than the optima.
+    """Find the confidence limits of quantities by profile likelihood, and optima that were missed.
 
     Parameters
     ----------
     likelihoods
-        One a trace, of any number of experiments.
+        One per trace, of one or several experiments.
     quantities
-        Whose limits are wanted.
+        Quantities whose limits are computed.
 
     Returns
     -------
     limits : (n_traces, n_quantities, 2)
-        Logarithms of the lower and upper limits; NaN where the trace does not close the profile.
+        Logarithms of the lower and upper limits; NaN where the profile stays below the threshold.
     deeper
-        By trace, log-parameters whose chi^2 is clearly below that of its optimum, so that
-        this was missed.
+        By trace, log-parameters whose chi^2 is clearly below that of its optimum, which is
+        not the global one.
     """
     limits = np.empty((len(likelihoods), len(quantities), 2))
     deeper: dict[int, Array] = {}
@@ -53,7 +53,7 @@ def limits_and_deeper(
 
 
 def _limits(fits: HeldFits) -> Array:
-    """Lower and upper limits by profile, one after the other, (2 n_profiles,)."""
+    """Return the lower and upper limit of each profile in turn, (2 n_profiles,)."""
     profile, upper = (index.ravel() for index in np.indices((len(fits.best), 2)))
     stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[profile]
     # Inside and outside, by row.
@@ -71,10 +71,10 @@ def _limits(fits: HeldFits) -> Array:
         side = (rise >= fits.threshold[profile[left]]).astype(np.int64)
         ends[side, left], rises[side, left], x[side, left] = tried, rise, found
         closed = left[side == 1]
-        # From nowhere else: limits are those of the optimum's own basin.
+        # No additional starts: limits are those of the optimum's own basin.
         brackets = Brackets(profile[closed], ends[:, closed], rises[:, closed], x[:, closed])
         limits[closed] = crossings(fits, brackets, CLOSE, _ACCURACY)
-        # Where another basin is below the threshold there, that is the way on.
+        # If another basin is below the threshold at the outer end, the search continues there.
         on = np.isnan(limits[closed])
         ends[0, closed[on]], rises[0, closed[on]] = brackets.values[1, on], brackets.rises[1, on]
         x[0, closed[on]] = brackets.x[1, on]

@@ -1,4 +1,4 @@
-"""What samples of a posterior say of single quantities, beside their profile likelihoods."""
+"""Marginal posteriors of single quantities, compared with their profile likelihoods."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,30 +9,29 @@ from biogrip.arrays import Array
 from biogrip.identifiability.quantities import Quantity
 
 AGREES, PRIOR, DIFFERS = "agrees", "prior", "differs"
-"""With a profile: the same interval; an end is what the prior leaves; another interval."""
+"""Comparison with a profile: the same interval; an end set by the prior; another interval."""
 
-# Of the width of a profile's interval, by which ends may differ: its own error, as the normal
-# distribution that it supposes is one of many samples only, and that of some thousand samples.
+# Share of the width of a profile's interval by which ends may differ: the profile's own error, as
+# its threshold is asymptotic in the number of readings, and that of some thousand samples.
 _ALLOWED = 0.15
 _INNER = 0.5
 
 
 @dataclass(frozen=True)
 class Marginal:
-    """A quantity's posterior, in SI units.
+    """The marginal posterior of a quantity, in SI units.
 
     Parameters
     ----------
     quantity
-        Which one.
+        The quantity.
     median
-        Half of the samples are above.
+        Median of the samples.
     inner, outer
-        Ends of the intervals that leave as many samples below as above: of 50 %, and of the
-        confidence that was asked for.
+        Equal-tailed credible intervals, of 50 % and of the confidence that was asked for.
     share
-        Of the samples, those in which what the quantity takes for granted holds; the others
-        do not count.
+        Share of the samples that fulfil the conditions of the quantity, its `hinges`;
+        the others do not count.
     """
 
     quantity: Quantity
@@ -42,7 +41,7 @@ class Marginal:
     share: float
 
     def words(self) -> str:
-        """Say it, e.g. ``34.6 N/m (31.6 to 38; half of it 33.5 to 35.7)``."""
+        """Describe it in words, e.g. ``34.6 N/m (31.6 to 38; half of it 33.5 to 35.7)``."""
         (low, high), (start, end) = self.outer, self.inner
         provided = f", provided {self.quantity.provided}" if self.quantity.provided else ""
         return (
@@ -51,7 +50,7 @@ class Marginal:
         )
 
     def against(self, low: float | None, high: float | None) -> str:
-        """Compare with the limits of a profile likelihood, of the same confidence."""
+        """Compare the outer interval with profile likelihood limits of the same confidence."""
         if low is None or high is None:
             return PRIOR
         width = np.log(high / low)
@@ -59,15 +58,15 @@ class Marginal:
         return AGREES if np.max(shifts) <= _ALLOWED * width else DIFFERS
 
     def why(self, low: float | None, high: float | None) -> str:
-        """Say in a sentence how the interval and a profile's limits go together."""
+        """Explain in a sentence how the interval compares with a profile's limits."""
         label, verdict = self.quantity.label, self.against(low, high)
         if verdict == AGREES:
             return f"{label}: the interval is that of the profile."
         if verdict == DIFFERS:
             return (
                 f"{label}: the profile has {low:.3g} to {high:.3g}. It takes the best fit at every "
-                "value; the posterior counts how much of the prior fits, and much of it does "
-                "where other parameters are free."
+                "value; the posterior integrates over all other parameters, and so favours values "
+                "at which more of them fit."
             )
         ends = {"lower": low, "upper": high}
         free = " and ".join(name for name, limit in ends.items() if limit is None)
@@ -82,16 +81,16 @@ class Marginal:
 def marginals_of(
     log_parameters: Array, quantities: Sequence[Quantity], duration_s: float, confidence: float
 ) -> list[Marginal]:
-    """Return the posteriors of quantities.
+    """Compute the marginal posteriors of quantities from samples.
 
     Parameters
     ----------
     log_parameters : (n, n_parameters)
         Samples.
     quantities
-        Of which.
+        Quantities of interest.
     duration_s
-        Length of the experiment, within which branches have to relax where a quantity says so.
+        Length of the experiment, within which branches must relax if a quantity requires it.
     confidence
         Of the outer intervals.
     """
@@ -100,7 +99,7 @@ def marginals_of(
     for quantity in quantities:
         late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.hinges]
         holds = np.all(np.less_equal(late, 0.0).reshape(-1, count), axis=0)
-        # Where it hardly ever holds, there is nothing better to say.
+        # If no sample fulfils the conditions, all count.
         counted = log_parameters[holds] if np.any(holds) else log_parameters
         median, a, b, c, d = np.exp(np.quantile(quantity.logs(counted), levels)).tolist()
         found.append(Marginal(quantity, median, (a, b), (c, d), float(np.mean(holds))))

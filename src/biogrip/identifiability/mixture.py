@@ -1,8 +1,8 @@
-"""A mixture of multivariate t distributions that follows a cloud of samples.
+"""Mixture of multivariate t distributions, fitted to posterior samples.
 
-What a trace tells is a hill in some directions and a plateau over decades in others.
-Clusters of samples (k-means), a t distribution each, follow both: independent samples
-are proposed from it, and the evidence is weighed with it.
+A posterior may have a peak in some directions and a plateau over decades in others.
+Clusters of samples (k-means), a t distribution each, approximate both. The mixture gives
+independent proposals to the sampler, and importance weights to the evidence.
 
 References
 ----------
@@ -24,17 +24,17 @@ FREEDOM = 5
 """Degrees of freedom: tails heavy enough for importance weights to be bounded."""
 
 _MOST_CLUSTERS = 60
-# Points a cluster has, a dimension; and how many of all that it is fitted to.
+# Points per cluster and dimension; and the most points that a mixture is fitted to.
 _POINTS, _MOST_POINTS = 5, 10_000
-# A share of the weight is divided equally: where samples are few, proposals must not be fewer.
+# Share of the weight that is divided equally, so that proposals are not rarer than samples.
 _ALIKE = 0.2
-# A share of the whole cloud's variance that no direction of a cluster falls short of.
+# Least variance of a cluster in any direction, relative to that of all points.
 _LEAST_VARIANCE = 1e-10
 
 
 @dataclass(frozen=True)
 class Mixture:
-    """Weighted t distributions.
+    """Weighted multivariate t distributions.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class Mixture:
         Sum to one.
     centres : (n_clusters, n_dimensions)
     factors : (n_clusters, n_dimensions, n_dimensions)
-        Lower triangles whose squares are the scale matrices.
+        Lower Cholesky factors of the scale matrices.
     """
 
     weights: Array
@@ -50,7 +50,7 @@ class Mixture:
     factors: Array
 
     def log_density(self, points: Array) -> Array:
-        """Logarithm of the density at points (n, n_dimensions), (n,)."""
+        """Return the logarithm of the density, (n,), at points, (n, n_dimensions)."""
         peaks, scaling = self._peaks
         scaled = (points - self.centres[:, None]) @ scaling
         distance = np.einsum("kni,kni->kn", scaled, scaled)
@@ -61,7 +61,7 @@ class Mixture:
 
     @cached_property
     def _peaks(self) -> tuple[Array, Array]:
-        """Logarithms of the densities at the centres, (n_clusters,), and what scales distances."""
+        """Log densities at the centres, (n_clusters,), and inverse factors that scale distances."""
         size = self.centres.shape[1]
         logs = np.log(np.diagonal(self.factors, axis1=1, axis2=2))
         constant = lgamma((FREEDOM + size) / 2) - lgamma(FREEDOM / 2)
@@ -84,9 +84,9 @@ def mixture_of(points: Array, rng: np.random.Generator) -> Mixture:
     Parameters
     ----------
     points : (n, n_dimensions)
-        Samples; some dozens a dimension at least.
+        Samples; at least some dozens per dimension.
     rng
-        Seeds the clusters.
+        Random generator that seeds the clusters.
     """
     from scipy.cluster.vq import kmeans2
 
@@ -101,7 +101,7 @@ def mixture_of(points: Array, rng: np.random.Generator) -> Mixture:
     squares = np.zeros((len(found), size, size))
     np.add.at(squares, own, away[:, :, None] * away[:, None, :])
     usual = np.sum(squares, axis=0) / count + np.diag(_LEAST_VARIANCE * spread**2)
-    # Of a cluster of few points, the others' shape is a part: as if it had so many points of it.
+    # Scale matrices are shrunk towards their mean, as if it stood for this many points.
     borrowed = size + 2
     scales = (squares + borrowed * usual) / (sizes + borrowed)[:, None, None]
     weights = (1 - _ALIKE) * sizes / count + _ALIKE / len(found)

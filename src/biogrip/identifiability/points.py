@@ -1,4 +1,4 @@
-"""Points of profiles: fitted from one another, and as many as it takes to draw them."""
+"""Points of profiles, fitted from one another, and added where drawings need more of them."""
 
 from collections.abc import Sequence
 
@@ -9,17 +9,17 @@ from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identify.local_fits import FAIR
 
 HIGHEST = 16.0
-"""Rise up to which a profile has dense points: what a figure shows of it."""
+"""Increase of chi^2 up to which a profile has dense points, as figures show no more."""
 
-# Between neighbours the square root of the rise, nearly linear, changes by so much at most.
+# Largest difference between neighbours of the square root of the increase, which is nearly linear.
 _STEP = 0.3
 _MOST_ROUNDS = 8
 NEWS = 1e-3
-"""Share of one more than the rise by which a fit becomes better, to be news to its neighbours."""
+"""Improvement of a fit, relative to 1 + increase of chi^2, that has its neighbours fitted again."""
 
 
 class Points:
-    """Points of profiles, one profile after the other, as far as they are fitted.
+    """Points of several profiles, one profile after the other, with their best fits so far.
 
     Parameters
     ----------
@@ -31,9 +31,9 @@ class Points:
     Attributes
     ----------
     profile : (n_points,)
-        Which profile each is of.
+        Index of the profile of each point.
     values, rises : (n_points,)
-        Logarithms of the quantity, and rises of chi^2.
+        Logarithms of the quantity, and increases of chi^2.
     x : (n_points, n_parameters)
         Log-parameters fitted there.
     """
@@ -47,13 +47,13 @@ class Points:
         self.rises = np.where(self._optimum, 0.0, np.inf)
 
     def from_optimum(self) -> None:
-        """Fit every point but the optimum from the optimum, which is where they start."""
+        """Fit every point but the optimum, starting from the optimum."""
         point = np.flatnonzero(~self._optimum)
         self._try(point, point, FAIR)
 
     def from_neighbours(self) -> None:
-        """Fit points from their neighbours' fits, as long as these are news."""
-        # Neither an optimum nor what is beyond the ends is any profile's to fit.
+        """Fit points from their neighbours' fits, as long as these have improved."""
+        # Optima, and places beyond the ends, belong to no profile here: they are not fitted.
         to_fit = np.append(np.where(self._optimum, -1, self.profile), -1)
         news = np.full(len(self.values), True)
         while np.any(news):
@@ -63,7 +63,7 @@ class Points:
             news = self._try(point[own], start[own], CLOSE)
 
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
-        """Fit points from other points' fits; tell which have become much better."""
+        """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
         rises, x = self.fits.at(profile, targets, self.x[start], tolerance)
         news = np.zeros(len(self.values), dtype=bool)
@@ -77,22 +77,22 @@ class Points:
         return news
 
     def ends(self) -> IntArray:
-        """First and last point of every profile, (2, n_profiles)."""
+        """Return the indices of the first and last point of every profile, (2, n_profiles)."""
         every = np.arange(len(self.fits.best))
         last = np.searchsorted(self.profile, every, side="right") - 1
         return np.stack((np.searchsorted(self.profile, every), last))
 
     def extremes(self) -> Array:
-        """Fits at both ends of each trace's profiles, (2 n_quantities, n_traces, n_parameters).
+        """Return the fits at both ends of profiles, (2 n_quantities, n_traces, n_parameters).
 
-        A basin that some profile comes to may be the deepest at the limit of another.
+        A basin at the end of one profile may be the deepest at the limit of another.
         """
         ends = self.x[self.ends()].reshape(2, len(self.fits.likelihoods), -1, self.x.shape[1])
         extremes: Array = np.concatenate(ends.swapaxes(1, 2))
         return extremes
 
     def smooth(self, limits: Array) -> None:
-        """Add points, at last: the limits, then halfway wherever two neighbours are far apart.
+        """Add points for drawing: the limits, then midpoints of neighbours that are far apart.
 
         Parameters
         ----------
@@ -111,7 +111,7 @@ class Points:
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
 
     def _add(self, left: IntArray, values: Array) -> None:
-        """Fit new points after others, from both neighbours; the lower fit counts."""
+        """Insert points after given ones, each with the lower of the fits from both neighbours."""
         if not len(left):
             return
         profile, right = self.profile[left], left + 1

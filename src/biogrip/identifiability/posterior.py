@@ -1,4 +1,4 @@
-"""The posterior of a sample's parameters, the noise's level being taken account of.
+"""Posterior of a sample's parameters, with an unknown noise level integrated out.
 
 References
 ----------
@@ -18,14 +18,14 @@ from biogrip.identify.problem import Problem
 
 @dataclass(frozen=True)
 class Posterior:
-    """Density of the log-parameters given a trace, up to the evidence.
+    """Posterior density of the log-parameters of a trace, not divided by the evidence.
 
     Parameters
     ----------
     problem
         The trace and the model.
     prior
-        What is known beforehand.
+        Prior of the log-parameters.
     noise_rad
         Standard deviation of the noise if it is known.
     """
@@ -35,35 +35,35 @@ class Posterior:
     noise_rad: float | None = None
 
     def log_density(self, log_parameters: Array, power: float = 1.0) -> Array:
-        """Logarithm of likelihood times prior; a sample's does not depend on the others.
+        """Return the logarithm of likelihood times prior, of each point independent of others.
 
         Parameters
         ----------
         log_parameters : (n, n_parameters)
         power
-            To which the likelihood is raised.
+            Power to which the likelihood is raised.
 
         Returns
         -------
         (n,)
-            Minus infinity where the prior forbids a sample, or the model has no answer.
+            Minus infinity where the prior excludes a point, or the model has no response.
         """
         density = self.prior.log_density(log_parameters)
         allowed = np.flatnonzero(np.isfinite(density))
         if len(allowed):
-            # Whether a proposal is accepted is a comparison: the fewer digits a sum of squares
-            # loses, the rarer it is that two processors disagree about one.
+            # Accepting a proposal is a comparison: the fewer digits a sum of squares loses, the
+            # rarer it is that two processors disagree.
             misfit_rad = self.problem.residuals.condensed_misfit(np.exp(log_parameters[allowed]))
             density[allowed] += power * self.log_likelihood(misfit_rad)
         return np.where(np.isnan(density), -np.inf, density)
 
     def log_likelihood(self, misfit_rad: Array) -> Array:
-        r"""Logarithm of the likelihood of samples with these misfits, (n,).
+        r"""Return the logarithms of the likelihood for given misfits, (n,).
 
-        With S the sum of squares and nu the samples less what the instrument may have
-        added, whose coefficients have no other prior than a flat one: where the noise
-        is known, -nu/2 ln(2 pi sigma^2) - S/(2 sigma^2). Where it is not, sigma has
-        Jeffreys' prior 1/sigma, and its integral is
+        S is the sum of squares, and nu the number of readings less that of nuisance
+        functions, whose coefficients have a flat prior. If the noise is known, the
+        logarithm is -nu/2 ln(2 pi sigma^2) - S/(2 sigma^2). If it is not, sigma has
+        Jeffreys' prior 1/sigma, and the likelihood integrated over it is
 
             Gamma(nu/2) / 2 (pi S)^(-nu/2)                                [1], section 1.3
         """

@@ -1,4 +1,4 @@
-"""What is known of a sample beforehand, and how long its posterior may be sampled."""
+"""Settings of posterior sampling: priors of parameters, and numbers of walkers and steps."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,7 +12,7 @@ from biogrip.keys import Key, Problem
 
 @dataclass(frozen=True)
 class LogNormal:
-    """A parameter whose logarithm is normal beforehand, within the search range."""
+    """Log-normal prior of a parameter, truncated to the search range."""
 
     median: Annotated[float, Key("Median, SI units.", above=0, high=1e12)]
     spread: Annotated[float, Key("Standard deviation of the natural logarithm.", above=0, high=100)]
@@ -20,18 +20,18 @@ class LogNormal:
 
 @dataclass(frozen=True)
 class PosteriorSettings:
-    """Samples of the posterior of the first trace; nothing is sampled without this block."""
+    """Sampling of the posterior of the first trace; nothing is sampled without this block."""
 
     prior: Annotated[
         Mapping[str, LogNormal],
         Key(
-            "What is known beforehand, by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
+            "Log-normal priors by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
             "being the standard deviation of the natural logarithm. All others are uniform in "
             "their logarithms over the search range."
         ),
     ] = field(default_factory=dict)
     walkers: Annotated[
-        int, Key("Samples that move together. By default 100.", low=20, high=10_000)
+        int, Key("Number of walkers in the ensemble. By default 100.", low=20, high=10_000)
     ] = 100
     most_steps: Annotated[
         int,
@@ -45,24 +45,24 @@ class PosteriorSettings:
     evidence: Annotated[
         bool,
         Key(
-            "Whether the models of `model_selection` are sampled, too, and their evidence is "
+            "If true, the models of `model_selection` are sampled, too, and their evidence is "
             "compared. By default false."
         ),
     ] = False
 
     def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
-        """Find too few walkers, and priors of what a model lacks or tells by its order.
+        """Find too few walkers, and priors of parameters that are not searched or are ordered.
 
         Parameters
         ----------
         model
-            Of the sample.
+            Sample model.
         known
-            Parameters that are not identified.
+            Names of parameters that are fixed.
         """
         searched = [name for name in model.names if name not in known]
         if self.walkers < 2 * len(searched):
-            # As emcee wants them: their differences have to span all directions.
+            # emcee requires it: differences of walkers have to span all directions.
             text = f"found {self.walkers}, allowed are at least {2 * len(searched)}"
             yield ("walkers",), f"{text} to identify {counted(len(searched), 'parameter')}."
         branches = [name for pair in model.branches for name in pair] * (len(model.branches) > 1)

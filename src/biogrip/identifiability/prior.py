@@ -1,4 +1,4 @@
-"""What is known of a sample before its trace is looked at."""
+"""Prior of a sample's log-parameters."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from biogrip.identifiability.posterior_settings import LogNormal
 
 @dataclass(frozen=True)
 class Prior:
-    """Normal distributions of the log-parameters, cut off at the ends of the search range.
+    """Normal priors of the log-parameters, truncated at the ends of the search range.
 
-    One of no precision is uniform. Branches relax in their order, the fastest first:
-    a trace is the same whichever is called which.
+    A prior of zero precision is uniform. Branches are in the order of their relaxation
+    times, the fastest first: exchanging them does not change a response.
 
     Parameters
     ----------
     model
-        Whose parameters.
+        Sample model.
     low, high : (n_parameters,)
-        Ends of the range.
+        Ends of the search range.
     centre, precision : (n_parameters,)
-        Logarithms of medians, before the cut, and one over standard deviations.
+        Logarithms of the medians before truncation; reciprocal standard deviations.
     """
 
     model: SampleModel
@@ -36,7 +36,7 @@ class Prior:
     precision: Array
 
     def log_density(self, log_parameters: Array) -> Array:
-        """Logarithm of the density of the log-parameters, which integrates to one.
+        """Return the logarithm of the density of the log-parameters, which integrates to one.
 
         Parameters
         ----------
@@ -45,7 +45,7 @@ class Prior:
         Returns
         -------
         (n,)
-            Minus infinity outside the range, and where branches are not in their order.
+            Minus infinity outside the range, and where branches are out of order.
         """
         away = (log_parameters - self.centre) * self.precision
         density = self._largest - 0.5 * np.sum(away**2, axis=1)
@@ -58,7 +58,7 @@ class Prior:
         return np.where(allowed, density, -np.inf)
 
     def draw(self, count: int, rng: np.random.Generator) -> Array:
-        """Draw log-parameters, (count, n_parameters)."""
+        """Draw log-parameters from the prior, (count, n_parameters)."""
         from scipy.special import ndtri
 
         share = rng.random((count, len(self.low)))
@@ -81,7 +81,7 @@ class Prior:
 
     @cached_property
     def _largest(self) -> float:
-        """Logarithm of the density at the centre."""
+        """Logarithm of the prior density at its centre."""
         below, above = self._within
         told = self.precision > 0
         of_normal = np.log(self.precision[told] / np.sqrt(2 * np.pi) / (above - below)[told])
@@ -96,11 +96,11 @@ def prior_of(model: SampleModel, low: Array, high: Array, told: Mapping[str, Log
     Parameters
     ----------
     model
-        Whose parameters.
+        Sample model.
     low, high : (n_parameters,)
         Logarithms of the ends of the search range.
     told
-        What is known beforehand, by name; the others are log-uniform.
+        Log-normal priors by parameter name; the others are log-uniform.
     """
     centre, precision = 0.5 * (low + high), np.zeros(len(low))
     for index, name in enumerate(model.names):

@@ -1,10 +1,9 @@
-"""Profile likelihood: how well a trace can still be fitted with one quantity held.
+"""Profile likelihood: minimum of chi^2 over all parameters as a function of one quantity.
 
-Of all quantities of many traces at once. All points are fitted from the
-optimum at once, then from the fits of both neighbours, again and again where these
-have become better: what is a basin anywhere in a profile is followed both ways. The
-limits are the outermost: what is between them need not all be within confidence,
-and where it is not is told as gaps.
+All quantities of many traces are profiled at once. All points are fitted from the
+optimum, then from the fits of both neighbours, again and again where these have
+improved: a basin found anywhere in a profile is followed both ways. The confidence
+limits are the outermost: values between them may be excluded, too, which gaps tell.
 
 References
 ----------
@@ -28,13 +27,13 @@ from biogrip.identifiability.points import Points
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fits import FINE, alike
 
-# Steps away from the best fit, in standard deviations, that every profile has.
+# Points near the best fit, in standard deviations, that every profile has.
 _NEAR = np.array([z for z in np.arange(-4.0, 4.1, 0.5) if z != 0])
 _POINTS = 35
-# Points closer than this are one.
+# Points closer to the optimum than this are left out.
 _APART = 1e-9
 _ACCURACY = 1e-5
-# Fits end where chi^2 is known to a hundredth: what exceeds the threshold by less does not.
+# Factor by which a gap exceeds the threshold: fits give chi^2 with an error of about 0.01.
 _CLEARLY = 1.01
 
 
@@ -45,15 +44,15 @@ class Profile:
     Parameters
     ----------
     log_values, rises : (n_points,)
-        Ascending values, and the rise of chi^2 at each.
+        Ascending values, and the increase of chi^2 at each.
     best
         Value at the optimum.
     low, high
-        Confidence limits; None where the trace does not close the profile.
+        Confidence limits; None on a side where the trace sets no limit.
     lowest : (n_parameters,)
-        Log-parameters at the lowest rise, which is below zero if the optimum was missed.
+        Log-parameters of the lowest increase, which is negative if the optimum was missed.
     gaps
-        Where, between points within confidence, the profile is above the threshold.
+        Stretches between the limits in which the profile is above the threshold.
     """
 
     log_values: Array
@@ -68,16 +67,16 @@ class Profile:
 def profiles_of(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
-    """Follow quantities over their whole ranges, and find their confidence limits.
+    """Compute profile likelihoods over the whole ranges of quantities, and confidence limits.
 
     Parameters
     ----------
     likelihoods
-        One a trace.
+        One per trace.
     quantities
-        Whose profiles are wanted.
+        Quantities that are profiled.
     smooth
-        Whether with as many points as it takes to draw them.
+        True to add as many points as a drawing needs.
 
     Returns
     -------
@@ -114,17 +113,17 @@ def _profiles(fits: HeldFits, *, smooth: bool) -> list[Profile]:
 
 
 def _grid(likelihood: Likelihood, quantity: Quantity) -> Array:
-    """Values over a quantity's whole range, ascending: its best, denser near by, and both ends."""
+    """Return ascending values over a quantity's whole range, denser near the optimum."""
     low, high = quantity.range(likelihood.problem.low, likelihood.problem.high)
     start = quantity.log(likelihood.best)
     near = start + likelihood.deviation(quantity) * _NEAR
     others = np.concatenate((near[(near > low) & (near < high)], np.linspace(low, high, _POINTS)))
-    # Last bits must not make two points of an optimum that lies at an end.
+    # Rounding must not make two points of an optimum that lies at an end.
     return np.unique(np.append(others[np.abs(others - start) > _APART], start))
 
 
 def _limits(points: Points) -> Array:
-    """Where profiles cross the threshold, (2, n_profiles); NaN where they are not closed."""
+    """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
     fits, ends = points.fits, points.ends()
     crossed = np.full(ends.shape, np.nan)
     end, profile = np.nonzero(points.rises[ends] > fits.certainty)
@@ -148,19 +147,19 @@ def _limits(points: Points) -> Array:
 
 
 def gaps_of(log_values: Array, rises: Array, threshold: float) -> tuple[tuple[float, float], ...]:
-    """Stretches between points within confidence that are not within confidence themselves.
+    """Find the stretches of a profile above the threshold that lie between points below it.
 
     Parameters
     ----------
     log_values, rises : (n_points,)
         A profile.
     threshold
-        Rise at the limits.
+        Increase of chi^2 at the limits.
 
     Returns
     -------
     tuple of (float, float)
-        Where each begins and ends, between points as the square root of the rise has it.
+        Both ends of each, interpolated linearly in the square root of the increase.
     """
     inside = np.flatnonzero(rises < threshold).tolist()
     found = []

@@ -1,7 +1,7 @@
-"""Single numbers that a trace may determine: parameters, and combinations of them.
+"""Quantities that a trace may determine: parameters, and combinations of parameters.
 
-All are positive, and known through their logarithm as a function of the
-logarithms of the parameters.
+All are positive, and are represented by their logarithm as a function of the
+log-parameters.
 """
 
 from dataclasses import dataclass, replace
@@ -12,22 +12,22 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 
-# A branch may relax within twice the experiment at the price of chi^2 rising by some 50, and
-# after one that comes later, by a hundredth, at that of rising by 1.
+# Slopes of hinges: a relaxation time of twice the experiment increases chi^2 by some 50, and one
+# a hundredth above that of the next branch by 1.
 _WITHIN, _IN_ORDER = 10.0, 100.0
 
 
 @dataclass(frozen=True)
 class Hinge:
-    """A residual that is zero while a branch relaxes early enough.
+    """A penalty residual that is zero while a branch relaxes early enough.
 
     Parameters
     ----------
     branch
-        Spring and damper, by index.
+        Indices of its spring and damper.
     before
-        Those of the branch that has to relax later; None if it is the experiment
-        within which this one has to relax.
+        Those of the branch that must relax later; None if the branch must relax
+        within the experiment.
     """
 
     branch: tuple[int, int]
@@ -35,11 +35,11 @@ class Hinge:
 
     @property
     def stiffness(self) -> float:
-        """How fast the residual grows, in standard deviations an e-fold."""
+        """Slope of the residual, in standard deviations per e-fold."""
         return _WITHIN if self.before is None else _IN_ORDER
 
     def form(self, n_parameters: int) -> Array:
-        """Coefficients of the log-parameters, (n_parameters,), in how much too late it is."""
+        """Return the coefficients, (n_parameters,), of its log (relative) relaxation time."""
         found = np.zeros(n_parameters)
         for branch, sign in ((self.branch, 1.0), (self.before, -1.0)):
             if branch is not None:
@@ -48,30 +48,30 @@ class Hinge:
         return found
 
     def allowed(self, longest_s: float) -> float:
-        """What of it is not too late; the experiment lasts so long."""
+        """Return the largest such log time without penalty, for the length of an experiment."""
         return float(np.log(longest_s)) if self.before is None else 0.0
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A combination of a model's parameters.
+    """A parameter of a model, or a combination of its parameters.
 
     Parameters
     ----------
     label, symbol, unit
-        In tables; as mathtext; in SI.
+        Name in tables; name as mathtext; SI unit.
     members
-        Indices of the parameters that it is made of.
+        Indices of the parameters in it.
     sign : (n_members,)
-        Powers, of a product (times of relaxation are quotients).
+        Powers in a product (relaxation times are quotients).
     form
         ``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of
         reciprocals.
     hinges
-        What has to hold for the quantity to mean anything. Of a sum, that branches relax
+        Conditions for the quantity to be meaningful. A sum requires that branches relax
         within the experiment: the damper of a branch too weak and slow to be seen could
-        be of any size. Of one branch among several, that they relax in their order: any
-        could take the name of another.
+        have any size. Parameters of several branches require that these relax in order:
+        branches could exchange their names.
     """
 
     label: str
@@ -84,25 +84,25 @@ class Quantity:
 
     @property
     def provided(self) -> str | None:
-        """What is taken for granted of the sample, if anything is."""
+        """Assumption about the sample, in words, if there is one."""
         count = sum(hinge.before is None for hinge in self.hinges)
         if not count:
             return None
         return f"the {'branch relaxes' if count == 1 else 'branches relax'} within the experiment"
 
     def log(self, log_parameters: Array) -> float:
-        """Logarithm of the quantity, from log-parameters of shape (n_parameters,)."""
+        """Return its logarithm, from log-parameters of shape (n_parameters,)."""
         return float(self.logs(log_parameters[None])[0])
 
     def logs(self, log_parameters: Array) -> Array:
-        """Logarithms of many, (n,), from log-parameters of shape (n, n_parameters)."""
+        """Return its logarithms, (n,), from log-parameters of shape (n, n_parameters)."""
         x = log_parameters[:, list(self.members)]
         if self.form == "product":
             return np.sum(x * np.array(self.sign), axis=1)
         return self.sense * np.logaddexp.reduce(self.sense * x, axis=1)
 
     def gradient(self, log_parameters: Array) -> Array:
-        """Its derivatives by the log-parameters, (n_parameters,)."""
+        """Return the derivatives of its logarithm by the log-parameters, (n_parameters,)."""
         slope = np.zeros_like(log_parameters)
         if self.form == "product":
             slope[list(self.members)] = self.sign
@@ -112,11 +112,11 @@ class Quantity:
         return slope
 
     def range(self, low: Array, high: Array) -> tuple[float, float]:
-        """Logarithms between which it can lie if the log-parameters lie within bounds.
+        """Return its lowest and highest logarithm for log-parameters within bounds.
 
-        Of a sum and a series combination, as far as one member can reach whatever the others
-        are: where all of them have to be at the ends of their ranges, it is these that keep
-        the quantity from going further, and not the trace.
+        The upper end of a sum, and the lower end of a series combination, is what one member
+        can reach whatever the others are. Beyond it, all members would be at the ends of their
+        ranges, and these ends, not the trace, would bound the quantity.
         """
         members = list(self.members)
         if self.form == "product":
@@ -128,12 +128,12 @@ class Quantity:
 
     @property
     def sense(self) -> int:
-        """Power of the members in the sum: 1, or -1 of a series; 0 of a product, which has none."""
+        """Power of the members in the sum: 1 in a sum, -1 in a series; 0 in a product."""
         return {"product": 0, "sum": 1, "series": -1}[self.form]
 
 
 def parameters_and_sum(model: SampleModel) -> list[Quantity]:
-    """Every parameter, and the sum of those that the model calls exchangeable."""
+    """Return every parameter, and the sum of those that the model calls exchangeable."""
     ordered = _ordered(model)
     single = [
         Quantity(p.name, p.symbol, p.unit, (index,), hinges=ordered)
@@ -149,11 +149,11 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
 
 
 def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
-    """What two parameters may determine together where neither is determined alone.
+    """Return combinations of two parameters that may be determined if neither is alone.
 
-    Of two springs or two dampers the sum (side by side) and the series
-    combination; of a damper and a spring their time c/k. Of a springpot nothing: what its
-    modulus trades against depends on its exponent.
+    Two springs or two dampers have their sum (in parallel) and their series combination,
+    a damper and a spring their relaxation time c/k. A springpot has none: what its
+    modulus trades off against depends on its exponent.
     """
     found = []
     ordered = _ordered(model)
@@ -186,6 +186,6 @@ def _series(model: SampleModel, members: tuple[int, ...]) -> Quantity:
 
 
 def _named(model: SampleModel, members: tuple[int, ...]) -> tuple[list[str], list[str], str]:
-    """Names and symbols of parameters, and the unit of the first."""
+    """Return the names and symbols of parameters, and the unit of the first."""
     chosen = [model.parameters[index] for index in members]
     return [p.name for p in chosen], [p.symbol for p in chosen], chosen[0].unit

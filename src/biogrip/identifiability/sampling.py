@@ -1,8 +1,8 @@
-"""Samples of a posterior by an ensemble of walkers.
+"""Markov chain Monte Carlo sampling of a posterior by an ensemble of walkers.
 
-First the walkers explore, by differences between one another and one coordinate at a time; a
-mixture is fitted to where they have been; then proposals from it, which lead from any basin to
-any other, take turns with the others until means and tails are known well enough.
+First the walkers explore, by differential evolution moves and by moves in one coordinate. A
+mixture is fitted to the points that they visited. Its proposals, which lead from any basin to
+any other, then take turns with the other moves until means and tails have converged.
 
 References
 ----------
@@ -31,35 +31,35 @@ from biogrip.identifiability.straightened import Straightened, straightened
 from biogrip.identify.answer import Progress
 from biogrip.identify.local_fits import FAIR, LocalFits
 
-# Points of the prior, the best of which are fitted from, and points about each optimum.
+# Points drawn from the prior, the best of them, which are fitted, and points about each optimum.
 _DRAWN, _FITTED, _ABOUT = 2000, 32, 200
-# About an optimum they are so far away, in e-folds, at least and at most.
+# Least and largest scale of the distance of points about an optimum, in e-folds.
 _NEAREST, _FURTHEST = 1e-3, 10.0
-# Steps between looks at what has been found; proposals are learnt from every other.
+# Steps between tests of convergence; mixtures are fitted to every other step.
 _STRETCH, _KEPT = 250, 2
-# Powers of the likelihood, one a stretch, in which walkers explore: where it is flatter, they
-# find their way from one basin to another. Of what was seen under the last but one, a few points
-# are learnt from to the end, so that proposals are nowhere much rarer than samples.
+# Powers of the likelihood, one per stretch, with which walkers explore: a flatter likelihood lets
+# them cross between basins. Mixtures are fitted to a few points of the last but one as well, so
+# that proposals are nowhere much rarer than samples.
 _POWERS, _WIDER = (0.05, 0.25, 1.0), 8
-# Stretches, time and again, before proposals are learnt anew.
+# Numbers of stretches after which the mixture is fitted anew.
 _LEARNING = (2, 4)
 _COOLER = 0.8
-# Log-parameters are multiples of this, far less than any is known to. Differences of differences
-# would otherwise blow up the last bits, in which processors differ, until decisions do.
+# Log-parameters are multiples of this, far below their uncertainty. Repeated differences would
+# otherwise amplify the last bits, in which processors differ, until decisions differ.
 _GRID = 2.0**-20
 
 
 @dataclass(frozen=True)
 class Samples:
-    """What the walkers visited once they had found their way.
+    """Posterior samples: the points that walkers visited after their exploration.
 
     Parameters
     ----------
     log_parameters : (n_steps, n_walkers, n_parameters)
     accepted
-        Share of the proposals.
+        Share of accepted proposals.
     convergence
-        How far the samples can be relied on.
+        Convergence diagnostics of the samples.
     """
 
     log_parameters: Array
@@ -75,18 +75,18 @@ def sampled(
     Parameters
     ----------
     posterior
-        What is sampled.
+        Posterior that is sampled.
     settings
-        How many walkers and steps.
+        Numbers of walkers and steps.
     rng
         The only source of randomness.
     progress
-        Is told of the evaluations, after every stretch.
+        Called after every stretch with the number of evaluations.
 
     Raises
     ------
     BiogripError
-        If the model has no answer anywhere.
+        If the model has no response in most of the search range.
     """
     axes = straightened(posterior.problem.residuals.model)
     walkers = _starts(posterior, settings.walkers, rng)
@@ -99,7 +99,7 @@ def sampled(
         ensemble.walk(_STRETCH, moves, power)
         moves = _moves(posterior, axes, mixture_of(axes.of(ensemble.recent), rng))
     left = settings.most_steps - len(_POWERS) * _STRETCH
-    # What was seen while proposals were still learnt is not kept.
+    # Samples from before the last fit of the mixture are not kept.
     for length in (*_LEARNING, left):
         learnt = np.concatenate([ensemble.recent, wider[: len(ensemble.recent) // _WIDER]])
         moves = _moves(posterior, axes, mixture_of(axes.of(learnt), rng))
@@ -121,7 +121,7 @@ def _samples(stretches: Sequence["Stretch"], axes: Straightened) -> Samples:
 
 
 def _starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
-    """Choose where walkers set out: by their densities, from the prior and about all optima."""
+    """Draw the walkers' starts by density from points of the prior and about all optima."""
     prior, problem = posterior.prior, posterior.problem
     drawn = prior.draw(_DRAWN, rng)
     order = np.argsort(-posterior.log_density(drawn).astype(np.float32), kind="stable")
@@ -144,7 +144,7 @@ def _starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array
 
 
 def _tempered(log_weights: Array, count: int) -> Array:
-    """Weights, flattened until so many points share them."""
+    """Return weights, flattened until they are shared by enough points."""
     power = 1.0
     while True:
         weights = np.exp(power * log_weights)
@@ -155,12 +155,12 @@ def _tempered(log_weights: Array, count: int) -> Array:
 
 
 Moves = Sequence[tuple[emcee.moves.Move, float]]
-# Where walkers were, and the share of accepted proposals.
+# Points of the walkers, and the share of accepted proposals.
 Stretch = tuple[Array, float]
 
 
 class _Ensemble:
-    """Walkers, and where they are."""
+    """The walkers and their current points."""
 
     def __init__(self, posterior: Posterior, state: emcee.State, progress: Progress) -> None:
         self._posterior = posterior
@@ -170,7 +170,7 @@ class _Ensemble:
         self.recent = state.coords
 
     def walk(self, steps: int, moves: Moves, power: float = 1.0) -> Stretch:
-        """Take steps, under a power of the likelihood."""
+        """Take steps, with the likelihood raised to a power."""
         count, size = self._state.coords.shape
         density = partial(self._posterior.log_density, power=power)
         sampler = _Sampler(count, size, density, moves=moves, vectorize=True)
@@ -186,15 +186,15 @@ class _Ensemble:
 
 
 class _Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
-    """The sampler, which takes densities as they come: an array without blobs and NaN."""
+    """emcee's sampler for a density function that returns one array, without blobs and NaN."""
 
     def compute_log_prob(self, coords: Array) -> tuple[Array, None]:
-        """Logarithms of the density at points, (n,)."""
+        """Return the logarithms of the density at points, (n,)."""
         return self.log_prob_fn(coords), None
 
 
 class _AlongValley(DEMove):  # type: ignore[misc]
-    """Differential evolution in coordinates whose Jacobian determinant is one."""
+    """Differential evolution moves in coordinates whose Jacobian determinant is one."""
 
     def __init__(self, axes: Straightened, gamma0: float | None = None) -> None:
         super().__init__(gamma0=gamma0)
@@ -203,14 +203,14 @@ class _AlongValley(DEMove):  # type: ignore[misc]
     def get_proposal(
         self, s: Array, c: list[Array], random: np.random.RandomState
     ) -> tuple[Array, Array]:
-        """Propose for walkers `s`, by differences of the others, `c`."""
+        """Propose points for walkers `s` by differences of the others, `c`."""
         others = [self._axes.of(np.concatenate(c))]
         proposed, factors = super().get_proposal(self._axes.of(s), others, random)
         return _gridded(self._axes.back(proposed)), factors
 
 
 def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = None) -> Moves:
-    """Return what takes turns: differences, single coordinates, and draws of a mixture if any."""
+    """Return the moves: differences, single coordinates, and draws of a mixture if there is one."""
     prior, plain = posterior.prior, Straightened(())
     found: list[tuple[emcee.moves.Move, float]] = [
         (_AlongValley(plain), 0.15),
@@ -227,7 +227,7 @@ def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = N
 def _one_anew(
     axes: Straightened, low: Array, high: Array, walkers: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
-    """Put each walker anywhere in one coordinate: where it is free, that is where it can be."""
+    """Propose for each walker a uniform draw of one coordinate, chosen at random."""
     proposed = axes.of(walkers)
     rows = np.arange(len(walkers))
     moved = random.randint(walkers.shape[1], size=len(walkers))
@@ -238,7 +238,7 @@ def _one_anew(
 def _of_mixture(
     axes: Straightened, mixture: Mixture, walkers: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
-    """Draw from a mixture, wherever the walkers are."""
+    """Propose draws from a mixture, independent of the walkers' points."""
     drawn = _gridded(axes.back(mixture.draw(len(walkers), random)))
     density = mixture.log_density(axes.of(np.concatenate((walkers, drawn))))
     return drawn, density[: len(walkers)] - density[len(walkers) :]

@@ -1,8 +1,8 @@
 """Coordinates in which the valley of exchangeable dampers is straight.
 
-Where c and c_p trade against each other, only their sum being known, logarithms of
-samples lie along a narrow bend, round which no straight step leads. Over the
-logarithm of the sum and those of ratios it is a straight line.
+Where c and c_p trade against each other and only their sum is determined, log-parameters
+of samples lie along a narrow bend, which no straight step can follow. The logarithms of
+the sum and of ratios lie along a straight line.
 """
 
 from dataclasses import dataclass
@@ -26,9 +26,9 @@ class Straightened:
     members: tuple[int, ...]
 
     def of(self, log_parameters: Array) -> Array:
-        """Put the sum's logarithm in place of the last member's, log-ratios to it of the others'.
+        """Replace the last member's logarithm by the sum's, the others' by log-ratios to the last.
 
-        Both of shape (n, n_parameters).
+        Both arrays have shape (n, n_parameters).
         """
         found = log_parameters.copy()
         if len(self.members) > 1:
@@ -39,7 +39,7 @@ class Straightened:
         return found
 
     def range(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Ends between which coordinates can be if log-parameters are, (n_parameters,) each."""
+        """Return bounds of the coordinates from bounds of log-parameters, (n_parameters,) each."""
         ends = low.copy(), high.copy()
         if len(self.members) > 1:
             *others, last = self.members
@@ -49,7 +49,7 @@ class Straightened:
         return ends
 
     def back(self, coordinates: Array) -> Array:
-        """Return to log-parameters, both of shape (n, n_parameters)."""
+        """Transform coordinates back to log-parameters, both of shape (n, n_parameters)."""
         found = coordinates.copy()
         if len(self.members) > 1:
             *others, last = self.members
@@ -61,6 +61,6 @@ class Straightened:
 
 
 def straightened(model: SampleModel) -> Straightened:
-    """Return the coordinates for a model's parameters."""
+    """Return the coordinates in which a model's exchangeable parameters have a straight valley."""
     named = enumerate(model.names)
     return Straightened(tuple(index for index, name in named if name in model.exchangeable))

@@ -1,4 +1,4 @@
-"""The valley in which a damper of a branch and the parallel damper trade against each other."""
+"""Map of chi^2 along the valley in which a branch's and the parallel damper trade off."""
 
 from collections.abc import Callable
 from typing import Any
@@ -13,12 +13,12 @@ from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.points import NEWS
 from biogrip.identify.local_fits import FAIR
 
-# Shares of the first in the sum, fine where either is next to nothing, and sums over the best sum,
-# fine where the valley is.
+# Shares of the first damper in the sum, dense where either is small, and sums relative to the best
+# one, dense in the valley.
 _SHARES = 1 / (1 + np.exp(-np.linspace(-8.0, 8.0, 31)))
 _BESIDE = np.array([0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2, 0.3])
 _SUMS = np.concatenate((1 - _BESIDE[::-1], [1.0], 1 + _BESIDE))
-# A branch too weak and slow to be seen leaves the second alone with the sum, whatever the first.
+# Second arm of the valley: if the branch is too weak to show, the second damper alone is the sum.
 _FIRSTS = np.concatenate((np.arange(0.002, 0.1, 0.005), np.linspace(0.11, 1.2, 12)))
 _SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 
@@ -26,7 +26,7 @@ _SECONDS = np.concatenate((np.arange(0.9, 1.06, 0.005), [1.08, 1.12, 1.2]))
 def valley_and_deeper(
     likelihood: Likelihood, model: SampleModel
 ) -> tuple[dict[str, Any] | None, Array | None]:
-    """Rise of chi^2 over two exchangeable parameters, the others fitted at every point.
+    """Compute the increase of chi^2 over two exchangeable parameters, with the others fitted.
 
     Parameters
     ----------
@@ -43,8 +43,8 @@ def valley_and_deeper(
         ``x_values``, ``y_values`` and ``rises``, nested lists.
         None unless exactly two exchangeable parameters were searched, among others.
     (n_parameters,) or None
-        Log-parameters whose chi^2 is clearly below that of the optimum, so that this
-        was missed.
+        Log-parameters whose chi^2 is clearly below that of the optimum, which is not the
+        global one.
     """
     pair = [index for index, p in enumerate(model.parameters) if p.name in model.exchangeable]
     if len(pair) != 2 or len(model.parameters) == 2:
@@ -71,9 +71,9 @@ def _listed(values: Array, rounding: Callable[[float], float | None]) -> list[li
 def _rises(
     likelihood: Likelihood, pair: list[int], x_values: Array, y_values: Array
 ) -> tuple[Array, Array | None]:
-    """Rise of chi^2 at every point of a grid, and what is deeper.
+    """Compute the increase of chi^2 at every point of a grid, and find a missed optimum.
 
-    All points are fitted from the optimum, then from neighbours as long as these are news.
+    All points are fitted from the optimum, then from neighbours as long as these improve.
     """
     fits = HeldFits([likelihood], [])
     rows, columns = x_values.shape

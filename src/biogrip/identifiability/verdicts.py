@@ -1,4 +1,4 @@
-"""What a trace says about every parameter, in words that can be relied on."""
+"""Verdicts on quantities: determined, bounded on one side, or not determined by a trace."""
 
 import math
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
 
-# A combination of parameters that are not determined is looked at if, near the
-# optimum, it is known to better than this (standard deviation of its logarithm).
+# A combination of undetermined parameters is profiled if the first-order standard
+# deviation of its logarithm is below this.
 _WORTH_A_LOOK = 0.5
 
 
@@ -29,7 +29,7 @@ class Finding:
     Parameters
     ----------
     quantity, profile
-        Which one, and how chi^2 rises away from the optimum.
+        The quantity, and its profile likelihood.
     deviation
         Standard deviation of its logarithm to first order, see `Likelihood.deviation`.
     """
@@ -40,7 +40,7 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """One of the four verdicts."""
+        """Verdict: determined, bounded below or above, or not determined."""
         below, above = self.profile.low is not None, self.profile.high is not None
         if below and above:
             return DETERMINED
@@ -50,7 +50,7 @@ class Finding:
 
     @property
     def value(self) -> float:
-        """Best estimate in SI units; means little unless the quantity is determined."""
+        """Best estimate in SI units, meaningful only if the quantity is determined."""
         return math.exp(self.profile.best)
 
     @property
@@ -65,16 +65,16 @@ class Finding:
 
     @property
     def gaps(self) -> list[tuple[float, float]]:
-        """Values in SI units that are excluded although others on both sides are not."""
+        """Stretches between the limits that are excluded, in SI units."""
         return [(math.exp(start), math.exp(end)) for start, end in self.profile.gaps]
 
     @property
     def told(self) -> bool:
-        """Whether the trace says anything of it."""
+        """True if the trace bounds the quantity on at least one side."""
         return self.verdict != NOT_DETERMINED
 
     def words(self) -> str:
-        """Verdict as a sentence fragment, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
+        """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
         words = self._limits_in_words() + (f", except {but}{self._unit}" if but else "")
         provided = self.quantity.provided
@@ -124,7 +124,7 @@ class Trade:
 
 
 def findings_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Finding]:
-    """Judge quantities, each by its profile."""
+    """Profile quantities and reach a verdict on each."""
     (profiles,) = profiles_of([likelihood], quantities)
     return [
         Finding(quantity, profile, likelihood.deviation(quantity))

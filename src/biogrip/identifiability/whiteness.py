@@ -1,4 +1,4 @@
-"""Whether what a fit leaves of a trace is white noise, and in words why not."""
+"""Tests of whether the residuals of a fit are white noise, with their results in words."""
 
 from collections.abc import Iterator
 
@@ -9,21 +9,21 @@ from biogrip.digits import counted
 from biogrip.identify.outliers import FAR, outliers_of
 
 FALSE_ALARM = 0.003
-"""Share of traces with white noise of which something else is suspected, by any one test."""
+"""Significance level of each test: share of traces with white noise that fail it."""
 
-# Correlation of neighbouring residuals, in standard deviations of that of white noise.
+# Largest correlation of neighbouring residuals, in standard deviations of that of white noise.
 _CORRELATED = 5.0
-# Stretches over which residuals are averaged, and samples in the shortest.
+# Stretches over which residuals are averaged, and readings in the shortest.
 _STRETCHES, _SHORTEST = 20, 5
 
 
 def doubts_about_noise(residual: Array) -> Iterator[str]:
-    """Say in sentences why a residual is not white noise.
+    """Yield a sentence for each test of white noise that the residuals of a fit fail.
 
     Parameters
     ----------
     residual : (n_samples,)
-        What a fit leaves of a trace.
+        Residuals of the fit.
     """
     correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
     chance = uneven(residual)
@@ -35,40 +35,39 @@ def doubts_about_noise(residual: Array) -> Iterator[str]:
         )
     elif chance < FALSE_ALARM:
         yield (
-            "The residual has more of some frequencies than of others, as white noise would "
-            f"{one_in(chance)} traces: the intervals are not the right ones, or the model, the "
-            "protocol or the gripper is not."
+            "The residual has more of some frequencies than of others, as white noise has only "
+            f"{one_in(chance)} traces: the intervals are wrong, or the model, the protocol or the "
+            "gripper is."
         )
     chance = wandering(residual)
     if chance < FALSE_ALARM:
         yield (
-            "The residual wanders: its means over stretches of the trace scatter as those of white "
-            f"noise would {one_in(chance)} traces. Something slow is in it that the model does not "
-            "have, a drift of the instrument perhaps: the intervals are too narrow."
+            "The residual wanders: its means over stretches of the trace scatter as much as those "
+            f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
+            "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
     far = int(np.count_nonzero(outliers_of(residual)))
     chance = _chance_of_far(far, len(residual))
     if chance < FALSE_ALARM:
         yield (
             f"Beyond {FAR:g} standard deviations from the samples around: "
-            f"{counted(far, 'outlier')}, as of Gaussian noise {one_in(chance)} traces. What lies "
-            "so far off weighs too much."
+            f"{counted(far, 'outlier')}, as of Gaussian noise only {one_in(chance)} traces. "
+            "Outliers distort the fit."
         )
 
 
 def one_in(chance: float) -> str:
-    """Say how rare something is, e.g. ``"once in 2e+03"``."""
+    """Return a probability in words, e.g. ``"once in 2e+03"``."""
     return f"once in {1 / max(chance, 1e-300):.1g}"
 
 
 def wandering(residual: Array) -> float:
-    """Return the probability that means of white noise over stretches scatter as much.
+    """Return the p-value of a chi-squared test of means over stretches of white noise.
 
-    The sum of n_i m_i^2 / sigma^2 over stretches of n_i samples and mean m_i is
-    chi-squared for white noise, with a degree of freedom each; what a fit has
-    taken from it only lowers it. Parts of a spectrum below some ten periods a trace
-    show in it, however little they are beside the noise of single samples. The residual is
-    that of `doubts_about_noise`.
+    The statistic is the sum of n_i m_i^2 / sigma^2 over stretches of n_i readings and mean
+    m_i, with a degree of freedom each; a fit only lowers it. The test detects parts of the
+    spectrum below some ten periods a trace, however small they are beside the noise of
+    single readings. The residual is that of `doubts_about_noise`.
     """
     from scipy.special import chdtrc
 
@@ -81,11 +80,11 @@ def wandering(residual: Array) -> float:
 
 
 def uneven(residual: Array) -> float:
-    """Return the probability that the periodogram of white noise is as uneven.
+    """Return the p-value of the cumulative periodogram test of white noise [1]_.
 
-    By the largest distance between the cumulative periodogram and a straight line, which is
-    Kolmogorov's [1]_. Parts that are forgotten within some samples show in it where neighbours
-    are hardly correlated yet. The residual is that of `doubts_about_noise`.
+    The statistic is the largest distance between the cumulative periodogram and a straight
+    line, with Kolmogorov's distribution. The test detects noise with a correlation time of some
+    readings and too small a share to correlate neighbours. `residual` as in `doubts_about_noise`.
 
     References
     ----------
@@ -95,7 +94,7 @@ def uneven(residual: Array) -> float:
     from scipy.fft import prev_fast_len
     from scipy.special import kolmogorov
 
-    # Of a length that has no small factors, a transform takes many times the memory.
+    # A transform takes many times the memory if its length has no small factors.
     residual = residual[: prev_fast_len(len(residual))]
     power = np.abs(np.fft.rfft(residual)[1 : (len(residual) + 1) // 2]) ** 2
     if len(power) < 2:
@@ -106,7 +105,7 @@ def uneven(residual: Array) -> float:
 
 
 def _chance_of_far(far: int, samples: int) -> float:
-    """Probability of as many samples of Gaussian noise that far out (Poisson's)."""
+    """Return the probability of as many outliers in Gaussian noise, by Poisson's distribution."""
     from scipy.special import ndtr, pdtrc
 
     return float(pdtrc(far - 1, 2 * samples * ndtr(-FAR))) if far else 1.0

@@ -1,1 +1,1 @@
-"""Finding the sample's parameters in a trace."""
+"""Identification of the sample's parameters from a trace."""

@@ -1,4 +1,4 @@
-"""What every identifier returns."""
+"""The result that every identification method returns."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,25 +10,25 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.identify.levenberg_marquardt import Minima
 
 Progress = Callable[[int, float], None]
-"""Is told, now and then, how many responses were simulated and the lowest misfit in rad."""
+"""Callback that receives the number of simulated responses and the lowest misfit in rad."""
 
 
 Row = tuple[Array, float, float, int]
-"""Of a history: best parameters so far, lowest and median misfit, evaluations so far."""
+"""Row of a history: best parameters so far, lowest and median misfit, evaluations so far."""
 
 
 def silent(evaluations: int, misfit_rad: float) -> None:
-    """Report to nobody."""
+    """Ignore a report of progress."""
 
 
 @dataclass(frozen=True)
 class History:
-    """What happened, step by step; what a step is depends on the method.
+    """Course of an identification, step by step; the method defines what a step is.
 
     Parameters
     ----------
     best_misfit, median_misfit : (n_steps + 1,)
-        Lowest misfit so far in rad, and the median over what the method works with.
+        Lowest misfit so far in rad, and the median over the method's population or fits.
     best_parameters : (n_steps + 1, n_parameters)
         Parameters of the lowest misfit.
     evaluations : (n_steps + 1,)
@@ -42,32 +42,32 @@ class History:
 
     @classmethod
     def of(cls, rows: Sequence[Row]) -> "History":
-        """Put the rows of a history together."""
+        """Assemble a history from its rows."""
         parameters, best_misfit, median_misfit, counts = map(np.array, zip(*rows, strict=True))
         return cls(best_misfit, median_misfit, parameters, counts)
 
 
 @dataclass(frozen=True)
 class Identification:
-    """The answer of one run.
+    """The result of identifying one trace by one method.
 
     Parameters
     ----------
     parameters : (n_parameters,)
-        Those of lowest misfit.
+        Parameters of lowest misfit.
     misfit_rad
-        Their misfit.
+        RMS misfit of these parameters.
     generations
         Number of steps: generations, or local fits.
     evaluations
-        Responses simulated; one with its derivatives counts as one. Those by which an
-        optimum is settled to its last digits are left out.
+        Number of simulated responses; a response with its derivatives counts as one.
+        Those of the final Newton refinement are not counted.
     stop_reason
-        Why it stopped there.
+        Reason why the method stopped.
     history
-        The way there.
+        Course of the identification.
     converged
-        Whether an optimum that was to be settled to its last digits could be.
+        False if the final Newton refinement of the optimum did not converge.
     """
 
     parameters: Array
@@ -79,7 +79,7 @@ class Identification:
     converged: bool = True
 
     def at(self, fit: Minima) -> "Identification":
-        """Return the answer, with a fit of this trace alone in place of the optimum."""
+        """Return a copy with the optimum of `fit`, a local fit of this trace alone."""
         return self.replaced(
             np.exp(fit.x[0]), float(fit.misfit_rad[0]), converged=bool(fit.converged[0])
         )
@@ -87,7 +87,7 @@ class Identification:
     def replaced(
         self, parameters: Array, misfit_rad: float, *, converged: bool
     ) -> "Identification":
-        """Return the answer, with other parameters and their misfit, in its history as well."""
+        """Return a copy with other parameters and misfit, in its last row of history as well."""
         history = self.history
         best_misfit, best_parameters = history.best_misfit.copy(), history.best_parameters.copy()
         best_misfit[-1], best_parameters[-1] = misfit_rad, parameters
@@ -100,7 +100,7 @@ class Identification:
         )
 
     def in_order(self, model: SampleModel) -> "Identification":
-        """Name branches, all the way, in the order in which they relax."""
+        """Return a copy with Maxwell branches sorted by relaxation time, in its history as well."""
         way = self.history.best_parameters
         ordered = np.take_along_axis(way, model.in_order(way), axis=1)
         found = self.parameters[model.in_order(self.parameters[None])[0]]

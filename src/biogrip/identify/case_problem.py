@@ -1,4 +1,4 @@
-"""What the identification of a case assumes, whatever the trace."""
+"""Assumptions of the identification that all traces of a case share."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -25,18 +25,18 @@ from biogrip.response.whitening import Colour, Whitening
 
 @dataclass(frozen=True)
 class CaseProblem:
-    """What the identification of a case assumes, whatever the trace.
+    """Assumptions of the identification that all traces of a case share.
 
     Parameters
     ----------
     gripper, ranges, noise_rad
-        As of `problem_of`.
+        As in `problem_of`.
     nonlinear
-        Whether to simulate the nonlinear model.
+        True to simulate the nonlinear model.
     offset, drift
-        Whether the instrument may have added a constant, and a drift linear in time.
+        True if the instrument may have added a constant, or a drift linear in time.
     coloured
-        Whether the noise of a trace may be other than white, see `trace_fit`.
+        True if the noise of a trace may be autocorrelated, see `trace_fit`.
     uncertainty
         Standard uncertainties of the gripper's arms, by arm and key.
     phases
@@ -75,26 +75,26 @@ class CaseProblem:
 
     @cached_property
     def searched(self) -> SampleModel:
-        """Sample model without the parameters that are known."""
+        """Sample model without the fixed parameters."""
         return with_fixed(self.model, self.fixed)
 
     def searched_for(self, *others: SampleModel) -> "CaseProblem":
-        """Return what fits of its model, and of others, depend on: no range but of their own."""
+        """Return a copy that keeps only the search ranges of its model and of `others`."""
         chosen = {p.range_name for model in (self.model, *others) for p in model.parameters}
         return replace(self, ranges={n: r for n, r in self.ranges.items() if n in chosen})
 
     def to_identify(self, *others: SampleModel) -> "CaseProblem":
-        """Return what `of` and `for_model` depend on: judgements alone allow for more."""
+        """Return a copy without noise model, gripper uncertainty and unused search ranges."""
         return replace(self.searched_for(*others), coloured=False, uncertainty={})
 
     @property
     def plain(self) -> bool:
-        """Whether noise is taken for white, and the gripper for known."""
+        """True if noise is assumed to be white, and the gripper to be known exactly."""
         known = [value for arm in self.uncertainty.values() for value in arm.values()]
         return not self.coloured and not any(known)
 
     def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
-        """Return the problem with the arms of a calibration, YAML, if there is one.
+        """Return a copy with the arms of the first calibration file (YAML), if there is one.
 
         Raises
         ------
@@ -114,13 +114,13 @@ class CaseProblem:
         noise_rad: float | None = None,
         condensed: Condensed | None = None,
     ) -> Problem:
-        """Pose the problem for a trace.
+        """Set up the problem of a trace.
 
-        A model, a level of noise and what `in_noise` gives replace the case's.
+        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case.
         """
         noise_rad = noise_rad or self.noise_rad
         if condensed is None:
-            # Once for all traces of a case: it takes as long as some fifty responses.
+            # Shared by all traces of a case: condensing takes as long as some fifty responses.
             shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
             sampled = time_s.tobytes(), shown
             if sampled not in self._condensed:
@@ -140,19 +140,19 @@ class CaseProblem:
     def shows_inertia(
         self, time_s: Array, rotation_rad: Array, noise_rad: float | None = None
     ) -> bool:
-        """Whether a trace shows the arms ringing, so that it is fitted with their inertia."""
+        """Return True if a trace shows ringing of the arms: its fit then includes their inertia."""
         sampled = time_s.tobytes()
         if sampled not in self._changes:
             self._changes[sampled] = change_by_inertia(self.gripper, self.torque, time_s)
         change = self._changes[sampled]
-        # What would not show without noise needs no estimate of it.
+        # Ringing that does not show even without noise needs no estimate of the noise.
         if not inertia_shows(change, rotation_rad, 0.0):
             return False
         noise_rad = noise_rad or self.noise_rad or noise_of(rotation_rad)
         return inertia_shows(change, rotation_rad, noise_rad)
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
-        """Pose one of its problems for another model; what is tabulated of the trace is shared."""
+        """Return one of its problems posed for another model; both share tables of the trace."""
         residuals = problem.residuals.of_model(model)
         misfit: Misfit = residuals.condensed_misfit
         if isinstance(problem.misfit, SeriesMisfit):
@@ -160,24 +160,24 @@ class CaseProblem:
         return searched(misfit, residuals, self.ranges)
 
     def nuisance(self, time_s: Array) -> Array:
-        """What the instrument may have added, (n_functions, n_samples)."""
+        """Return the nuisance functions, offset and drift, (n_functions, n_samples)."""
         return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
 
     def in_noise(
         self, time_s: Array, colour: Colour | None, uncertain: Array, *, inertia: bool
     ) -> Condensed:
-        """Condense for noise that is not just white.
+        """Condense the readings for autocorrelated noise or an uncertain gripper.
 
         Parameters
         ----------
         time_s : (n_samples,)
             Ascending sampling times.
         colour
-            Of the noise, unless that is white.
+            Autocorrelation model of the noise; None if it is white.
         uncertain : (n_functions, n_samples)
-            What is added with an amplitude that is known about, see `with_uncertain`.
+            Functions added with a random amplitude, see `with_uncertain`.
         inertia
-            Whether the arms ring.
+            True to include the inertia of the arms.
         """
         nuisance, whitening = self.nuisance(time_s), None
         if colour is not None:
@@ -197,6 +197,6 @@ class CaseProblem:
         )
 
     def logs(self, parameters: Mapping[str, float]) -> Array:
-        """Logarithms of the searched parameters' values, zeros lifted into the search range."""
+        """Return log-parameters of the searched parameters, zeros replaced by the lower bound."""
         chosen = [(parameters[p.name], self.ranges[p.range_name]) for p in self.searched.parameters]
         return np.log([max(value, genes.low) for value, genes in chosen])

@@ -1,4 +1,4 @@
-"""SciPy's differential evolution on log-parameters, a whole generation evaluated at once.
+"""SciPy's differential evolution on log-parameters, which evaluates a generation at once.
 
 References
 ----------
@@ -44,10 +44,10 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
-    """Identify samples one after the other, as `biogrip.identify.methods` says.
+    """Identify samples one after the other by SciPy's differential evolution.
 
-    Individuals are ranked on their misfit in single precision, as in `biogrip.identify.genetic`.
-    Progress is told after every generation of each.
+    Individuals are ranked by their misfit in single precision, as in `biogrip.identify.genetic`.
+    `progress` is called after every generation of each.
     """
     pairs = zip(problems, rngs, strict=True)
     return [_identified(problem, settings, rng, progress) for problem, rng in pairs]

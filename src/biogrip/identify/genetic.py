@@ -1,4 +1,4 @@
-"""The paper's genetic algorithm (section 4), every reading of it a setting."""
+"""The paper's genetic algorithm (section 4), with a setting for each detail left open there."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
-    """Identify samples of one genome, as `biogrip.identify.methods` says.
+    """Identify samples of one model by the paper's genetic algorithm.
 
-    Individuals are ranked on their misfit in single precision, ties broken by
-    the chromosome. Its 24 bits are far finer than noise can tell apart, and far
-    coarser than what differs between processors and BLAS libraries: the last
-    bits of a misfit cannot change which trajectory is taken.
+    Individuals are ranked by their misfit in single precision; the chromosome breaks
+    ties. Its 24 bits are far finer than noise can resolve, and far coarser than the
+    differences between processors and BLAS libraries: the last bits of a misfit cannot
+    change the course of the search.
 
-    Progress is told after every generation, of all problems together.
+    `progress` is called after every generation, for all problems together.
     """
     evolutions = evolved(problems, settings, rngs, progress)
     return [evolution.identification for evolution in evolutions]
@@ -37,12 +37,12 @@ def identify_many(
 
 @dataclass(frozen=True)
 class Evolution:
-    """A run of the algorithm with the survivors that others start from.
+    """The result of one run of the genetic algorithm, with its first and last survivors.
 
     Parameters
     ----------
     identification
-        Its answer.
+        Best individual and history.
     first_survivors, last_survivors : (n_survivors, n_parameters)
         Parameters of the survivors of the initial and of the last population, best first.
     """
@@ -58,7 +58,7 @@ def evolved(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Evolution]:
-    """Identify as `identify_many` does, and return the survivors as well."""
+    """Identify samples as `identify_many` does, and return the survivors as well."""
     misfits = together([problem.misfit for problem in problems])
     return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
 
@@ -70,20 +70,20 @@ def evolve_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Evolution]:
-    """Run the algorithm with a population for each generator.
+    """Run the genetic algorithm with one population for each random generator.
 
-    Populations evolve side by side as arrays and know nothing of each other; those
-    that have stopped are left out.
+    Populations evolve side by side as arrays, independently of each other; those that
+    have stopped are left out.
 
     Parameters
     ----------
     misfits
-        Of parameters of shape (n_populations, n, n_parameters), and of the indices of
-        those populations, (n_populations,).
+        Function of parameters, (n_populations, n, n_parameters), and of the indices of
+        those populations, (n_populations,), that returns misfits.
     genome
-        What a chromosome may be.
+        Encoding of the parameters.
     settings, rngs, progress
-        As of `identify_many`, with a generator for each population.
+        As in `identify_many`, with a generator for each population.
     """
     running = np.arange(len(rngs))
     drawn = [genome.code(genome.draw(settings.population, rng)) for rng in rngs]
@@ -127,7 +127,7 @@ def evolve_many(
 
 @dataclass(frozen=True)
 class _Populations:
-    """Individuals with what they are ranked on.
+    """Individuals of populations with the misfits by which they are ranked.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class _Populations:
         )
 
     def at(self, *places: int) -> "_Populations":
-        # Copies, for a part of an array keeps all of it.
+        # Copies, for a view would keep the whole array in memory.
         return _Populations(self.codes.take(places, axis=2), self.ranking.take(places, axis=1))
 
     def only(self, which: NDArray[np.bool_]) -> "_Populations":
@@ -158,8 +158,8 @@ class _Populations:
 def _evaluated(
     codes: IntArray, misfits: Misfits, genome: Genome, running: IntArray
 ) -> _Populations:
-    """Individuals in the order they come in."""
-    # A misfit is not negative, but what is not a number has either sign.
+    """Compute the misfits of chromosomes, keeping their order."""
+    # A misfit is not negative, but a NaN has either sign.
     ranking = np.abs(misfits(genome.parameters(codes), running).astype(np.float32))
     return _Populations(codes, ranking)
 
@@ -170,7 +170,7 @@ def _identifications(
     genome: Genome,
     settings: GeneticSettings,
 ) -> list[Identification]:
-    """Sort generations, the best and the middle survivor of all populations that run, by these."""
+    """Collect each population's history from the best and middle survivors of generations."""
     running = np.concatenate([populations for populations, _ in course])
     codes = np.concatenate([kept.codes[:, :, 0] for _, kept in course], axis=1)
     best_misfit, median_misfit = np.concatenate([kept.ranking for _, kept in course]).T
@@ -192,7 +192,7 @@ def _identifications(
 
 
 def _evaluations(settings: GeneticSettings, generations: int) -> IntArray:
-    """Misfits computed up to each generation, (n_generations,)."""
+    """Return the number of misfits computed up to each generation, (n_generations,)."""
     number = np.arange(generations)
     counts = settings.population + (settings.population - settings.survivors) * number
     if settings.mutants == "all":

@@ -1,6 +1,6 @@
 """Crossover and mutation of populations side by side, each with a generator of its own.
 
-What a population draws, and in which order, does not depend on the others.
+The random numbers of a population do not depend on the other populations.
 """
 
 from collections.abc import Sequence
@@ -19,14 +19,14 @@ def cross(
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
 ) -> IntArray:
-    """Single-point crossover; both children of a pair are kept.
+    """Produce children by single-point crossover; both children of a pair are kept.
 
     Parameters
     ----------
     parents : (n_words, n_populations, n_parents)
         Codes, best first.
     genome, settings
-        What the codes say, and how parents are mated and children mutate.
+        Encoding of the parameters, and settings of mating and mutation.
     rngs
         A generator for each population.
 
@@ -55,7 +55,7 @@ def cross(
 def _mates(
     parents: int, pairs: int, settings: GeneticSettings, rng: np.random.Generator
 ) -> IntArray:
-    """Indices of mothers and fathers, (pairs, 2)."""
+    """Draw the indices of mothers and fathers, (pairs, 2)."""
     if settings.mating == "rank":
         rank = np.arange(parents, 0, -1)
         return rng.choice(parents, size=(pairs, 2), p=rank / rank.sum())
@@ -70,14 +70,14 @@ def mutate(
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
 ) -> None:
-    """Redraw genes of some children in place.
+    """Mutate children in place: redraw random genes of a random share of them.
 
     Parameters
     ----------
     children : (n_words, n_populations, n_children)
         Codes.
     genome, settings, rngs
-        As of `cross`.
+        As in `cross`.
     """
     chance = np.empty(children.shape[1:])
     for own, rng in zip(chance, rngs, strict=True):

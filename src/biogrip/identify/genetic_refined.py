@@ -1,7 +1,7 @@
-"""The genetic algorithm, its survivors polished on log-parameters.
+"""The genetic algorithm, followed by local fits of log-parameters from its survivors.
 
-The last survivors crowd in one basin. The survivors of the initial population
-are still everywhere, so local fits start from the best of both.
+The last survivors lie in one basin. The survivors of the initial population lie in
+all basins, so local fits start from the best of both.
 """
 
 from collections.abc import Sequence
@@ -26,17 +26,17 @@ class Polishing:
     first: Annotated[
         int,
         Key(
-            "How many survivors of the initial population are polished, the best.",
+            "Number of the best survivors of the initial population that are polished.",
             low=0,
             high=10_000,
         ),
     ]
-    last: Annotated[int, Key("The same of the last population.", low=1, high=10_000)]
+    last: Annotated[int, Key("The same for the last population.", low=1, high=10_000)]
 
 
 @dataclass(frozen=True)
 class RefinedSettings:
-    """How the population evolves, and how many local fits follow."""
+    """Settings of the genetic algorithm and of the local fits that follow."""
 
     genetic: GeneticSettings
     polishing: Polishing
@@ -48,9 +48,9 @@ def identify_many(
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Identification]:
-    """Identify samples of one genome, as `biogrip.identify.methods` says.
+    """Identify samples of one model by the genetic algorithm and local fits from its survivors.
 
-    Progress is told after every generation, of all problems together, and in the end once for each.
+    `progress` is called after every generation, for all problems together, and finally for each.
     """
     evolutions = evolved(problems, settings.genetic, rngs, progress)
     starts, before = zip(*(_survivors(e, settings.polishing) for e in evolutions), strict=True)
@@ -60,7 +60,7 @@ def identify_many(
 
 
 def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
-    """Return the fits' starts, log-parameters, and the first row of their history."""
+    """Return the starts of the fits, log-parameters, and the first row of their history."""
     coarse = evolution.identification
     last, first = evolution.last_survivors, evolution.first_survivors
     starts = np.concatenate((last[: chosen.last], first[: chosen.first]))
@@ -70,7 +70,7 @@ def _survivors(evolution: Evolution, chosen: Polishing) -> tuple[Array, Row]:
 
 
 def _polished(coarse: Identification, fine: Identification) -> Identification:
-    """Append the fits to the generations; the fits' first row repeats the last generation."""
+    """Append the fits' history, but for its first row, to that of the generations."""
     columns = zip(vars(coarse.history).values(), vars(fine.history).values(), strict=True)
     return replace(
         fine,

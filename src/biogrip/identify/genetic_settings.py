@@ -1,4 +1,4 @@
-"""How the paper's genetic algorithm is read."""
+"""Settings of the paper's genetic algorithm."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ _MOST = 1_000_000
 
 @dataclass(frozen=True)
 class GeneticSettings:
-    """How the population evolves (section 4)."""
+    """Settings of the genetic algorithm (section 4)."""
 
     population: Annotated[int, Key("Individuals in a generation.", low=4, high=_MOST)]
     survivors: Annotated[
         int,
         Key(
-            "The best so many live on unchanged and are the parents of the others.",
+            "Number of the best, which survive unchanged and are the parents of the others.",
             low=2,
             high=_MOST,
         ),
@@ -51,7 +51,7 @@ class GeneticSettings:
     mutated_genes: Annotated[
         int,
         Key(
-            "How many times a gene of such a child is chosen and redrawn from its range.",
+            "Number of times that a gene of such a child is chosen and redrawn from its range.",
             low=1,
             high=50,
         ),
@@ -59,23 +59,23 @@ class GeneticSettings:
     patience: Annotated[
         int,
         Key(
-            "Stop after so many generations in which the best misfit has not improved.",
+            "Stop after this number of generations without improvement of the best misfit.",
             low=1,
             high=_MOST,
         ),
     ]
-    min_generations: Annotated[int, Key("Do not stop earlier.", low=0, high=_MOST)]
-    max_generations: Annotated[int, Key("Stop then at the latest.", low=1, high=_MOST)]
+    min_generations: Annotated[int, Key("Fewest generations.", low=0, high=_MOST)]
+    max_generations: Annotated[int, Key("Most generations.", low=1, high=_MOST)]
     mutants: Annotated[
         str,
         Key(
-            "Who may mutate. `children`; or `all`: survivors, too, but for the best of them.",
+            "Individuals that may mutate: `children`; or `all`, survivors except the best, too.",
             choices=("children", "all"),
         ),
     ] = "children"
 
     def problems(self) -> Iterator[Problem]:
-        """Find what leaves no children, and a stop before the start."""
+        """Find settings that leave no children, or whose limits of generations conflict."""
         if self.survivors >= self.population:
             text = f"found {self.survivors}, allowed is less than population"
             yield ("survivors",), f"{text}, which is {self.population}."
@@ -84,7 +84,7 @@ class GeneticSettings:
             yield ("min_generations",), f"{text}, which is {self.max_generations}."
 
     def problems_of(self, genes: int) -> Iterator[Problem]:
-        """Find cuts that a chromosome of some length cannot have."""
+        """Find crossover cuts that a chromosome of `genes` genes cannot have."""
         last = self.last_cut if self.last_cut > 0 else genes + self.last_cut
         if genes and not 1 <= self.first_cut <= last:
             text = f"found {self.first_cut}, allowed is 1 to last_cut, "

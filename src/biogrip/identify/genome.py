@@ -1,4 +1,4 @@
-"""The chromosome: an exponent and some digits a parameter, each a gene (eq. 10, Tables 3, 4)."""
+"""The chromosome: exponent and digits of each parameter are genes (eq. 10, Tables 3, 4)."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class GeneRange:
     digits: Annotated[int, Key("How many digits; in eq. (10) two.", low=1, high=6)] = 2
 
     def problems(self) -> Iterator[Problem]:
-        """Find ends in the wrong order, and a range of one value."""
+        """Find bounds in the wrong order, and a range of a single value."""
         for gene, (low, high) in (("exponent", self.exponent), ("digit", self.digit)):
             if low > high:
                 yield (gene,), f"found [{low}, {high}], allowed is [lowest, highest]."
@@ -66,14 +66,14 @@ class GeneRange:
 
 @dataclass(frozen=True)
 class Genome:
-    """The genes of a sample model.
+    """Encoding of a sample model's parameters as genes.
 
     Parameters
     ----------
     low, high : (n_genes,)
         Smallest and largest value of each gene, both included.
     sizes : (n_parameters,)
-        How many genes each parameter has, one after the other: exponent and digits.
+        Number of genes of each parameter: its exponent and digits, in this order.
     """
 
     low: IntArray
@@ -90,7 +90,7 @@ class Genome:
         return rng.integers(self.low, self.high, size=(count, self.genes), endpoint=True)
 
     def decode(self, chromosomes: IntArray) -> Array:
-        """Parameters of chromosomes, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
+        """Decode chromosomes into parameters, 10^g_1 (0.1 g_2 + 0.01 g_3 + ...) (eq. 10).
 
         Parameters
         ----------
@@ -99,14 +99,14 @@ class Genome:
         Returns
         -------
         (n, n_parameters)
-            Each the double nearest to the decimal number that is encoded.
+            Each is the double nearest to the encoded decimal number.
         """
         return self.parameters(self.code(chromosomes))
 
     def code(self, chromosomes: IntArray) -> IntArray:
-        """Number chromosomes in the order of their genes; different ones differ.
+        """Encode chromosomes as integers, one or several words each, that sort like their genes.
 
-        Each word is a number whose digits are genes, counted from their smallest
+        A word is a mixed-radix number whose digits are genes, counted from their smallest
         values. So crossover and mutation are arithmetic on codes.
 
         Parameters
@@ -124,7 +124,7 @@ class Genome:
         return codes
 
     def parameters(self, codes: IntArray) -> Array:
-        """Parameters of chromosomes from their codes, as `decode` has them.
+        """Decode the codes of chromosomes into parameters, as `decode` does with chromosomes.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Genome:
         return np.moveaxis(parameters, 0, -1)
 
     def crossed(self, parents: IntArray, cut: IntArray) -> IntArray:
-        """Both children of each pair: all genes from the cut on are swapped.
+        """Return both children of each pair, with all genes from the cut on swapped.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Genome:
         return children
 
     def redraw(self, codes: IntArray, which: IntArray, gene: IntArray, value: IntArray) -> None:
-        """Give genes of some chromosomes another value, in place.
+        """Set one gene of each of some chromosomes to a new value, in place.
 
         Parameters
         ----------
@@ -186,12 +186,12 @@ class Genome:
 
     @cached_property
     def values(self) -> IntArray:
-        """How many values each gene has."""
+        """Number of values of each gene, (n_genes,)."""
         return self.high - self.low + 1
 
     @cached_property
     def _word(self) -> IntArray:
-        """Word of each gene; the genes of a parameter share one."""
+        """Index of the word that contains each gene; the genes of a parameter share one."""
         words, filled = [0], 1
         for own in self._own:
             values = prod(self.values[own].tolist())
@@ -205,7 +205,7 @@ class Genome:
 
     @cached_property
     def _own(self) -> list[slice]:
-        """Where the genes of each parameter are."""
+        """Slices of the chromosome with the genes of each parameter."""
         return [slice(*ends) for ends in pairwise(accumulate(self.sizes, initial=0))]
 
     @cached_property
@@ -214,7 +214,7 @@ class Genome:
 
     @cached_property
     def _weight(self) -> IntArray:
-        """What a step of each gene counts in its word."""
+        """Place value of each gene in its word."""
         weights = np.ones(self.genes, dtype=np.int64)
         for gene in range(self.genes - 2, -1, -1):
             if self._word[gene] == self._word[gene + 1]:
@@ -223,7 +223,7 @@ class Genome:
 
     @cached_property
     def _modulus(self) -> IntArray:
-        """What is left of a word, modulo this, are the genes from a cut on; (n_words, n_genes)."""
+        """Moduli that reduce a word to its genes from each cut on, (n_words, n_genes)."""
         moduli = np.empty((self._words, self.genes), dtype=np.int64)
         for word in range(self._words):
             own = np.flatnonzero(self._word == word)
@@ -234,18 +234,18 @@ class Genome:
 
     @cached_property
     def _values_of(self) -> list["_Values"]:
-        """Looks up values of each parameter by the number that its genes are."""
+        """Functions from the number that a parameter's genes form to the parameter's value."""
         ends = [(self.low[own].tolist(), self.high[own].tolist()) for own in self._own]
         return [_values(tuple(low), tuple(high)) for low, high in ends]
 
 
 _Values = Callable[[IntArray, Array], None]
-"""Writes the values of some numbers to an array of their shape."""
+"""Function that writes the parameter values of given numbers to an array of their shape."""
 
 
 @lru_cache(maxsize=64)
 def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
-    """Look up values of a parameter by the number that its genes are."""
+    """Return a function from the number that a parameter's genes form to its value."""
     exponents, mantissas = np.arange(low[0], high[0] + 1), _mantissas(low[1:], high[1:])
     # Both powers are exact doubles, and one of them is 1, so this rounds once.
     power = exponents + (_LARGEST_POWER - len(low) + 1)
@@ -269,18 +269,18 @@ def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
 
 @lru_cache(maxsize=64)
 def _mantissas(low: tuple[int, ...], high: tuple[int, ...]) -> Array:
-    """All digits that there may be, read as a number, ascending."""
+    """Return all allowed sequences of digits as integers, ascending."""
     numbers = np.zeros(1)
     for least, most in zip(low, high, strict=True):
         numbers = (10 * numbers[:, None] + np.arange(least, most + 1)).ravel()
     return numbers
 
 
-# A table of all values of a parameter is looked up in one go; of six digits it would take 100 MB.
+# Largest table of all values of a parameter; with six digits it would take 100 MB.
 _LARGEST_TABLE = 2**17
 
 WORD_BITS = 48
-"""A word of a code is below two to this power."""
+"""Number of bits in a word of a code."""
 
 # The largest power of ten that is an exact double.
 _LARGEST_POWER = 22
@@ -290,7 +290,7 @@ _DIVISOR = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
 def genome_of(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
-    """Genome of a sample model.
+    """Return the genome of a sample model.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from biogrip.keys import Key
 
 @dataclass(frozen=True)
 class LeastSquaresSettings:
-    """Local fits from random points; also what identifiability is judged with."""
+    """Local fits from random points, the method of identifiability analyses, too."""
 
     candidates: Annotated[
         int,
@@ -37,14 +37,14 @@ def identify_many(
     Parameters
     ----------
     problems, settings, rngs, progress
-        As `biogrip.identify.methods` says; progress is told after every trace.
+        As in `biogrip.identify.methods`; `progress` is called after every trace.
     further
-        More starting points of each, log-parameters (n_further, n_parameters).
+        Additional starts of each trace, log-parameters (n_further, n_parameters).
 
     Raises
     ------
     BiogripError
-        If the model has no answer at any of the points.
+        If the model has no response at any of the points.
     """
     pairs = zip(problems, rngs, strict=True)
     points = [_screened(problem, settings, rng) for problem, rng in pairs]
@@ -57,9 +57,9 @@ def identify_many(
 def _screened(
     problem: Problem, settings: LeastSquaresSettings, rng: np.random.Generator
 ) -> tuple[Array, Row]:
-    """Starting points, and the first row of the history."""
+    """Return the best random points as starts, and the first row of the history."""
     shape = (settings.candidates, len(problem.low))
-    # Where arms ring chi^2 has many basins; which points are good shows better without.
+    # With ringing arms chi^2 has many basins; points are ranked better without inertia.
     quiet = problem.without_inertia()
     points, misfit = screened(quiet.misfit, rng.uniform(problem.low, problem.high, shape))
     if not len(points):

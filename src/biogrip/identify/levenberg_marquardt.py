@@ -1,15 +1,14 @@
-"""Least squares within bounds, many problems at once (Levenberg 1944, Marquardt 1963).
+"""Levenberg-Marquardt least squares within bounds, for many problems at once [1]_, [2]_.
 
-Every problem has its own damping, adapted as Nielsen (1999) does, and drops out
-when it has converged (Moré 1978). A step stays within the bounds and within a box
-about the point it starts from: what would leave is fixed at the edge, and the rest
-solved for again. No sum runs over problems, nor in an order that depends on how
-many there are: to the last bit, what a problem comes out with does not depend on
-which others are solved with it.
+Every problem has its own damping, adapted as in [4]_, and is removed when it has
+converged [3]_. A step stays within the bounds and within a box about its origin:
+parameters that would leave are fixed at the edge, and the others are solved for again.
+No sum runs over problems, nor in an order that depends on their number: the result of
+a problem does not depend, to the last bit, on the problems solved with it.
 
-Points are rounded to a grid far finer than what the data tell. Processors differ in the
-last bits of a step, and a descent along a valley would blow that up until decisions
-differ: on the grid, every step begins with the same bits on all of them.
+Points are rounded to a grid far finer than the statistical uncertainty. Processors differ
+in the last bits of a step, and a descent along a valley would amplify these until decisions
+differ. On the grid, every step begins with the same bits on all processors.
 
 References
 ----------
@@ -32,23 +31,23 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 
 _LEAST_DAMPING = 1e-9
-# In e-folds. Linearised, a rotation is a poor guide much further, and starts would be wasted.
+# In e-folds. Linearised rotations are wrong for longer steps, which would waste starts.
 _LONGEST_STEP = 3.0
 _MOST_STEPS = 300
 _STANDSTILL = 1e-8
 _SMALLEST = 1e-300
-# Ratios of gains are told apart to one in so many.
+# Ratios of actual to predicted decrease are rounded to multiples of one over this.
 _RATIOS = 256
-# Spacing of the grid, in standard deviations of a parameter with all others known, and at most.
+# Grid spacing, in standard deviations of a parameter with all others known; and its maximum.
 _SPACING, _WIDEST = 1e-3, 2.0**-10
 
 
 class Rows:
-    """Arrays, fields of a dataclass, with a row for each of n problems."""
+    """Base of dataclasses whose fields are arrays with a row for each of n problems."""
 
     @property
     def parts(self) -> tuple[Any, ...]:
-        """All of them, in order."""
+        """All fields, in order."""
         return tuple(vars(self).values())
 
     def __getitem__(self, which: BoolArray | IntArray) -> Self:
@@ -57,7 +56,7 @@ class Rows:
 
     @classmethod
     def joined(cls, some: Sequence[Self]) -> Self:
-        """Put the rows of some behind one another."""
+        """Concatenate the rows of several objects."""
         return cls(*map(np.concatenate, zip(*(each.parts for each in some), strict=True)))
 
 
@@ -68,11 +67,11 @@ class Normal(Rows):
     Parameters
     ----------
     square_sum : (n,)
-        What is minimized, a sum of squares.
+        Sum of squares that is minimized.
     gradient : (n, n_parameters)
         Half its gradient.
     information : (n, n_parameters, n_parameters)
-        Half its second derivatives, as far as first derivatives of residuals give them.
+        Half its Hessian, in the Gauss-Newton approximation unless noted otherwise.
     misfit_rad : (n,)
         RMS misfit to the trace.
     """
@@ -84,33 +83,33 @@ class Normal(Rows):
 
 
 Objective = Callable[[Array, IntArray], Normal]
-"""Normal equations at points (n, n_parameters) of the problems with given indices, (n,)."""
+"""Function of points, (n, n_parameters), and problem indices, (n,): their normal equations."""
 
 
 class Constraint(Protocol):
-    """A relation between the parameters of each problem, kept exactly by eliminating one."""
+    """A constraint on the parameters of each problem, kept exactly by eliminating one of them."""
 
     def eliminated(self, normal: Normal, x: Array, problem: IntArray) -> tuple[Normal, BoolArray]:
-        """Normal equations for all parameters but one, and which one it is, (n, n_parameters)."""
+        """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
 
     def restored(self, x: Array, problem: IntArray, eliminated: BoolArray) -> Array:
-        """Points, (n, n_parameters), with the relation restored; NaN if bounds forbid that."""
+        """Move points, (n, n_parameters), onto the constraint; NaN where bounds forbid that."""
 
 
 @dataclass
 class Minima(Rows):
-    """Where the problems ended.
+    """Results of minimizing n problems.
 
     Parameters
     ----------
     x : (n, n_parameters)
-        Points.
+        Final points.
     misfit_rad : (n,)
         RMS misfits there.
     evaluations : (n,)
-        How often each problem was linearised.
+        Number of linearisations of each problem.
     converged : (n,)
-        Whether the descent came to an end by itself.
+        True if the minimization ended before the limit of steps.
     """
 
     x: Array
@@ -120,7 +119,7 @@ class Minima(Rows):
 
     @classmethod
     def none_yet(cls, starts: Array, evaluations: int) -> "Minima":
-        """Return what is known of starting points that are not compared with any other yet."""
+        """Return starts as results that have not converged and whose misfit is infinite."""
         count = len(starts)
         misfit_rad, converged = np.full(count, np.inf), np.zeros(count, dtype=bool)
         return cls(starts.copy(), misfit_rad, np.full(count, evaluations), converged)
@@ -147,24 +146,24 @@ def minimized(
     damping: float = 1e-2,
     most_steps: int = _MOST_STEPS,
 ) -> Minima:
-    """Descend from a starting point in every problem.
+    """Minimize the sum of squares of every problem from its start.
 
     Parameters
     ----------
     objective
-        What is minimized.
+        Function that returns the normal equations.
     starts : (n, n_parameters)
-        Within bounds, and fulfilling the constraint; logarithms, for steps are limited in length.
+        Logarithms, within bounds and on the constraint; steps are limited in e-folds.
     low, high : (n, n_parameters)
-        Bounds; what is equal stays.
+        Bounds; equal bounds fix a parameter.
     tolerance
-        Stop when a step lowers the sum of squares, and was to lower it, by less than this share.
+        Stop when the actual and the predicted relative decrease of the sum are below this.
     constraint
-        What is to hold on the way.
+        Constraint on the parameters, if any.
     damping
-        Of the first steps, relative to the diagonal of the information.
+        Initial damping, relative to the diagonal of the information.
     most_steps
-        Stop after so many.
+        Limit of steps.
     """
     everyone, minima = np.arange(len(starts)), Minima.none_yet(starts, evaluations=1)
     normal, growth = objective(starts, everyone), np.full(len(starts), 2.0)
@@ -186,7 +185,7 @@ def minimized(
 def _advance(
     state: _State, objective: Objective, constraint: Constraint | None, tolerance: float
 ) -> BoolArray:
-    """Try a step in every problem, keep it where it leads down, and tell which are done."""
+    """Try a step in every problem, keep those that decrease it, return which have converged."""
     x, problem, normal = state.x, state.problem, state.normal
     reduced, basic = normal, np.zeros(x.shape, dtype=bool)
     if constraint is not None:
@@ -194,7 +193,7 @@ def _advance(
     below = np.where(basic, 0.0, np.maximum(state.low - x, -_LONGEST_STEP))
     above = np.where(basic, 0.0, np.minimum(state.high - x, _LONGEST_STEP))
     step = bounded_step(reduced, state.damping, below, above)
-    # Valleys are straight in the logarithms or, of sums, in the parameters themselves.
+    # Valleys are straight in the logarithms or, where a sum is determined, in the parameters.
     straight = np.where(state.growth[:, None] > 2, np.log1p(np.maximum(step, -0.9)), step)
     tried, possible = _on_grid(x + straight, state), np.ones(len(x), dtype=bool)
     if constraint is not None:
@@ -215,10 +214,10 @@ def _advance(
 
 
 def _on_grid(x: Array, state: _State) -> Array:
-    """Round points to the grid of each problem, but for what is at a bound."""
+    """Round points to the grid of each problem, except parameters at a bound."""
     diagonal = np.arange(x.shape[1])
     size = np.abs(state.normal.information[:, diagonal, diagonal]) + _SMALLEST
-    # A power of two, so that points of a finer grid stay where they are.
+    # A power of two, so that points of a coarser grid are points of a finer one.
     spacing = np.ldexp(1.0, np.frexp(_SPACING / np.sqrt(size))[1])
     spacing = np.minimum(spacing, _WIDEST)
     inside = (x > state.low) & (x < state.high)
@@ -227,7 +226,7 @@ def _on_grid(x: Array, state: _State) -> Array:
 
 
 def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> Array:
-    """Damped Gauss-Newton steps, with what would leave a box fixed at its edge.
+    """Compute damped Gauss-Newton steps within a box.
 
     Parameters
     ----------
@@ -236,7 +235,7 @@ def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> 
     damping : (n,)
         Relative to the diagonal of the information; 0 for plain Gauss-Newton.
     below, above : (n, n_parameters)
-        How far each parameter may change; neither above nor below zero.
+        Smallest and largest change of each parameter; zero is between them.
 
     Returns
     -------
@@ -254,15 +253,15 @@ def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> 
         given = np.where(fixed, step[again], 0.0)
         pull = gradient[again] + _times(information, given)
         rest = _free_step(pull, information, damping[again], fixed)
-        # Whatever leaves the box now is cut off there.
+        # Parameters that leave the box now are clipped.
         step[again] = np.clip(given + rest, below[again], above[again])
     return step
 
 
 def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolArray) -> Array:
-    """Steps of what is not fixed."""
+    """Compute the damped steps of parameters that are not fixed."""
     diagonal = np.arange(gradient.shape[1])
-    # Marquardt's scaling; what has no effect at all must not divide by zero.
+    # Marquardt's scaling; a parameter without any effect must not divide by zero.
     size = np.abs(information[:, diagonal, diagonal]) + _SMALLEST
     scale = np.where(fixed, 0.0, 1 / np.sqrt(size))
     matrix = information * (scale[:, :, None] * scale[:, None, :])
@@ -273,8 +272,8 @@ def _free_step(gradient: Array, information: Array, damping: Array, fixed: BoolA
 def _solved(matrix: Array, vector: Array) -> Array:
     """Solve positive definite systems, (n, size, size) and (n, size), by elimination.
 
-    For matrices this small it is several times as fast to do each of its steps for all
-    systems than all steps for each, as a library does.
+    For such small matrices, taking each elimination step for all systems is several times as
+    fast as solving one system after the other, as a library does.
     """
     a, b = matrix.transpose(1, 2, 0).copy(), vector.T.copy()
     size = len(b)
@@ -289,10 +288,10 @@ def _solved(matrix: Array, vector: Array) -> Array:
 
 
 def _damp(state: _State, gained: Array, predicted: Array) -> None:
-    """Adapt the damping to how much of what was predicted was gained (Nielsen 1999)."""
+    """Adapt the damping to the ratio of actual to predicted decrease (Nielsen 1999)."""
     hopeful = predicted > 0
     ratio = np.where(hopeful, gained / np.where(hopeful, predicted, 1.0), -1.0)
-    # Of a gain that is next to nothing, last bits are a large share.
+    # The last bits are a large share of a tiny decrease.
     ratio = np.rint(np.minimum(np.maximum(ratio, -1.0), 2.0) * _RATIOS) / _RATIOS
     better = ratio > 0
     less = np.maximum(1 / 3, 1 - (2 * np.where(better, ratio, 0.5) - 1) ** 3)
@@ -314,5 +313,5 @@ def _either(which: BoolArray, one: Normal, other: Normal) -> Normal:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
-    """Product of a matrix and a vector in each problem."""
+    """Multiply the matrix and the vector of each problem."""
     return (matrices @ vectors[:, :, None])[:, :, 0]

@@ -1,8 +1,8 @@
-"""Local fits on log-parameters within bounds, any number of them at once.
+"""Local fits of log-parameters within bounds, computed many at once.
 
-Of any number of traces with the same protocol, sampling times and model, from any number of
-starting points, as one array. To the last bit, a fit does not depend on which others are made
-with it.
+The fits of traces with the same protocol, sampling times and model, from any number of starts,
+are computed as one array. The result of a fit does not depend, to the last bit, on the other
+fits.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,39 +16,38 @@ from biogrip.identify.problem import Problem
 from biogrip.identify.refreshed_fits import minimized_with_refreshes
 
 PRIOR_WIDTH = 100.0
-"""Width in e-folds of the prior that every parameter has, about the middle of its range.
+"""Standard deviation, in e-folds, of the Gaussian prior about the middle of each range.
 
-Wherever the trace says anything at all it is without effect: it changes an
-estimate by the square of (standard deviation / 100 e-folds). A parameter of which
-the trace says nothing comes out in the middle of the range left to it, not where
-rounding errors leave it, which differs from processor to processor.
+The prior changes an estimate only by the square of (standard deviation / 100 e-folds).
+A parameter that the trace does not inform ends in the middle of the range left to it.
+Without the prior, rounding errors would place it, and these differ between processors.
 """
 
 ROUGH, FAIR, FINE = 1e-5, 1e-6, 1e-8
-"""Stop when a step lowers the sum of squares by less than this share.
+"""Relative decrease of the sum of squares below which a fit has converged.
 
-To tell basins apart; to know chi^2 of some thousand samples to 0.01; to be there.
-All are far above rounding, so that every machine stops at the same step.
+`ROUGH` distinguishes basins, `FAIR` gives chi^2 of some thousand readings to 0.01, `FINE` gives
+the optimum. All are far above rounding errors, so that every machine stops at the same step.
 """
 
-# Second derivatives of residuals are differences of exact first ones, so far apart.
+# Step of the differences of exact first derivatives that give second derivatives of residuals.
 _APART = 1e-4
-# Numbers in the rows that are formed at once, where every sample has one.
+# Most numbers in the rows that are formed at once.
 _AT_ONCE = 1_000_000
 
 
 class Held(Constraint, Protocol):
-    """What fits are held to: a relation between parameters, and perhaps residuals of its own."""
+    """A constraint between parameters that fits keep, with residuals of its own if it has any."""
 
     def started(self, x: Array) -> Array:
-        """Points near the given ones, one a fit, at which the relation holds."""
+        """Return points near the given ones, one a fit, that fulfil the constraint."""
 
     def added(self, normal: Normal, x: Array, fit: IntArray) -> Normal:
-        """Normal equations with its own residuals in them."""
+        """Return the normal equations with the residuals of the constraint included."""
 
 
 def alike(problems: Sequence[Problem]) -> list[IntArray]:
-    """Divide problems, by index, into groups that `LocalFits` can take together."""
+    """Group the indices of problems that one `LocalFits` can fit together."""
     groups: list[list[int]] = []
     for index, problem in enumerate(problems):
         for group in groups:
@@ -66,7 +65,7 @@ def alike(problems: Sequence[Problem]) -> list[IntArray]:
 
 
 class LocalFits:
-    """Fits to any of a number of traces.
+    """Local fits to several traces that are modelled by the same responses.
 
     Parameters
     ----------
@@ -83,22 +82,22 @@ class LocalFits:
         self._middle = 0.5 * (self.low + self.high)
 
     def normal(self, x: Array, trace: IntArray) -> Normal:
-        """Normal equations of the residuals, in units of the noise, and the prior.
+        """Return the normal equations of the residuals, in units of the noise, and the prior.
 
         Parameters
         ----------
         x : (n, n_parameters)
             Log-parameters.
         trace : (n,)
-            Which trace each is compared with.
+            Index of the trace that each point is compared with.
         """
         return self._in_parts(self._residuals.condensed_responses, x, trace)
 
     def curved(self, x: Array, trace: IntArray) -> Normal:
-        """Normal equations with all of the second derivatives, not only those of Gauss and Newton.
+        """Return normal equations with the full Hessian in place of its Gauss-Newton part.
 
-        They leave out residuals times their second derivatives. Of these only the latter are
-        differences, so that where residuals vanish, their error does, too.
+        The Gauss-Newton part lacks residuals times their second derivatives. Only these
+        derivatives are finite differences, so that their error vanishes with the residuals.
         """
         normals = []
         numbers = 2 * x.shape[1] * (1 + x.shape[1]) * self._traces.shape[1]
@@ -110,20 +109,20 @@ class LocalFits:
         return Normal.joined(normals)
 
     def _second(self, residual: Array, x: Array, trace: IntArray) -> Array:
-        """Residuals times their second derivatives, in units of the noise."""
+        """Return residuals times their second derivatives, in units of the noise."""
         count, parameters = x.shape
         both_ways = _APART * np.concatenate((np.eye(parameters), -np.eye(parameters)))
         around = (x[:, None] + both_ways).reshape(-1, parameters)
         slopes = self._residuals.condensed_responses(around)[:, 1:]
         ahead, behind = slopes.reshape(count, 2, parameters * parameters, -1).swapaxes(0, 1)
-        # One product a fit: the order of its sums does not depend on how many there are.
+        # One product per fit: the order of its sums does not depend on the number of fits.
         second = ((ahead - behind) @ residual[:, :, None])[:, :, 0] / (2 * _APART)
         second = second.reshape(count, parameters, parameters)
         second /= (self._noise_rad[trace] ** 2)[:, None, None]
         return 0.5 * (second + second.swapaxes(1, 2))
 
     def on_all_samples(self, x: Array, trace: IntArray) -> Normal:
-        """Sums of squares and gradients on all samples, to all digits; no information."""
+        """Return sums of squares and gradients from all readings, without the information."""
         found = [
             self.problems[own].residuals.gradient(point)
             for point, own in zip(x, trace.tolist(), strict=True)
@@ -142,7 +141,7 @@ class LocalFits:
     def _in_parts(
         self, rows_of: Callable[..., Array], x: Array, trace: IntArray, *beside: Array
     ) -> Normal:
-        """Normal equations, with rows of so many fits at once as memory has room for."""
+        """Return normal equations, with the rows of a limited number of fits formed at a time."""
         size = max(1, _AT_ONCE // (self._traces.shape[1] * (1 + x.shape[1])))
         if len(x) <= size:
             return self._normal_of(rows_of(x, *beside), x, trace)
@@ -153,7 +152,7 @@ class LocalFits:
         return Normal.joined(normals)
 
     def _normal_of(self, rows: Array, x: Array, trace: IntArray) -> Normal:
-        """Normal equations, given rows of the responses; infinitely bad where these are none."""
+        """Return normal equations from rows of responses; infinite where there is no response."""
         answered = np.isfinite(rows[:, 0, 0])
         rows[~answered] = 0.0
         rows[:, 0] -= self._traces[trace]
@@ -181,20 +180,20 @@ class LocalFits:
         low: Array | None = None,
         high: Array | None = None,
     ) -> Minima:
-        """Fit from starting points.
+        """Minimize the sum of squares from given starts.
 
         Parameters
         ----------
         starts : (n, n_parameters)
-            Log-parameters; moved into the bounds if need be, and to where fits are held.
+            Log-parameters; moved into the bounds and onto the constraint if need be.
         trace : (n,)
-            Which trace each is fitted to.
+            Index of the trace that each is fitted to.
         tolerance
             `ROUGH`, `FAIR` or `FINE`.
         held
-            What the fits are held to.
+            Constraint that the fits keep.
         low, high : (n, n_parameters) or (n_parameters,)
-            Bounds instead of the search range; a parameter between equal ones is known.
+            Bounds instead of the search range; equal bounds fix a parameter.
         """
         low = np.broadcast_to(self.low if low is None else low, starts.shape)
         high = np.broadcast_to(self.high if high is None else high, starts.shape)

@@ -1,10 +1,10 @@
-"""The identifiers that there are.
+"""Registry of the identification methods.
 
-Each is a module of its own here, named like the method. It has the class of its settings,
+Each method is a module of this package, named like the method. It has the class of its settings,
 whose fields are the keys of its config block (`biogrip.keys.Key`), and a function
-``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
-trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
-in the settings, its generator is its only source of randomness, and progress is told of all.
+``identify_many(problems, settings, rngs, progress)`` that returns an `Identification` of each
+trace, independent of the other traces to the last bit. Each trace's generator is its only source
+of randomness. Search ranges belong to the problems, the budget of each trace to the settings.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -19,23 +19,23 @@ from biogrip.identify.problem import Problem
 Identify = Callable[
     [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
 ]
-"""Identifies traces as the ``identify_many`` of a method does, with its settings."""
+"""The ``identify_many`` of a method with its settings already given."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """What is said of an identifier without loading it.
+    """Description of an identification method, available without importing its module.
 
     Parameters
     ----------
     name, title
-        In the config and in files; in print.
+        Name in the config and in files; name in print.
     blocks
-        Config blocks that hold its settings; of each, the class in its module that has the keys.
+        Names of its config blocks, and of the settings class of each in its module.
     step
-        What a row of its history follows.
+        Unit of work after which its history has a row.
     settings
-        Class in its module that puts several blocks together, in their order.
+        Name of the class in its module that combines several blocks, in their order.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Method:
         return f"biogrip.identify.{self.name}"
 
     def named(self, name: str) -> type:
-        """Load a class of its module."""
+        """Import a class of its module by its name."""
         found: type = getattr(import_module(self.module), name)
         return found
 
@@ -88,20 +88,20 @@ METHODS: dict[str, Method] = {
 
 
 def block_class(block: str) -> type:
-    """Load the class that has the keys of a config block of some method."""
+    """Import the settings class of a config block of any method."""
     method = next(method for method in METHODS.values() if block in method.blocks)
     return method.named(method.blocks[block])
 
 
 def identifier(name: str, settings: object) -> Identify:
-    """Load a method with its settings.
+    """Return the function that identifies traces by a method with given settings.
 
     Parameters
     ----------
     name
         One of `METHODS`.
     settings
-        Its block, or what puts its blocks together.
+        Instance of the method's settings class.
     """
     module = import_module(METHODS[name].module)
 
@@ -118,6 +118,6 @@ def identifier(name: str, settings: object) -> Identify:
 def best_fit(
     problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
 ) -> Identification:
-    """Identify one trace by multi-start least squares, the method of every judgement."""
+    """Identify one trace by multi-start least squares, the method of all further analyses."""
     (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
     return found

@@ -1,4 +1,4 @@
-"""Which sample model is the simplest that a trace asks for.
+"""Choice of the simplest adequate sample model by information criteria.
 
 References
 ----------
@@ -19,7 +19,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, SampleModel
 
 WORTH_A_MENTION = 2.0
-"""A difference of BIC below this says nothing for one of two models."""
+"""Difference of BIC below which neither of two models is preferred."""
 
 
 @dataclass(frozen=True)
@@ -29,11 +29,11 @@ class Tried:
     Parameters
     ----------
     candidate
-        Which one, see `CANDIDATES`.
+        Name of the model in `CANDIDATES`.
     misfit_rad
-        Of its best fit.
+        RMS misfit of its best fit.
     delta_aic, delta_bic
-        By how much it exceeds the lowest of those tried.
+        AIC and BIC minus the lowest of the models tried.
     """
 
     candidate: str
@@ -43,14 +43,14 @@ class Tried:
 
     @property
     def model(self) -> SampleModel:
-        """The model itself."""
+        """The sample model of that name."""
         return CANDIDATES[self.candidate].model
 
 
 def aic_and_bic(
     misfit_rad: ArrayLike, samples: ArrayLike, parameters: ArrayLike
 ) -> tuple[Array, Array]:
-    """Akaike's and Schwarz's criteria, with Gaussian noise of unknown level.
+    """Compute AIC and BIC for Gaussian noise of unknown standard deviation.
 
     AIC = n ln(misfit^2) + 2 (p + 1) and BIC = n ln(misfit^2) + (p + 1) ln n, the
     noise being one parameter more.
@@ -66,7 +66,7 @@ def aic_and_bic(
 
 
 def ranked(candidates: Sequence[str], misfits_rad: Sequence[float], samples: int) -> list[Tried]:
-    """Compare the best fits of some models to one trace, in their order."""
+    """Compare the best fits of several models to one trace by AIC and BIC, keeping their order."""
     counts = [len(CANDIDATES[name].model.names) for name in candidates]
     criteria = aic_and_bic(misfits_rad, samples, counts)
     aic, bic = (values - values.min() for values in criteria)
@@ -77,14 +77,14 @@ def ranked(candidates: Sequence[str], misfits_rad: Sequence[float], samples: int
 
 
 def advice(tried: Sequence[Tried], chosen: str) -> str:
-    """Say in a sentence whether a model is what the trace asks for.
+    """State in a sentence whether BIC prefers another model to the chosen one.
 
     Parameters
     ----------
     tried
-        It, and the others.
+        All models tried, the chosen one among them.
     chosen
-        Which one it is.
+        Name of the chosen one.
     """
     own = next(each for each in tried if each.candidate == chosen)
     best = min(tried, key=lambda each: each.delta_bic)
@@ -93,7 +93,7 @@ def advice(tried: Sequence[Tried], chosen: str) -> str:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
     more, fewer = len(best.model.names), len(own.model.names)
     lead = f"{best.model.title} is preferred, with a BIC lower by {own.delta_bic:.3g}."
-    # By how much it fits worse, parameters left aside.
+    # Difference of n ln(misfit^2), which leaves the number of parameters aside.
     worse = own.delta_aic - best.delta_aic - 2 * (fewer - more)
     if more > fewer or (more < fewer and worse > WORTH_A_MENTION):
         return f"{title} is not adequate: {lead}"

@@ -1,6 +1,6 @@
-"""Local fits from several starting points, and the best of them, for many traces at once.
+"""Multi-start least squares: the best of several local fits, for many traces at once.
 
-To the last bit, the answer for a trace does not depend on which others there are.
+The result of a trace does not depend, to the last bit, on the other traces.
 
 References
 ----------
@@ -20,11 +20,11 @@ from biogrip.identify.local_fits import ROUGH, LocalFits, alike
 from biogrip.identify.problem import Problem
 from biogrip.identify.settling import settled
 
-# Shares by which springs differ in starts for arms that ring.
+# Changes of the springs' logarithms in additional starts for ringing arms.
 _BESIDE = np.array([-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
 
 FINISHED = 4
-"""Of the rough fits, so many of the best are finished."""
+"""Number of a trace's best rough fits that are continued to the optimum."""
 
 
 def best_of_starts(
@@ -33,22 +33,22 @@ def best_of_starts(
     before: Sequence[Row],
     progress: Progress,
 ) -> list[Identification]:
-    """Fit every trace from each of its starts; the answers are the optima of lowest misfit.
+    """Fit every trace from each of its starts and return the optima of lowest misfit.
 
-    Misfits are compared in single precision and the first of equals wins, so
-    that the last bits of a processor decide nothing.
+    Misfits are compared in single precision and the first of equals wins, so that the
+    last bits, which differ between processors, decide nothing.
 
     Parameters
     ----------
     problems
-        What is fitted, one a trace.
+        One problem per trace.
     starts
         Log-parameters for each trace, (n_starts, n_parameters).
     before
         First row of the history of each trace: parameters, lowest and median misfit, and
         evaluations before the first fit.
     progress
-        Is told after every trace.
+        Called after every trace.
     """
     answers: dict[int, Identification] = {}
     for group in alike(problems):
@@ -77,7 +77,7 @@ def _best_of_alike(
     answers = []
     for own, first_row in enumerate(before):
         rows = _descents(rough[trace == own], first_row)
-        # Not the steps that settle it: how many it takes, the last bits of a processor decide.
+        # Newton's steps are not counted: the last bits of a processor decide their number.
         finished = fine.evaluations[trace_of_fine == own].sum()
         misfit_rad, evaluations = float(best.misfit_rad[own]), rows[-1][3] + int(finished)
         rows[-1] = np.exp(best.x[own]), misfit_rad, misfit_rad, evaluations
@@ -89,10 +89,10 @@ def _best_of_alike(
 def _finished(
     fits: LocalFits, starts: Sequence[Array]
 ) -> tuple[Minima, IntArray, Minima, IntArray]:
-    """Fit roughly from all starts, and the best of each trace finely: both, each with its trace."""
+    """Fit roughly from all starts, then finely from the best; return both with their traces."""
     trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
-    # Which basin is deepest shows before its bottom is reached; only the best are worth that.
+    # Rough fits show which basins are deepest; only the best are continued to the optimum.
     best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
     finalists = np.concatenate(best)
     return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
@@ -101,17 +101,17 @@ def _finished(
 def _started_quietly(
     problems: Sequence[Problem], starts: Sequence[Array], before: Sequence[Row]
 ) -> tuple[list[Array], list[Row]]:
-    """Add the best fits of arms that do not ring to the starts.
+    """Add the best fits without inertia to the starts of fits with inertia.
 
-    Rings of different frequencies look alike at the instants of the samples: chi^2 has many
-    basins. Without inertia it has few, of which the deepest lies by the right one: starts with
-    springs a little stiffer and softer are in the basins beside it.
+    Ringing of different frequencies may agree at the sampling times, so that chi^2 has many
+    basins. Without inertia it has few, and the deepest lies near the right one. Starts with
+    slightly stiffer and softer springs cover the basins beside it.
     """
     quiet = LocalFits([problem.without_inertia() for problem in problems])
     rough, trace, fine, trace_of_fine = _finished(quiet, starts)
     model = problems[0].residuals.model
     springs = [parameter.kind == "stiffness" for parameter in model.parameters]
-    # Rings beside a power law take a hundred times as long.
+    # Ringing responses of power-law models take a hundred times as long.
     most, beside = (FINISHED, _BESIDE[:0]) if model.power_law else (None, _BESIDE)
     more, rows = [], []
     for own, (own_starts, row) in enumerate(zip(starts, before, strict=True)):
@@ -124,19 +124,19 @@ def _started_quietly(
 
 
 def identify_from(problem: Problem, start: Array) -> Identification:
-    """Fit a trace from a single point, (n_parameters,) log-parameters."""
+    """Fit a trace from a single start, (n_parameters,) log-parameters."""
     misfit = float(problem.misfit(np.exp(start)[None])[0])
     row = np.exp(start), misfit, misfit, 1
     return best_of_starts([problem], [start[None]], [row], silent)[0]
 
 
 def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
-    """Fit every trace from one starting point, and settle the optima.
+    """Fit every trace from one start, and refine the optima to their last digits.
 
     Parameters
     ----------
     problems
-        What is fitted, one a trace.
+        One problem per trace.
     starts : (n_parameters,) or (n_traces, n_parameters)
         Log-parameters.
 
@@ -154,12 +154,12 @@ def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
 
 
 def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array, Array]:
-    """Sort log-parameters by misfit, those without one left out.
+    """Sort log-parameters by misfit, leaving out those without a response.
 
     Returns
     -------
     candidates : (n, n_parameters)
-        Best first; equals, in single precision, in the order they came.
+        Best first; equals, in single precision, in their given order.
     misfit_rad : (n,)
     """
     values = misfit(np.exp(candidates))
@@ -169,7 +169,7 @@ def screened(misfit: Callable[[Array], Array], candidates: Array) -> tuple[Array
 
 
 def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
-    """Indices of the best fits."""
+    """Return the indices of the best fits among those that `which` marks."""
     chosen = np.flatnonzero(which)
     order = np.argsort(found.misfit_rad[chosen].astype(np.float32), kind="stable")
     best: IntArray = chosen[order[:count]]
@@ -177,7 +177,7 @@ def _best(found: Minima, which: BoolArray, count: int) -> IntArray:
 
 
 def _descents(found: Minima, before: Row) -> list[Row]:
-    """Rows of a history: the first, and one for each fit."""
+    """Return the rows of a history: the given first one, and one for each fit."""
     rows, evaluations, best, sorted_rad = [before], before[3], 0, list[float]()
     ranks = found.misfit_rad.astype(np.float32)
     for fit, misfit_rad in enumerate(found.misfit_rad.tolist()):
@@ -190,7 +190,7 @@ def _descents(found: Minima, before: Row) -> list[Row]:
 
 
 def _answer_of(rows: list[Row], *, converged: bool) -> Identification:
-    """Return the last row of a history as the answer."""
+    """Return an identification with a history, whose last row is its result."""
     parameters, misfit_rad, _, evaluations = rows[-1]
     steps, why = len(rows) - 1, "all starts fitted"
     return Identification(

@@ -1,8 +1,8 @@
-"""Fits of several sample models to the same traces: none fits worse than one that it contains.
+"""Fits of nested sample models to the same traces: none fits worse than a model nested in it.
 
-Each model is fitted from starting points of its own and from the optima of the models that it
-contains. Where one of these still fits better, because its optimum is out of reach of the
-richer model's search range, it is the richer model's answer: with elements that have vanished
+Each model is fitted from starts of its own and from the optima of the models nested in it.
+If one of these still fits better, because its optimum lies outside the richer model's search
+range, its optimum is the richer model's result, with elements that have vanished
 (`biogrip.experiment.nesting`).
 """
 
@@ -19,12 +19,12 @@ from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 
-# What an element that has vanished is over the usual one, or under it, where a fit starts; and
-# of an experiment, the time in which what is usual relaxes.
+# Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
+# start; and the usual relaxation time as a share of the length of the experiment.
 _AWAY, _SHARE = (3.0, 100.0), 0.1
-# Relaxation times at which a further branch starts, over the usual one.
+# Relaxation times at which an additional branch starts, over the usual one.
 _FURTHER = 0.03, 1.0, 30.0
-# Models that are the same in other parameters may lead one another on.
+# Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
 Answers = list[Identification]
@@ -37,26 +37,26 @@ def fit_models(
     done: Callable[[], None],
     near: Mapping[str, Array] | None = None,
 ) -> dict[str, Answers]:
-    """Fit models to traces by least squares.
+    """Fit nested models to traces by least squares.
 
     Parameters
     ----------
     problems
-        By candidate, the same traces posed for it.
+        By candidate, the problems of the same traces.
     settings
         The budget of each fit.
     rngs
-        By candidate, a source of randomness for each trace.
+        By candidate, a random generator for each trace.
     done
-        Is called after every model.
+        Called after every model.
     near
-        By candidate, log-parameters (n_traces, n_parameters) to start from as well.
+        By candidate, additional starts, log-parameters (n_traces, n_parameters).
 
     Returns
     -------
     dict of list of Identification
-        By candidate, in the order given, the best fit to each trace. Parameters may be zero or
-        infinite. Not converged is, too, what fits worse than a model within its own range.
+        By candidate, in the given order, the best fit to each trace. Parameters may be zero or
+        infinite. A fit worse than a nested model's within its own range has not converged.
     """
     found: dict[str, Answers] = {}
     for name in sorted(problems, key=lambda each: len(CANDIDATES[each].model.names)):
@@ -78,9 +78,9 @@ def fit_models(
 def _of_contained(
     name: str, found: Mapping[str, Answers], trace: int, longest_s: float
 ) -> Iterator[Array]:
-    """Starting points at the optima of models that one contains, in its own parameters.
+    """Yield the optima of nested models as starts, in the richer model's own parameters.
 
-    Elements that have vanished are there, where they begin to be felt and well before that.
+    Elements that have vanished start at two finite sizes: noticeable, and hardly noticeable.
     """
     kinds = np.array([parameter.kind for parameter in CANDIDATES[name].model.parameters])
     for inner in different_in(name, found):
@@ -128,7 +128,7 @@ def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array
 
 
 def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:
-    """Size of the elements of a kind that are there; else, the others' within the experiment."""
+    """Return the mean size of a kind's elements, or one that relaxes within the experiment."""
     if np.any(own := there & (kinds == kind)):
         return float(np.exp(np.mean(np.log(values[own]))))
     others = values[there & (kinds != "exponent") & (values > 0)]
@@ -137,7 +137,7 @@ def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: 
 
 
 def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
-    """Fit again, in place, what fits worse than a model within its own range."""
+    """Fit again, in place, models that fit worse than a nested one within their range."""
     for _ in range(_MOST_ROUNDS):
         news = False
         for name, inner, trace in _worse(found):
@@ -152,7 +152,7 @@ def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answe
 
 
 def _take_simpler(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answers]) -> None:
-    """Take, in place, a simpler model's optimum where a richer model does not reach it."""
+    """Replace, in place, a richer model's result by a nested model's better optimum."""
     for name, inner, trace in _worse(found):
         simpler = found[inner][trace]
         parameters = as_richer(name, inner, simpler.parameters)
@@ -163,7 +163,7 @@ def _take_simpler(problems: Mapping[str, Sequence[Problem]], found: dict[str, An
 
 
 def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
-    """Find models, simpler ones first, models in them and traces to which these fit better."""
+    """Yield model, nested model and trace where the nested one fits better; simple ones first."""
     for name in found:
         for inner in contained_in(name, found):
             pairs = zip(found[name], found[inner], strict=True)
@@ -173,18 +173,18 @@ def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
 
 
 def _digits(answer: Identification) -> float:
-    """Misfit to nine digits: what differs by less is the same on another processor."""
+    """Round a misfit to nine digits, below which processors differ."""
     return float(f"{answer.misfit_rad:.8e}")
 
 
 def _within(parameters: Array, problem: Problem) -> Array:
-    """Log-parameters within the search range."""
+    """Return log-parameters, clipped to the search range."""
     with np.errstate(divide="ignore"):
         return np.clip(np.log(parameters), problem.low, problem.high)
 
 
 def is_within(parameters: Array, problem: Problem) -> bool:
-    """Whether parameters, (n_parameters,), lie in the search range."""
+    """Return True if parameters, (n_parameters,), lie in the search range."""
     with np.errstate(divide="ignore"):
         x = np.log(parameters)
     return bool(np.all((x >= problem.low) & (x <= problem.high)))

@@ -1,9 +1,9 @@
-"""What colour the noise of a trace has, and how well that is known, by restricted likelihood.
+"""Autocorrelation of the noise of a trace, estimated by restricted maximum likelihood (REML).
 
-What a fit leaves has less noise than the trace, most of all at low frequencies, where
-parameters, offset and drift take it for their own. Restricted likelihood is that of
-what none of them can reach, so the colour comes out without that bias [1]_. The share of
-1/f noise is kept from vanishing, as it often would by chance alone [2]_.
+The residuals of a fit have less noise than the trace, most of all at low frequencies,
+where parameters, offset and drift absorb noise. The restricted likelihood is that of
+the part that none of them can absorb, which removes the bias [1]_. A prior keeps the share
+of 1/f noise from vanishing, as it often would by chance alone [2]_.
 
 References
 ----------
@@ -19,29 +19,29 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.response.whitening import Colour, Whitening
 
-# Logarithms of the odds of a part against the white one: from nothing to all.
+# Bounds of the logarithm of a component's share over that of white noise: from none to all.
 _LEAST, _MOST = -9.0, 7.0
-# Likelihoods of colours have several maxima. Odds, and places between the shortest and the longest
-# time, that are tried; the best with more of one part, and with more of the other, are followed.
+# The likelihood has several maxima. Grid of log odds, and of places between the shortest and the
+# longest time; starts are the best points with more relaxing, and with more 1/f noise.
 _ODDS, _PLACES = (_LEAST, -4.0, -1.0, 2.0, 6.0), (0.15, 0.35, 0.6, 0.85)
 _STEP, _SETTLED = 1e-4, 1e-9
-# Of second differences: where a parabola may end.
+# Step of finite differences.
 _APART = 0.1
-# A share, or a time, is known to some e-folds whatever the trace.
+# Prior standard deviation of the logarithms of odds and time, in e-folds.
 _KNOWN = 3.0
 
 
 class ColourLikelihood:
-    """How likely the noise that a fit leaves is to be of a colour.
+    """Restricted likelihood of noise models, given the residuals of a fit.
 
     Parameters
     ----------
     time_s : (n_samples,)
         Ascending sampling times.
     residual : (n_samples,)
-        What is left of a trace.
+        Residuals of the fit.
     directions : (n_directions, n_samples)
-        Where residuals may have been taken in: derivatives by the parameters, and nuisance.
+        Directions that the fit absorbs: derivatives by the parameters, and nuisance functions.
     """
 
     def __init__(self, time_s: Array, residual: Array, directions: Array) -> None:
@@ -52,7 +52,7 @@ class ColourLikelihood:
         self._bounds = [(_LEAST, _MOST), times, (_LEAST, _MOST)]
 
     def best(self, near: Colour | None = None) -> Colour:
-        """Return the colour of the highest likelihood, near to one that is known if there is."""
+        """Return the noise model of highest likelihood, starting from `near` if it is given."""
         from scipy.optimize import minimize
 
         starts = [_logarithms(near)] if near is not None else self._best_of_each()
@@ -69,19 +69,19 @@ class ColourLikelihood:
         return _colour(min(found, key=lambda each: float(each.fun)).x)
 
     def freedom(self, colour: Colour, sensitivity: Array, nuisance: Array) -> float:
-        """Degrees of freedom of the variances that follow from a colour, of the least known.
+        """Compute the degrees of freedom of the least known variance of a parameter.
 
-        From how the variance of an estimate changes with the colour, and how well that is
-        known: that of a chi-squared variable with as large a spread [1]_.
+        They are those of a chi-squared variable whose relative spread is that of the
+        variance, given the uncertainty of the noise model (Satterthwaite [1]_).
 
         Parameters
         ----------
         colour
-            The best.
+            Noise model of highest likelihood.
         sensitivity : (n_parameters, n_samples)
             Derivatives by the log-parameters, over the noise's standard deviation.
         nuisance : (n_functions, n_samples)
-            What the instrument may have added.
+            Nuisance functions of the instrument.
 
         References
         ----------
@@ -91,7 +91,7 @@ class ColourLikelihood:
 
         def variances(x: Array) -> Array:
             white = Whitening(self._time_s, _colour(x), nuisance)(sensitivity)
-            # Every parameter counts as known to an e-fold beforehand, as in `Likelihood.deviation`.
+            # Every parameter has a prior standard deviation of 1, as in `Likelihood.deviation`.
             inverse = np.linalg.inv(white @ white.T + np.eye(len(white)))
             return np.log(np.diagonal(inverse)) + 2 * self._log_scale(x)
 
@@ -103,7 +103,7 @@ class ColourLikelihood:
         return float(2 / max(spread.max(), 1e-12))
 
     def _information(self, x: Array) -> Array:
-        """Half of the second derivatives of the deviance, and what is known beforehand."""
+        """Return half the Hessian of the deviance, plus the precision of the prior."""
         steps = _APART * np.eye(len(x))
         middle = self._deviance(x)
         ahead, behind = ([self._deviance(x + sign * s) for s in steps] for sign in (1, -1))
@@ -122,7 +122,7 @@ class ColourLikelihood:
         return free * float(np.log(left)) + determinant + of_reached - float(x[2])
 
     def _log_scale(self, x: Array) -> float:
-        """Logarithm of the noise's standard deviation, if it is of a colour."""
+        """Return the logarithm of the noise's standard deviation under a noise model."""
         return 0.5 * float(np.log(self._parts(x)[0] / self._free))
 
     @property
@@ -130,7 +130,7 @@ class ColourLikelihood:
         return len(self._time_s) - len(self._reached)
 
     def _parts(self, x: Array) -> tuple[float, float, float]:
-        """Sum of squares, and logarithms of the determinants of what is reached and of all."""
+        """Return a sum of squares, and log determinants of absorbed directions and of all noise."""
         whitening = Whitening(self._time_s, _colour(x), np.zeros((0, len(self._time_s))))
         white = whitening(np.vstack((self._reached, self._residual)))
         basis, triangle = np.linalg.qr(white[:-1].T)
@@ -139,7 +139,7 @@ class ColourLikelihood:
         return float(left @ left), of_reached, whitening.log_determinant
 
     def _best_of_each(self) -> list[Array]:
-        """The best points of a grid with more that relaxes, and with more of spectrum 1/f."""
+        """Return the best points of a grid with more relaxing, and with more 1/f noise."""
         shortest, longest = self._bounds[1]
         tried = [
             np.array([relaxing, shortest + place * (longest - shortest), flicker])
@@ -157,14 +157,14 @@ def _logarithms(colour: Colour) -> Array:
 
 
 def _colour(x: Array) -> Colour:
-    """Turn log odds, and the logarithm of a time, into shares."""
+    """Return the noise model of two log odds and the logarithm of a time."""
     relaxing, flicker = np.exp(x[0]), np.exp(x[2])
     whole = 1 + relaxing + flicker
     return Colour(float(relaxing / whole), float(np.exp(x[1])), float(flicker / whole))
 
 
 def _independent(directions: Array) -> Array:
-    """Orthonormal rows with the span of some, of those that are more than rounding."""
+    """Return orthonormal rows with the span of given ones, leaving out rounding errors."""
     sizes = np.linalg.norm(directions, axis=1)
     rows = directions[sizes > 0] / sizes[sizes > 0, None]
     _, shares, basis = np.linalg.svd(rows, full_matrices=False)

@@ -1,4 +1,4 @@
-"""What there is to identify: a trace, a model, and the range that is searched."""
+"""The identification problem: a trace, a sample model and the search range."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from biogrip.response.residuals import Residuals
 
 @dataclass(frozen=True)
 class Problem:
-    """The same for every identifier; each uses what it needs of it.
+    """The identification of one trace, in the form that every method takes.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Problem:
     residuals
         Residuals and exact derivatives, as functions of log-parameters.
     genome
-        What a chromosome may be.
+        Encoding of the parameters for the genetic algorithm.
     low, high : (n_parameters,)
         Logarithms of the ends of the search range (Table 4).
     """
@@ -38,7 +38,7 @@ class Problem:
     high: Array
 
     def without_inertia(self) -> "Problem":
-        """Return the same problem for arms that do not ring: itself if they do not."""
+        """Return the same problem with the inertia of the arms neglected."""
         if not self.residuals.inertia:
             return self
         quiet = self.residuals.without_inertia()
@@ -56,18 +56,18 @@ def problem_of(
     *,
     noise_rad: float | None = None,
 ) -> Problem:
-    """Pose the identification of one trace.
+    """Set up the identification of one trace.
 
     Parameters
     ----------
     gripper, model, torque
-        What is simulated.
+        Gripper, sample model and torques of the simulated responses.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     ranges
         Gene ranges by the name of the range, see `Parameter.range_name`.
     condensed
-        Of the protocol and the times; traces that are to be fitted together share it.
+        Condensed rows of the protocol and times; traces that are fitted together share them.
     noise_rad
         Standard deviation of the noise, if it is known.
     """
@@ -79,7 +79,7 @@ def problem_of(
 
 
 def searched(misfit: Misfit, residuals: Residuals, ranges: Mapping[str, GeneRange]) -> Problem:
-    """Pose the problem of residuals, searched for in the ranges of `problem_of`."""
+    """Set up a problem from its misfit and residuals, with `ranges` as in `problem_of`."""
     chosen = [ranges[parameter.range_name] for parameter in residuals.model.parameters]
     return Problem(
         misfit,

@@ -1,7 +1,7 @@
-"""What mutation draws: genes, and a new value of each between its own bounds.
+"""Random draws of mutation: genes, and a new value of each between its own bounds.
 
-It is what numpy's `Generator.integers` draws one after the other with bounds for each, by
-Lemire's method from 32-bit words, at a fraction of the time for many generators.
+The numbers are those of numpy's `Generator.integers` with bounds for each, by Lemire's method
+from 32-bit words, in a fraction of its time for many generators.
 
 References
 ----------
@@ -24,25 +24,25 @@ _WIDEST = 2**31
 def redraws(
     genome: Genome, counts: Sequence[int], times: int, rngs: Sequence[np.random.Generator]
 ) -> IntArray:
-    """Draw a gene of each of some chromosomes and its new value, so many times.
+    """Draw, a number of times, a random gene of each chromosome and its new value.
 
     Parameters
     ----------
     genome
-        What a chromosome may be.
+        Encoding of the parameters.
     counts
         Number of chromosomes of each generator.
     times
-        Genes of each.
+        Number of draws for each chromosome.
     rngs
-        The generators.
+        Random generators.
 
     Returns
     -------
     (times, 2, n)
         Genes and their values, the chromosomes of all generators side by side.
     """
-    # What cannot vary takes no word, and products must not overflow.
+    # A gene of one value takes no random word, and products must not overflow.
     if len(rngs) > 1 and genome.values.min() > 1 and genome.values.max() < _WIDEST:
         before = [rng.bit_generator.state for rng in rngs]
         drawn, doubtful = _side_by_side(genome, counts, times, rngs)
@@ -57,7 +57,7 @@ def redraws(
 def _side_by_side(
     genome: Genome, counts: Sequence[int], times: int, rngs: Sequence[np.random.Generator]
 ) -> tuple[IntArray, bool]:
-    """Draw as `redraws` does; whether a word may favour some numbers, and numpy draw again."""
+    """Draw as `redraws` does; return also True if numpy might have rejected a word."""
     words = [
         rng.integers(_WORDS, size=2 * times * count, dtype=np.uint32).reshape(times, 2, count)
         for count, rng in zip(counts, rngs, strict=True)
@@ -80,7 +80,7 @@ def _by_numpy(genome: Genome, count: int, times: int, rng: np.random.Generator) 
 
 
 def _scaled(words: NDArray[np.uint32], spans: IntArray | int, numbers: IntArray) -> bool:
-    """Scale words to numbers below the spans; whether any may have to be drawn again."""
+    """Scale words to numbers below the spans; return True if numpy might reject a word."""
     products = words.astype(np.int64)
     products *= spans
     np.right_shift(products, 32, out=numbers)

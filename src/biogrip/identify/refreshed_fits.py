@@ -1,12 +1,12 @@
-"""Local fits of the nonlinear model at the price of the linear one's.
+"""Local fits of the nonlinear model at the cost of fits of the linear model.
 
-Nonlinear minus linear rotation is small and smooth, but takes a hundred times as
-long as the linear rotation. So it is expanded to first order in the log-parameters
-about the point that a fit starts from; with that, the fit is one of the linear
-model. About where it ends it is expanded anew, until the sum of squares there is
-the one that was foreseen, to the fit's own tolerance. What is returned is then an
-optimum of the nonlinear model: what is left out of the expansion, of second order
-in the last step, lies below the tolerance.
+Nonlinear minus linear rotation, the correction, is small and smooth, but takes a hundred
+times as long to compute as the linear rotation. So the correction is expanded to first
+order in the log-parameters about the start of a fit, which then needs linear responses
+only. The correction is expanded anew about the end of the fit, until the sum of squares
+there equals the predicted one, to the fit's own tolerance. The result is an optimum of
+the nonlinear model: neglected terms, of second order in the last step, lie below the
+tolerance.
 """
 
 from collections.abc import Callable
@@ -19,33 +19,33 @@ from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, Row
 
 # Most fits need two or three.
 _MOST_ROUNDS = 12
-# E-folds; further away, a straight line says little.
+# E-folds; beyond this distance the correction is kept constant.
 _FAR = 1.0
 
 Correction = Callable[[Array], Array]
-"""Of log-parameters (n, n_parameters), the rows (n, 1 + n_parameters, n_rows), see `Residuals`."""
+"""Function from log-parameters, (n, n_parameters), to rows (n, 1 + n_parameters, n_rows)."""
 
 Objective = Callable[[Array, IntArray, Array], Normal]
-"""Normal equations at points of the problems with given indices, given rows of the correction."""
+"""Function of points, problem indices and rows of the correction: their normal equations."""
 
 
 @dataclass
 class Expansion(Rows):
-    """A correction to first order about a point of each problem.
+    """First-order Taylor expansion of the correction about a point of each problem.
 
     Parameters
     ----------
     about : (n, n_parameters)
         Log-parameters.
     rows : (n, 1 + n_parameters, n_rows)
-        Correction and derivatives there.
+        Correction and its derivatives there.
     """
 
     about: Array
     rows: Array
 
     def at(self, x: Array, problem: IntArray) -> Array:
-        """Correction and derivatives at points (n, n_parameters) of some problems."""
+        """Return correction and derivatives at points, (n, n_parameters), of some problems."""
         away = x - self.about[problem]
         near = np.abs(away) < _FAR
         rows = self.rows[problem]
@@ -57,7 +57,7 @@ class Expansion(Rows):
 
 @dataclass
 class _Some:
-    """What holds some of the problems."""
+    """The constraint of a subset of the problems."""
 
     held: Constraint
     which: IntArray
@@ -78,9 +78,9 @@ def minimized_with_refreshes(
     tolerance: float,
     constraint: Constraint | None = None,
 ) -> Minima:
-    """Descend as `minimized` does, with a correction expanded about few points on the way.
+    """Minimize as `minimized` does, with the correction expanded about a few points only.
 
-    Other arguments are as of `minimized`.
+    The other arguments are those of `minimized`.
     """
     best = Minima.none_yet(starts, evaluations=0)
     lowest, foreseen = np.full(len(starts), np.inf), np.full(len(starts), np.nan)

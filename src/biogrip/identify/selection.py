@@ -1,4 +1,4 @@
-"""Truncation selection: the best of populations, in an order that nothing but they decide."""
+"""Truncation selection: the best individuals of populations, in a reproducible order."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,21 +8,21 @@ from biogrip.identify.genome import WORD_BITS
 
 Ranking = NDArray[np.float32]
 
-# So many bits a sorted number has left beside a word of a code; its sign stays free.
+# Bits that a sorted 64-bit integer has left beside a word of a code and its sign.
 _PLACE_BITS = 63 - WORD_BITS
 
 
 def best(codes: IntArray, ranking: Ranking, count: int) -> tuple[IntArray, Ranking]:
-    """Keep the best of each population, best first, ties in the order of their codes.
+    """Select the best individuals of each population, best first, ties in the order of codes.
 
     Parameters
     ----------
     codes : (n_words, n_populations, n)
-        The chromosomes, see `Genome.code`.
+        Chromosomes, see `Genome.code`.
     ranking : (n_populations, n)
-        What they are ranked on; not negative, what is not a number last.
+        Their misfits, not negative; NaN is ranked last.
     count
-        How many to keep.
+        Number of individuals to select.
 
     Returns
     -------
@@ -34,8 +34,8 @@ def best(codes: IntArray, ranking: Ranking, count: int) -> tuple[IntArray, Ranki
     if words > 1 or size > 2**_PLACE_BITS:
         order = first + np.lexsort((*codes[::-1], ranking))[:, :count]
         return codes.reshape(words, -1).take(order, axis=1), ranking.take(order)
-    # Numbers by themselves are sorted several times as fast as indices: first the codes, each
-    # with its place; then the rankings, which order like their bits, each with its code's rank.
+    # Sorting integers is several times as fast as sorting indices: first the codes, each with
+    # its place; then the misfits, which order like their bits, each with its code's rank.
     bits = (size - 1).bit_length()
     places = codes[0] << bits
     places |= np.arange(size)

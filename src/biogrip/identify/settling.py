@@ -1,11 +1,11 @@
-"""From near an optimum to its last digits.
+"""Newton refinement of optima to their last digits.
 
-Descents compare sums of squares, and so find an optimum to half the digits; where
-the gradient vanishes can be found to all of them. Gauss-Newton steps need not lead
-there: of an element too weak to be seen, only second derivatives of the residuals
-tell how the gradient changes. So the steps are Newton's. The first are damped, and
-compared on the rows that stand for all samples; each of the last ones is compared on
-all samples with the point before it, and kept only if it fits no worse.
+Descents compare sums of squares, and so find an optimum to half the digits. Its vanishing
+gradient locates it to all of them. Gauss-Newton steps need not converge there: for an
+element too weak to be seen, second derivatives of the residuals decide how the gradient
+changes. So the steps are Newton's. The first are damped, and compared on condensed rows.
+Each of the last is compared, on all readings, with the point before it, and kept only if
+it fits no worse.
 
 References
 ----------
@@ -21,27 +21,27 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimized
 from biogrip.identify.local_fits import LocalFits
 
-# Along a curved valley a minimum must first be approached, with steps damped if need be.
+# Tolerance and initial damping of the steps that approach a minimum along a curved valley.
 _CLOSE, _DAMPING = 1e-10, 1e-6
 _MOST_STEPS = 60
-# After a step that was not kept the next is damped, at least and at most so much more.
+# Least damping after a rejected step, and the factor by which damping then changes.
 _LITTLE, _MORE = 1e-9, 10.0
-# E-folds: whether a step is shorter every machine sees alike, and what is left is rounding.
+# E-folds; shorter steps are rounding, and every machine decides alike whether a step is shorter.
 _STILL = 1e-9
-# Longer steps lead to points of a grid.
+# Steps longer than the first, in e-folds, end on a grid of the second.
 _FAR, _SPACING = 1e-5, 2.0**-24
-# A step that is to lower chi^2 by less than this changes no digit that is told.
+# A step with a smaller predicted decrease of chi^2 changes no digit that is written.
 _NOTHING = 1e-8
-# E-folds; what has converged has no further to go.
+# E-folds; a converged fit is nearer to its optimum.
 _LONGEST_STEP = 1.0
-# Of a direction's curvature, over those of single parameters; and of the latter.
+# Least curvature of a direction, relative to single parameters; and of a single parameter.
 _FLAT, _SMALLEST = 1e-12, 1e-150
-# Of the largest rotation, to which a misfit is known.
+# Accuracy of a misfit, relative to the largest rotation.
 _ROUNDING = 1e-15
 
 
 def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
-    """Take Newton's steps until optima stand still to the last digits.
+    """Refine optima by Newton steps until they are stationary to the last digits.
 
     Parameters
     ----------
@@ -50,14 +50,14 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     found
         Optima, fitted with the finest tolerance.
     trace : (n,)
-        Which trace each was fitted to.
+        Index of the trace that each was fitted to.
 
     Returns
     -------
     Minima
-        Optima with their misfits on all samples, none above that of the optimum found, and
-        evaluations since then; branches named in the order in which they relax. Converged are
-        those whose next step would change nothing.
+        Optima with their misfits on all readings, none above that of `found`, and the
+        evaluations of the refinement; branches sorted by relaxation time. An optimum has
+        converged if its next step would not change chi^2 noticeably.
     """
     low, high = (np.broadcast_to(bound, found.x.shape) for bound in (fits.low, fits.high))
 
@@ -92,7 +92,7 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         more, less = _MORE * damping[moving], damping[moving] / _MORE
         less[less < _LITTLE] = 0.0
         damping[moving] = np.where(kept, less, np.maximum(more, _LITTLE))
-        # Where steps only go to and fro within rounding, there is nothing more to be had.
+        # A converged fit whose step is rejected differs from its optimum by rounding only.
         moving = moving[kept | ~converged[moving]]
     order = fits.problems[0].residuals.model.in_order(np.exp(state.x))
     x = np.take_along_axis(state.x, order, axis=1)
@@ -100,14 +100,14 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
 
 
 def _on_grid(x: Array, step: Array) -> Array:
-    """Round points, after steps that are not the last, as `minimized` does and for its reasons."""
+    """Round the ends of long steps to a grid, for the reason given in `levenberg_marquardt`."""
     far = np.max(np.abs(step), axis=1, keepdims=True) > _FAR
     return np.where(far, np.rint(x / _SPACING) * _SPACING, x)
 
 
 @dataclass
 class _State:
-    """Where fits are, and what is minimized there, on all samples."""
+    """Points of the fits, with their sums of squares and gradients from all readings."""
 
     fits: LocalFits
     trace: IntArray
@@ -116,7 +116,7 @@ class _State:
     here: Normal
 
     def move(self, which: IntArray, x: Array) -> BoolArray:
-        """Move some fits to points that are no worse on all samples; tell which."""
+        """Move fits to those points that are no worse on all readings; return their mask."""
         there = self.fits.on_all_samples(x, self.trace[which])
         kept = there.square_sum <= self.here.square_sum[which] + self.rounding[which]
         moved = which[kept]
@@ -127,7 +127,7 @@ class _State:
 
 
 def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:
-    """What of sums of squares may be rounding, (n,)."""
+    """Estimate the rounding errors of sums of squares, (n,)."""
     residuals = [fits.problems[own].residuals for own in trace.tolist()]
     samples = np.array([each.samples for each in residuals])
     noise_rad = np.array([each.noise_scale_rad for each in residuals])
@@ -143,9 +143,9 @@ def _newton_step(fits: LocalFits, normal: Normal, x: Array, damping: Array) -> A
 
 
 def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:
-    """Normal equations with the moduli of all curvatures, which are themselves at a minimum."""
+    """Return normal equations with the moduli of the Hessian's eigenvalues."""
     normal = fits.curved(x, trace)
-    # What is pushed against a bound does not move, however the sum of squares is curved there.
+    # A parameter pushed against a bound does not move, whatever the curvature there.
     fixed = (x <= fits.low) & (normal.gradient > 0) | (x >= fits.high) & (normal.gradient < 0)
     free = (~fixed[:, :, None]) & (~fixed[:, None, :])
     second = np.where(free, normal.information, np.eye(x.shape[1]))

@@ -1,4 +1,4 @@
-"""How well identifications did: against one another, and against the noise."""
+"""Measures of success: misfits of identifications compared with one another and with noise."""
 
 import numpy as np
 import pandas as pd
@@ -8,11 +8,11 @@ from biogrip.arrays import Array
 
 
 def typical(found: pd.DataFrame) -> pd.Series:
-    """Return the identification of median excess of the misfit over the noise in its trace.
+    """Return the identification with the median ratio of misfit to noise in its trace.
 
-    The lowest misfit of all would be that of the quietest trace. Where nobody knows the
-    noise, or there is none, it is the identification of median misfit; of an even number
-    the better one of the two in the middle.
+    The lowest misfit of all would be that of the quietest trace. If the noise is unknown
+    or absent, the identification of median misfit is returned. Of an even number, it is
+    the better of the two in the middle.
     """
     noise = found["noise_rms_rad"].where(found["noise_rms_rad"] > 0).fillna(1.0)
     ranked = (found["misfit_rad"] / noise).sort_values(kind="stable").index
@@ -20,17 +20,17 @@ def typical(found: pd.DataFrame) -> pd.Series:
 
 
 def chi_square_rise(found: pd.DataFrame, samples: int) -> Array:
-    """By how much each identification's chi^2 exceeds the lowest known of its trace, (n,).
+    """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
-    The lowest is that of any method, or of the truth where it is known, which
-    a fit of a few parameters undercuts.
+    The lowest is that of any method, or that of the true parameters where these are
+    known; the best fit of a few parameters lies below the latter.
 
     Parameters
     ----------
     found
         Identifications of one case by all methods.
     samples
-        Samples in a trace.
+        Number of readings in a trace.
     """
     misfit = found["misfit_rad"]
     lowest = misfit.groupby(found["seed"]).transform("min")
@@ -40,10 +40,10 @@ def chi_square_rise(found: pd.DataFrame, samples: int) -> Array:
 
 
 def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
-    """Whether each seed's misfit is within a share of the noise in its trace (RMS), (n_seeds,).
+    """Return True for each seed whose misfit is at most a share above the RMS noise, (n_seeds,).
 
-    That is how far a plot of the fit looks right. With thousands of samples it is no
-    optimum: 2 % more misfit than noise is a chi^2 of 162 in 4001 of them; see
+    Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
+    a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
     `chi_square_rise`.
     """
     misfit, noise = (found[name].to_numpy(float) for name in ("misfit_rad", "noise_rms_rad"))
@@ -52,5 +52,5 @@ def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
 
 
 def near_noise_words(tolerance: float) -> str:
-    """Say what `near_noise` asks for."""
+    """Describe the criterion of `near_noise` in words."""
     return f"within {100 * tolerance:g} % of the noise"

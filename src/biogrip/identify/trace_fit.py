@@ -1,8 +1,8 @@
-"""Identification of one trace with all that its instrument does to it.
+"""Identification of one trace together with its noise model and an uncertain gripper.
 
-Usually noise is white and the gripper known, and there is nothing to it but an optimum.
-Otherwise the best fit, what noise it leaves, and what the gripper's uncertainty does to
-its response are found in turn, until none of them changes.
+If the noise is white and the gripper known, this is one global fit. Otherwise the best fit,
+the autocorrelation of its residuals and the effect of the gripper's uncertainty are
+computed in turn, until none of them changes.
 """
 
 from collections.abc import Callable
@@ -23,19 +23,19 @@ from biogrip.identify.uncertain_gripper import gripper_functions
 from biogrip.response.whitening import MOST_SAMPLES, Colour
 
 _ROUNDS = 5
-# Shares and times that change by less change no limit in its third digit.
+# Changes of noise shares and times below this change no confidence limit in its third digit.
 _SETTLED = 1e-2
-# So does a fit that moves by less, in standard deviations.
+# The same of a fit that moves by less, in standard deviations.
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
 
 Find = Callable[[Problem], Identification]
-"""Finds the global optimum of a problem."""
+"""Function that finds the global optimum of a problem."""
 
 
 @dataclass(frozen=True)
 class TraceFit:
-    """A trace that was identified.
+    """The identification of one trace, with its noise model and outliers.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class TraceFit:
     found
         Its global optimum.
     colour
-        What the noise is, unless it was taken for white.
+        Autocorrelation model of the noise; None if the noise was assumed to be white.
     outliers : (n_samples,)
-        Which samples were left out.
+        True for readings that were left out.
     """
 
     problem: Problem
@@ -55,7 +55,7 @@ class TraceFit:
     outliers: BoolArray
 
     def noise_data(self) -> dict[str, float | None] | None:
-        """Return what the noise was found to be as plain data."""
+        """Return the estimated noise model as plain data; None if noise was assumed white."""
         if self.colour is None:
             return None
         shares = {"white": self.colour.white, **vars(self.colour)}
@@ -66,18 +66,18 @@ class TraceFit:
         }
 
     def notes(self) -> list[str]:
-        """Say in sentences what the noise was found to be."""
+        """Describe the estimated noise model in sentences."""
         if self.colour is None:
             return []
         colour, left_out = self.colour, int(np.count_nonzero(self.outliers))
         parts = [f"{_percent(colour.white)} white"]
         if colour.relaxing >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.relaxing)} remembered for some {colour.time_s:.2g} s")
+            parts.append(f"{_percent(colour.relaxing)} correlated over some {colour.time_s:.2g} s")
         if colour.flicker >= _WORTH_SAYING:
             parts.append(f"{_percent(colour.flicker)} of spectrum 1/f")
         said = [
-            f"Noise model: {', '.join(parts)} of the variance; an offset and a drift of the "
-            "instrument are fitted along, and the intervals allow for all of it."
+            f"Noise model: of the variance, {', '.join(parts)}. An offset and a drift of the "
+            "instrument are fitted, too, and the intervals allow for all of it."
         ]
         if left_out:
             samples = counted(left_out, "sample")
@@ -86,25 +86,25 @@ class TraceFit:
 
 
 def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find) -> TraceFit:
-    """Identify a trace, and what its instrument did to it.
+    """Fit a trace and, if wanted, estimate the model of its noise.
 
-    In coloured noise, samples that stand out are left out; an offset and a drift are fitted
-    along; the rest of the noise may be white, relaxing and 1/f in any shares. What the gripper
-    is not known to is a part of the noise, too.
+    With a coloured noise model, outliers are removed, an offset and a drift are fitted as
+    nuisance parameters, and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. The
+    effect of the gripper's uncertainty on the rotation is one more component of the noise.
 
     Parameters
     ----------
     posed
-        What the identification assumes.
+        Assumptions of the identification.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     find
-        How to find an optimum.
+        Function that finds the global optimum.
 
     Raises
     ------
     BiogripError
-        If the noise of so many samples cannot be coloured.
+        If the trace has too many readings for a coloured noise model.
     """
     kept = np.ones(len(time_s), dtype=bool)
     if not posed.coloured:
@@ -122,7 +122,7 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
         kept, plain, found = _without_outliers(posed, time_s, rotation_rad, find)
     time_s, rotation_rad = time_s[kept], rotation_rad[kept]
     problem, found, colour = _in_turn(posed, time_s, rotation_rad, plain, found)
-    # What is slow counts less now, so that another basin may be the deepest.
+    # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
         found = other
@@ -146,7 +146,7 @@ def _without_outliers(
 def _in_turn(
     posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
 ) -> tuple[Problem, Identification, Colour | None]:
-    """Find the noise that a fit leaves, and fit with that noise, until the fit stays."""
+    """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, colour = plain, None
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)

@@ -1,4 +1,4 @@
-"""What a gripper that is only known about may do to a rotation."""
+"""Effect of the gripper's calibration uncertainty on a rotation."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -16,26 +16,26 @@ _WITHOUT_RING = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
 def gripper_functions(
     posed: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
 ) -> Array:
-    """Return what a standard uncertainty of each property of the arms adds to a rotation.
+    """Compute the change of a rotation by one standard uncertainty of each arm property.
 
-    Half of the difference between the property a standard uncertainty above and below its
-    value, as metrology has it where models are not straight [1]_.
+    The change is half the difference between rotations with the property a standard
+    uncertainty above and below its value, as is recommended for nonlinear models [1]_.
 
     Parameters
     ----------
     posed
-        What the identification assumes.
+        Assumptions of the identification.
     time_s : (n_times,)
         Ascending times.
     parameters : (n_parameters,)
-        Those that are searched, SI units.
+        Searched parameters, SI units.
     inertia
         True if the trace shows the arms ringing.
 
     Returns
     -------
     (n_properties, n_times)
-        In rad, of the properties that are uncertain.
+        Changes in rad, one row for each uncertain property.
 
     References
     ----------
@@ -57,7 +57,7 @@ def gripper_functions(
 def _pairs(
     gripper: Gripper, uncertainty: Mapping[str, Mapping[str, float]], properties: Sequence[str]
 ) -> Iterator[tuple[Gripper, Gripper]]:
-    """Two grippers for each property, one above and one below."""
+    """Yield two grippers for each uncertain property, one above and one below its value."""
     for name, known in uncertainty.items():
         arm = getattr(gripper, name)
         for key in properties:

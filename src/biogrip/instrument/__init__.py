@@ -1,1 +1,1 @@
-"""The instrument: how it is built, what its voltage does, how it is calibrated."""
+"""The instrument: gripper, comb drive and calibration."""

@@ -43,7 +43,7 @@ class CombDrive:
 
 
 def capacitance_slope(comb: CombDrive) -> float:
-    """Change of capacitance with overlap angle, dC_T/dtheta, in F/rad (eq. 7).
+    """Return the change of capacitance with overlap angle, dC_T/dtheta, in F/rad (eq. 7).
 
     Every gap between a fixed and a floating finger is a cylindrical capacitor,
     eps_0 h theta / ln(r_outer / r_inner); the drive is their sum.
@@ -58,12 +58,12 @@ def capacitance_slope(comb: CombDrive) -> float:
 
 
 def torque(comb: CombDrive, voltage_V: ArrayLike) -> Array:
-    """Electrostatic torque in N m at a voltage in V (eqs. 8, 9)."""
+    """Return the electrostatic torque in N m at a voltage in V (eqs. 8, 9)."""
     return 0.5 * capacitance_slope(comb) * np.square(np.asarray(voltage_V, dtype=float))
 
 
 def voltage(comb: CombDrive, torque_Nm: ArrayLike) -> Array:
-    """Voltage in V that exerts a torque in N m (eq. 9 solved for V).
+    """Return the voltage in V that exerts a torque in N m (eq. 9 solved for V).
 
     Raises
     ------

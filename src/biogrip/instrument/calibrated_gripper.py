@@ -15,7 +15,7 @@ ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
 
 @dataclass(frozen=True)
 class CalibratedArm:
-    """An arm and how well it is known.
+    """A calibrated arm with its standard uncertainties.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def read_calibrated_arms(
     Returns
     -------
     gripper
-        With the calibrated arms.
+        Gripper with the calibrated arms.
     uncertainty
         Standard uncertainties by arm and key.
 

@@ -42,14 +42,14 @@ class CalibrationTest:
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """What a free arm does after a torque step and after a torque impulse.
+    """Rotation of a free arm after a torque step and after a torque impulse.
 
     Parameters
     ----------
     time_s : (n_samples,)
-        From the instant of step and impulse.
+        Time since step and impulse.
     step_rad, impulse_rad : (n_samples,)
-        The two records.
+        Rotations after step and impulse.
     """
 
     time_s: Array
@@ -84,14 +84,14 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
     record
         The measured motion.
     step_Nm, impulse_Nms
-        What caused it.
+        Torque step and impulse that caused it.
 
     Raises
     ------
     BiogripError
         If the arm does not ring within the record, or no arm fits.
     """
-    # Loaded by nobody who only says what a calibration is to be.
+    # Imported here, for settings of calibrations do not need SciPy.
     from scipy.optimize import least_squares
 
     start = _first_guess(record, step_Nm)
@@ -102,7 +102,7 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
         return np.stack((motion.step_rad, motion.impulse_rad)) - measured
 
     scale, logarithms = np.ptp(measured, axis=1), np.log(start)
-    # The second time, each record weighs what its own noise allows.
+    # In the second fit, each record is weighted by its own noise.
     for _ in range(2):
         weights = 1 / scale[:, None]
         found = least_squares(
@@ -119,7 +119,7 @@ def calibrate(record: FreeMotion, step_Nm: float, impulse_Nms: float) -> Calibra
 
 
 def _first_guess(record: FreeMotion, step_Nm: float) -> Array:
-    """Stiffness from the step's end, frequency from the ring's spectrum, damping from its fall."""
+    """Estimate stiffness from the step's end, frequency from the spectrum, damping from decay."""
     if len(record.time_s) < _FEWEST_SAMPLES:
         found = f"found {counted(len(record.time_s), 'sample')}"
         raise BiogripError(f"calibration: {found}, allowed are {_FEWEST_SAMPLES} or more.")

@@ -1,4 +1,4 @@
-"""From the neutral configuration to a sample between the jaws (section 2)."""
+"""Closing of the arms from their neutral configuration onto a sample (section 2)."""
 
 import math
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ class Contact:
     closing_rad
         Rotation of each arm from its neutral position.
     reference_angle_deg
-        hat-theta_2 there.
+        hat-theta_2 in this configuration.
     torque_Nm, voltage_V
-        What holds each arm there against its hinge; the stiffer arm's.
+        Torque and voltage that hold each arm there against its hinge; the stiffer arm's.
     """
 
     size_m: float
@@ -38,7 +38,7 @@ class Contact:
 
 
 def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) -> Contact:
-    """Close the arms symmetrically onto a sample.
+    """Compute the configuration of arms closed symmetrically onto a sample.
 
     Parameters
     ----------

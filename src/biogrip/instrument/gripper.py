@@ -43,7 +43,7 @@ class Arm:
         return math.sqrt(self.inertia_kgm2 * self.stiffness_Nm_per_rad) / self.damping_Nms_per_rad
 
     def problems(self) -> Iterator[Problem]:
-        """Find that it rings for so long that its decay is lost in rounding."""
+        """Find a quality factor so large that the decay would be lost in rounding."""
         if self.quality_factor > _LARGEST_QUALITY:
             text = f"makes the arm's quality factor {self.quality_factor:.3g}, "
             yield ("damping_Nms_per_rad",), f"{text}allowed is at most {_LARGEST_QUALITY:g}."
@@ -80,6 +80,6 @@ class Gripper:
 
     @property
     def jaw_stiffness_N_per_m(self) -> float:
-        """Stiffness of both hinges as the sample meets it: force over the closing of the jaws."""
+        """Stiffness of both hinges as seen from the sample: force over closing of the jaws."""
         yielding = 1 / self.left.stiffness_Nm_per_rad + 1 / self.right.stiffness_Nm_per_rad
         return 1 / (self.lever_m**2 * yielding)

@@ -1,4 +1,4 @@
-"""The linkage: how far a tip moves when its arm turns."""
+"""The linkage: rotation of an arm and displacement of its tip."""
 
 import numpy as np
 
@@ -7,9 +7,9 @@ from biogrip.instrument.gripper import Gripper
 
 
 def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
-    """Rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
+    """Return the rotation phi in rad that moves a tip by u = l [cos(hat - phi) - cos hat].
 
-    Solved for phi without a difference of nearly equal cosines; NaN beyond the
+    The solution has no cancellation of nearly equal cosines. It is NaN beyond the
     displacement at which the arms lie flat.
     """
     angle = np.radians(gripper.reference_angle_deg)
@@ -22,7 +22,7 @@ def rotation_of_tip(gripper: Gripper, displacement_m: Array) -> Array:
 
 
 def displacement_of_tip(gripper: Gripper, rotation_rad: Array) -> Array:
-    """Displacement u in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
+    """Return the displacement in m of a tip whose arm turns, u = l [cos(hat - phi) - cos hat]."""
     angle = np.radians(gripper.reference_angle_deg)
     half = 0.5 * rotation_rad
     moved: Array = 2 * gripper.arm_length_m * np.sin(angle - half) * np.sin(half)

@@ -1,1 +1,1 @@
-"""How the gripper turns while it squeezes a sample."""
+"""Rotation of the gripper's arms while they squeeze a sample."""

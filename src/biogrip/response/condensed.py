@@ -1,14 +1,13 @@
-"""A few sampling times that stand for all: the same least squares with fewer rows.
+"""Condensed least squares: a few rows with the sum of squares of all readings.
 
-Whatever the sample, the linear rotation is a weighted sum of what modes do
-under the protocol, g(t; r), and all of these, over all rates r, nearly span a
-space of some fifty dimensions only. In it a function is known from its values
-at as many well-chosen times. So a response is simulated at those, and a square
-matrix turns what it is there into rows whose sum of squares, gradients and all,
-is that of the residuals at every sample. Where samples are dense, that space is
-found on nodes that stand for them (`biogrip.response.dense_samples`). Arms that
-ring do so at any frequency, and no small space holds what they do: then, and
-where nodes are too many, every node has a row of its own.
+The linear rotation of any sample is a weighted sum of the responses of modes to the
+protocol, g(t; r). Over all rates r these nearly span a space of some fifty dimensions
+only, in which a function is determined by its values at as many well-chosen times. So
+a response is simulated at those times, and a square matrix turns its values into rows
+with the sum of squares, and the gradients, of the residuals at all readings. Dense
+readings are first replaced by nodes (`biogrip.response.dense_samples`). Arms ring at any
+frequency, and no small space contains their responses. With inertia, and if nodes are
+too many, every node has a row of its own.
 
 References
 ----------
@@ -33,20 +32,20 @@ from biogrip.response.nuisance import without
 from biogrip.response.whitening import Whitening
 
 MOST_NODES = 50_000
-"""With more, finding the times that stand for all would take gigabytes."""
+"""Most nodes that are condensed further: with more, it would take gigabytes."""
 
-# Neighbouring rates, in log(1 - T r), T the last time: far closer than modes can be told apart.
+# Spacing of rates in log(1 - T r), T the last time: far closer than modes can be resolved.
 _SPACING = 0.25
-# Rates go from next to nothing to where only what has not begun to decay is left.
+# Slowest rate times T, and fastest rate times the shortest sampling interval.
 _SLOWEST, _FASTEST = 1e-6, 1e3
-# A correction on a mesh that follows a sinusoid of the torque may have thousands of values.
+# Most values of a correction: a mesh that follows a sinusoid of the torque may have thousands.
 _MOST_FUNCTIONS = 1000
-# Directions that matter less than this are rounding.
+# Directions with a smaller relative singular value are rounding errors.
 _RANK = 1e-14
 
 
 class Condensed:
-    """Rows that stand for the samples of any trace of a protocol.
+    """Condensed rows that replace the readings of any trace of a protocol in least squares.
 
     Parameters
     ----------
@@ -55,13 +54,13 @@ class Condensed:
     time_s : (n_samples,)
         Ascending sampling times.
     nuisance : (n_functions, n_samples)
-        What is taken out of trace and responses, see `nuisance_basis` and `with_uncertain`.
+        Functions projected out of trace and responses, see `nuisance_basis`, `with_uncertain`.
     nonlinear
-        Whether rows must also do for what the nonlinear model has over the linear one.
+        True if rows must also represent corrections by the nonlinear model.
     ringing_s
-        How long after a change of the torque arms may be seen ringing; 0 without inertia.
+        Time for which arms may ring after a change of the torque; 0 without inertia.
     whitening
-        What makes the noise white, and takes the nuisance out, if noise is not white as it is.
+        Transformation that whitens noise and projects nuisance out; None for white noise.
     """
 
     def __init__(
@@ -83,7 +82,7 @@ class Condensed:
 
     @cached_property
     def without_ringing(self) -> "Condensed":
-        """Rows for the same samples, of arms that do not ring."""
+        """Condensed rows for the same readings without inertia."""
         return Condensed(
             self._torque,
             self._all_s,
@@ -93,25 +92,25 @@ class Condensed:
         )
 
     def cleared(self, rows: Array) -> Array:
-        """Take the nuisance out of functions of time, (..., n_samples), and make noise white."""
+        """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
         if self._whitening is not None:
             return self._whitening(rows)
         return without(self.nuisance, rows)
 
     @property
     def coloured(self) -> bool:
-        """Whether noise is not white as it is."""
+        """True if the noise is whitened."""
         return self._whitening is not None
 
     @cached_property
     def reduced(self) -> bool:
-        """Whether rows are fewer than nodes."""
+        """True if rows are fewer than nodes."""
         functions = len(self._edges_s) * (STAGES + 1)
         few = len(self.dense.time_s) <= MOST_NODES and functions <= _MOST_FUNCTIONS
         return few and not self.ringing_s
 
     def of_trace(self, rotation_rad: Array) -> Array:
-        """Rows of a trace less nuisance, (n_rows,); the last is what no response can reach."""
+        """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
         seen, rest = self.dense.rows_of_samples(rotation_rad)
         if not self.reduced:
             return np.append(seen, rest)
@@ -120,15 +119,15 @@ class Condensed:
 
     @cached_property
     def time_s(self) -> Array:
-        """Times at which a response has to be known, (n_times,)."""
+        """Times at which responses are simulated, (n_times,)."""
         return self.dense.time_s[self._chosen] if self.reduced else self.dense.time_s
 
     def rows_of_nodes(self, values: Array) -> Array:
-        """Rows of responses less nuisance, from their values at the nodes, (..., n_nodes)."""
+        """Return rows of responses without nuisance, from values at the nodes, (..., n_nodes)."""
         return self._cleared_rows(self.dense.rows_of_values(values))
 
     def rows(self, values: Array) -> Array:
-        """Rows of responses, (..., n_rows), from their values at `time_s`, (..., n_times)."""
+        """Return rows of responses, (..., n_rows), from values at `time_s`, (..., n_times)."""
         if self.reduced:
             return values @ self.to_rows
         rows = self.rows_of_nodes(values)
@@ -136,7 +135,7 @@ class Condensed:
 
     @cached_property
     def to_rows(self) -> Array:
-        """Matrix that turns values at few times, from its left, into rows, (n_times, n_rows)."""
+        """Matrix that turns values at `time_s`, from its left, into rows, (n_times, n_rows)."""
         values = self.dense.values_of_rows(self._span.T)
         matrix = np.linalg.solve(
             values[:, self._chosen], self._cleared_rows(self._span.T) @ self._basis
@@ -145,7 +144,7 @@ class Condensed:
 
     @cached_property
     def of_modes(self) -> ModeRows:
-        """Rows of the responses of many samples at once."""
+        """Function from modes of many samples to rows of their responses."""
         events_s = [start for start, *_ in (*self._torque.jumps, *self._torque.swings)]
         elapsed = np.subtract.outer(self.time_s, events_s)
         shortest_s = float(np.min(elapsed, where=elapsed > 0, initial=self.time_s[-1]))
@@ -153,8 +152,8 @@ class Condensed:
 
     @cached_property
     def dense(self) -> DenseSamples:
-        """Nodes that stand for the samples."""
-        # What is whitened is no longer smooth: each sample is a node.
+        """Nodes that replace the readings."""
+        # Whitened functions are not smooth: each reading is a node.
         dense = self._whitening is None
         return DenseSamples(
             self._torque, self._all_s, self._edges_s, ringing_s=self.ringing_s, dense=dense
@@ -167,7 +166,7 @@ class Condensed:
 
     @cached_property
     def _corrections(self) -> Array:
-        """Rows of the nodes of what corrections are a sum of, (n_functions, n_nodes)."""
+        """Rows of the nodes of a basis of corrections, (n_functions, n_nodes)."""
         if not self.nonlinear:
             return np.zeros((0, len(self.dense.time_s)))
         functions = mesh_functions(self._edges_s, self.dense.time_s)
@@ -209,8 +208,8 @@ class Condensed:
 
     @cached_property
     def _chosen(self) -> IntArray:
-        """Nodes at which the functions of the span differ most."""
-        # Not needed by the genetic algorithm, and half of the time that its jobs take to start.
+        """Indices of the best interpolation nodes of the span, by QR with column pivoting."""
+        # Imported here: the genetic algorithm does not need it, and loading takes long.
         from scipy.linalg import qr
 
         span = self.dense.values_of_rows(self._span.T)
@@ -220,11 +219,11 @@ class Condensed:
 
     @cached_property
     def _basis(self) -> Array:
-        """Orthonormal rows that span all responses less nuisance, (n_nodes, n_rows - 1)."""
+        """Orthonormal rows that span all responses without nuisance, (n_nodes, n_rows - 1)."""
         return np.linalg.qr(self._cleared_rows(self._span.T).T)[0]
 
     def _cleared_rows(self, rows: Array) -> Array:
-        """Do with rows of the nodes what `cleared` does with samples."""
+        """Project out nuisance and whiten as `cleared` does, with rows of the nodes."""
         if self._whitening is not None:
             return self._whitening(rows)
         return without(self._seen_nuisance, rows)

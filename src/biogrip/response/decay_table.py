@@ -1,4 +1,4 @@
-"""Sums of decaying exponentials as functions of the rate, tabulated.
+"""Tables of sums of decaying exponentials as functions of the rate.
 
 However many terms it has, f(r) = sum_i a_i exp(r t_i) is a smooth function of
 the rate r alone. So it is computed once at some hundred rates, and from then on
@@ -43,7 +43,7 @@ class DecayTable:
     function
         Of rates of shape (n,), returns the sums, shape (n_sums, n).
     longest, shortest
-        Largest t_i, and the smallest above zero.
+        Largest t_i, and smallest t_i above zero.
     """
 
     def __init__(self, function: Callable[[Array], Array], longest: float, shortest: float) -> None:
@@ -52,20 +52,20 @@ class DecayTable:
         u = WIDTH * (np.arange(pieces)[:, None] + NODES)
         values = function(-np.expm1(u).ravel() / longest).reshape(-1, *u.shape)
         short = (values @ _TO_SHORT).reshape(len(values), -1, SHORT_DEGREE + 1)
-        # Straight from values to powers would lose digits: they are large and cancel.
+        # A direct conversion of values to powers would lose digits by cancellation.
         powers = short @ _TO_SERIES @ _TO_POWERS
         self._powers = np.ascontiguousarray(np.moveaxis(powers, 2, 0))
         self._end = np.nextafter(short.shape[1], 0)
 
     def __call__(self, rates: Array) -> Array:
-        """Sums at rates of any shape, shape (n_sums, ...)."""
+        """Return the sums at rates of any shape, shape (n_sums, ...)."""
         every = np.arange(self._powers.shape[1]).reshape(-1, *np.ones(rates.ndim, dtype=int))
         return self.of(every, rates)
 
     def of(self, which: IntArray, rates: Array) -> Array:
-        """Some of the sums, each of which depends on its own rate alone.
+        """Return selected sums, each of which depends on its own rate alone.
 
-        Which they are are indices of a shape that broadcasts with that of the rates.
+        `which` holds indices of the sums, in a shape that broadcasts with that of the rates.
         """
         place = np.fmin(np.log(1 - self._longest * rates) / (WIDTH / SHORTER), self._end)
         piece = place.astype(np.intp)
@@ -80,12 +80,12 @@ class DecayTable:
 
 
 def series(places: Array, degree: int) -> NDArray[np.floating]:
-    """Chebyshev's polynomials on (0, 1), shape (n_places, degree + 1)."""
+    """Evaluate Chebyshev polynomials on (0, 1), shape (n_places, degree + 1)."""
     return chebyshev.chebvander(2 * places - 1, degree)
 
 
 def _powers(degree: int) -> Array:
-    """Rows of powers that Chebyshev's polynomials on (0, 1) are made of."""
+    """Return the power coefficients of Chebyshev polynomials on (0, 1), one in each row."""
     rows = np.zeros((degree + 1, degree + 1))
     for order in range(degree + 1):
         polynomial = Chebyshev.basis(order, domain=(0, 1)).convert(kind=Polynomial)

@@ -1,13 +1,13 @@
-"""Nodes that stand for dense samples: whatever is smooth in between is known from them.
+"""Nodes that replace dense readings in sums of products of smooth functions.
 
-After a change of torque, modes of all rates are seen; later, only slow ones are left.
-On a piece of time twice as far from the last change at its end as at its start, a
-response to it is a polynomial of degree 19 to 1e-15 of its peak, whatever the rate:
-with e^(-rho (3 + s)), |s| <= 1, Chebyshev's coefficients fall like 5.8^-n. Changes
-before are further away, and a sinusoid of the torque is a polynomial as well on a
-piece of a period. So a piece with thousands of samples needs twenty nodes, and sums
-of products over its samples are known from one small matrix, which is summed up block
-by block. Where samples are few, they are the nodes.
+After a change of torque, modes of all rates respond; later, only slow ones remain. On a
+piece of time twice as far from the last change at its end as at its start, a response
+is a polynomial of degree 19 to 1e-15 of its peak, whatever the rate: with
+e^(-rho (3 + s)), |s| <= 1, Chebyshev coefficients fall like 5.8^-n. Earlier changes are
+further away, and a sinusoid of the torque is a polynomial as well on a piece of a
+period. So a piece with thousands of readings needs twenty nodes, and sums of products
+over its readings follow from one small matrix, which is summed up block by block. If
+readings are few, they are the nodes.
 
 References
 ----------
@@ -28,23 +28,23 @@ from biogrip.experiment.protocol import TorqueHistory
 _NODES = 20
 _DEGREE = _NODES - 1
 _PLACES = chebyshev.chebpts1(_NODES)
-# From values at the nodes to coefficients of Legendre's polynomials, which samples that are
-# dense all over a piece leave nearly orthogonal.
+# From values at the nodes to coefficients of Legendre polynomials, which are nearly orthogonal
+# over readings that are dense all over a piece.
 _TO_SERIES = np.linalg.inv(legendre.legvander(_PLACES, _DEGREE))
-# Fewer samples are their own nodes; so are those whose matrix is further from orthogonality.
+# Fewer readings are their own nodes; so are those whose matrix is worse conditioned.
 _FEWEST, _LARGEST_CONDITION = 256, 100.0
-# Samples whose polynomials are formed at once.
+# Readings whose polynomials are formed at once.
 _AT_ONCE = 16_384
-# Of no more samples they are kept, for the next trace.
+# Most readings whose polynomials are kept for the next trace.
 _MOST_KEPT = 100_000
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """Samples from `first` up to `stop`, and what their nodes have to do with them.
+    """Readings from `first` up to `stop`, and the matrix that relates them to their nodes.
 
-    With the samples' Legendre polynomials Q R, Q orthonormal, the triangle is R^T; it is None
-    where samples are nodes.
+    With Legendre polynomials at the readings Q R, Q orthonormal, the triangle is R^T; it is
+    None where readings are nodes.
     """
 
     first: int
@@ -53,7 +53,7 @@ class _Piece:
 
 
 class DenseSamples:
-    """Rows that stand for the samples of any smooth function of time.
+    """Rows with the products of all readings, for any smooth functions of time.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ class DenseSamples:
     time_s : (n_samples,)
         Ascending sampling times.
     further_edges_s : (n_edges,)
-        Where else they may be less smooth.
+        Further times at which functions may be less smooth.
     ringing_s
-        How long after a change of the torque functions are not smooth.
+        Time after a change of the torque in which functions are not smooth.
     dense
-        Whether nodes may stand for samples; else each sample is one.
+        True if nodes may replace readings; otherwise each reading is a node.
     """
 
     def __init__(
@@ -93,18 +93,18 @@ class DenseSamples:
         """Times of the nodes, (n_nodes,), ascending."""
 
     def rows_of_values(self, values: Array) -> Array:
-        """Rows that have the products of the samples, from values at the nodes, (..., n_nodes)."""
+        """Return rows with the products of the readings, from node values, (..., n_nodes)."""
         return self._turned(values, lambda own, triangle: own @ (_TO_SERIES.T @ triangle))
 
     def values_of_rows(self, rows: Array) -> Array:
-        """Values at the nodes, from rows: the inverse of `rows_of_values`."""
+        """Return values at the nodes from rows: the inverse of `rows_of_values`."""
         to_nodes = legendre.legvander(_PLACES, _DEGREE).T
         return self._turned(
             rows, lambda own, triangle: np.linalg.solve(triangle.T, own.T).T @ to_nodes
         )
 
     def _turned(self, values: Array, turn: Callable[[Array, Array], Array]) -> Array:
-        """Turn what nodes of pieces have by their triangles."""
+        """Apply a function of node values and triangle to each piece that has a triangle."""
         turned, start = np.copy(values), 0
         for piece in self._pieces:
             here = slice(start, start + self._count(piece))
@@ -114,14 +114,14 @@ class DenseSamples:
         return turned
 
     def rows_of_samples(self, samples: Array) -> tuple[Array, float]:
-        """Rows of any function of the samples, (n_samples,), smooth or not, as smooth ones see it.
+        """Project readings, (n_samples,), smooth or not, on smooth functions.
 
         Returns
         -------
         rows : (n_nodes,)
-            With them it has the same products with smooth functions.
+            Rows with the same products with smooth functions.
         rest
-            Norm of what no smooth function has a part in.
+            Norm of the part orthogonal to all smooth functions.
         """
         parts: list[Array] = []
         rest = 0.0
@@ -141,7 +141,7 @@ class DenseSamples:
         return np.concatenate(parts), float(np.sqrt(rest))
 
     def _divided(self, first: int, stop: int) -> Iterator[_Piece]:
-        """Halve pieces that are not smooth, or not dense all over, down to few samples."""
+        """Halve pieces that are not smooth, or not dense all over, down to few readings."""
         if stop - first < _FEWEST:
             yield _Piece(first, stop, None)
             return
@@ -162,7 +162,7 @@ class DenseSamples:
         yield from self._divided(half, stop)
 
     def _blocks(self, first: int, stop: int) -> Iterator[tuple[slice, Array]]:
-        """Legendre's polynomials at the samples of a piece, (n_samples, n_nodes), by blocks."""
+        """Yield Legendre polynomials at a piece's readings, (n_samples, n_nodes), by blocks."""
         if len(self._all_s) > _MOST_KEPT:
             return self._formed(first, stop)
         if (first, stop) not in self._kept:
@@ -189,7 +189,7 @@ class DenseSamples:
 
 
 def _joined(pieces: Iterator[_Piece]) -> list[_Piece]:
-    """Join neighbours whose samples are nodes."""
+    """Join neighbouring pieces whose readings are nodes."""
     joined: list[_Piece] = []
     for piece in pieces:
         if joined and joined[-1].triangle is None and piece.triangle is None:

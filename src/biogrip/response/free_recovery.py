@@ -1,4 +1,4 @@
-"""What is left to itself: first-order systems of springs and dampers, mode by mode.
+"""Motion of first-order systems of springs and dampers from an initial state, mode by mode.
 
 A system M z' + K z = f with M = L L^T and K = G^T G, one row of G a spring, has the
 modes q = V^T L^T z of the singular value decomposition G L^-T = U S V^T, and the
@@ -36,14 +36,14 @@ class Forcing:
     amplitudes: ComplexArray
 
     def at(self, elapsed_s: Array) -> Array:
-        """Loads at times since the instant, (n_loads, n_times)."""
+        """Return the loads at times since the instant, (n_loads, n_times)."""
         powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
         turning = np.exp(1j * self.omega_rad_per_s[:, None] * elapsed_s)
         loads: Array = self.powers @ powers + (self.amplitudes @ turning).real
         return loads
 
     def later(self, elapsed_s: float) -> "Forcing":
-        """Return the same from a later instant on."""
+        """Return the same loads, counted from a later instant on."""
         t = elapsed_s
         shift = np.array([[1, 0, 0], [t, 1, 0], [t**2 / 2, t, 1]])
         turned = self.amplitudes * np.exp(1j * self.omega_rad_per_s * t)
@@ -51,7 +51,7 @@ class Forcing:
 
 
 def smooth_pieces(torque: TorqueHistory) -> list[tuple[float, float, Forcing]]:
-    """Divide a protocol where anything sets in: start, length, and torques of both arms."""
+    """Divide a protocol at changes of torque into start, length and torques of both arms."""
     instants = np.concatenate((torque.time_s, torque.harmonic_time_s))
     starts = np.unique(instants[instants < torque.end_s])
     lengths = np.diff(np.append(starts, torque.end_s))
@@ -73,7 +73,7 @@ def smooth_pieces(torque: TorqueHistory) -> list[tuple[float, float, Forcing]]:
 
 
 class Modes:
-    """A system of springs and dampers, ready to be followed from any state.
+    """Modes of a system of springs and dampers.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Modes:
         self._drive = turns @ inverse
 
     def follow(self, state: Array, forcing: Forcing) -> "Motion":
-        """Set off from a state, (n_states,), under loads on the first states."""
+        """Return the motion from a state, (n_states,), under loads on the first states."""
         drive = self._drive[:, : len(forcing.powers)]
         return Motion(
             self.rates[:, None],
@@ -104,7 +104,7 @@ class Modes:
 
 @dataclass(frozen=True)
 class Motion:
-    """How a system goes on from a state.
+    """Motion of a system from an initial state.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Motion:
     shapes : (n_states, n_modes)
         States by modes.
     start : (n_modes,)
-        The modes in the beginning.
+        Initial values of the modes.
     forcing
         Loads on the modes.
     """
@@ -124,11 +124,11 @@ class Motion:
     forcing: Forcing
 
     def at(self, elapsed_s: Array) -> Array:
-        """States at times since the beginning, (n_states, n_times)."""
+        """Return the states at times since the beginning, (n_states, n_times)."""
         return self.shapes @ self._modes(elapsed_s)
 
     def rate(self, elapsed_s: Array) -> Array:
-        """Their rates of change."""
+        """Return the states' rates of change at times since the beginning."""
         loads = self.forcing.at(elapsed_s)
         return self.shapes @ (loads - self.rates * self._modes(elapsed_s))
 

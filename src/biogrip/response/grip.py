@@ -1,4 +1,4 @@
-"""Whether the jaws press throughout a protocol, or would have to pull."""
+"""Largest and lowest force of the jaws on a sample, which is negative if they have to pull."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 
-# Less than this share of the largest force is rounding, and not told.
+# Forces below this share of the largest one are rounding errors.
 _NOTHING = 1e-9
 _A_PHASE, _A_PERIOD, _MOST = 200, 32, 200_000
 
@@ -22,11 +22,11 @@ class Grip:
     Parameters
     ----------
     largest_N
-        The hardest press.
+        Largest force with which the jaws press.
     lowest_N, lowest_at_s
-        The hardest pull, negative; or the gentlest press after the hardest. And when.
+        Lowest force, negative if the jaws pull, else after the largest one; and its time.
     pulls_from_s
-        Since when the jaws would have to pull; None if they press throughout.
+        Time from which the jaws would have to pull; None if they press throughout.
     """
 
     largest_N: float
@@ -35,7 +35,7 @@ class Grip:
     pulls_from_s: float | None
 
     def words(self) -> str | None:
-        """Say since when and how hard the jaws would have to pull, if they would."""
+        """Describe from when and how hard the jaws would have to pull, if they would."""
         if self.pulls_from_s is None:
             return None
         return (
@@ -46,14 +46,14 @@ class Grip:
 
 
 def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool) -> Grip:
-    """Compute by how much the jaws press or pull one sample, without inertia.
+    """Compute the extreme forces of the jaws on one sample, without inertia.
 
     Parameters
     ----------
     gripper, network, torque
-        What is simulated; the first sample of the network.
+        Arms, samples and protocol of the simulation; the first sample of the network.
     nonlinear
-        Whether to solve the nonlinear model.
+        True to solve the nonlinear model.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlin
 
 
 def _instants(torque: TorqueHistory) -> Array:
-    """Instants dense after everything that sets in, and within every period."""
+    """Return times that are dense after every change of torque and within every period."""
     starts = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s)))
     starts = starts[starts < torque.end_s]
     lengths = np.diff(np.append(starts, torque.end_s))

@@ -1,10 +1,9 @@
-"""Whether the arms' inertia shows in a trace.
+"""Effect of the arms' inertia on a trace, which decides whether fits include inertia.
 
-After a change of the torque arms ring, for milliseconds. How much of that a trace shows depends
-on when it is sampled, and beside which noise; not on who fits it. A bare spring between the jaws
-rings hardest and longest, since dampers only take energy from the ring: while arms ring, what
-inertia changes there bounds what it changes elsewhere. What it changes later is next to nothing
-(docs/model.md, "Without inertia").
+After a change of the torque, arms ring for milliseconds. The effect on a trace depends on the
+sampling times and the noise, not on the fit. It is largest for a bare spring between the jaws,
+since dampers take energy from the ring. While arms ring, the change by inertia with a spring
+bounds the change with any sample; later changes are negligible (docs/model.md, "Without inertia").
 """
 
 import numpy as np
@@ -17,30 +16,30 @@ from biogrip.response.linear import rotation, step_response
 
 # A ring of exp(-36) is lost in rounding.
 _DECAYED = 36.0
-# Springs over that of the arms: several, since one may ring with zeros at all samples.
+# Stiffnesses over that of the arms: several, since one ring may be zero at all readings.
 _STIFFNESS = np.geomspace(0.1, 1e4, 16)
-# Samples at which the size of a rotation is looked at.
+# Number of readings from which the size of a rotation is computed.
 _SOME = 500
 
 VISIBLE = 2e-4
-"""Share of its standard deviation by which an estimate may move where inertia is left out."""
+"""Largest bias of an estimate, in standard deviations, from neglecting inertia."""
 
-# Of a peak, a thousandth: traces with less, or none, count as having that much noise.
+# A thousandth of the peak: traces with less noise, or none, count as having that much.
 _FINEST_NOISE = 2.0**-10
 
 
 def ringing_s(gripper: Gripper) -> float:
-    """How long after a change of the torque arms may be seen ringing, in s.
+    """Return the time in s after which the ringing of the arms has decayed below rounding.
 
-    An arm loses energy to its own damper, whatever else it moves: the envelope of its ring falls
-    at least like exp(-c t / (2 I)).
+    An arm loses energy to its own damper, whatever else it moves: the envelope of its ringing
+    falls at least like exp(-c t / (2 I)).
     """
     arms = gripper.left, gripper.right
     return _DECAYED * max(2 * arm.inertia_kgm2 / arm.damping_Nms_per_rad for arm in arms)
 
 
 def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> BoolArray:
-    """Tell at which times, (n_times,), arms may be seen ringing."""
+    """Return True for times, (n_times,), at which arms may ring."""
     changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
     last = np.maximum(changes_s.searchsorted(time_s, side="right") - 1, 0)
     ringing: BoolArray = time_s - changes_s[last] <= ringing_s(gripper)
@@ -48,7 +47,7 @@ def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> Boo
 
 
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:
-    """Return what inertia adds to the left arm's rotation, (n, n_times) in rad, at any times."""
+    """Compute the change of the left arm's rotation by inertia, (n, n_times) in rad."""
     responses = (
         step_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
         for inertia in (True, False)
@@ -58,7 +57,7 @@ def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Arra
 
 
 def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> float:
-    """Norm of what inertia changes in the samples of a rotation, over the rotation's RMS.
+    """Compute the norm of the change of a trace by inertia, relative to the rotation's RMS.
 
     Parameters
     ----------
@@ -77,12 +76,12 @@ def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) ->
     some_s = time_s[np.linspace(0, len(time_s) - 1, min(_SOME, len(time_s))).astype(np.int64)]
     without = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     size = np.sqrt(np.mean(rotation(without, torque, some_s) ** 2, axis=1))
-    # Where no torque ever changes, nothing rings.
+    # If the torque never changes, nothing rings.
     return float(np.max(change / size)) if np.all(size > 0) else 0.0
 
 
 def inertia_shows(change: float, rotation_rad: Array, noise_rad: float) -> bool:
-    """Whether a trace of this size, in this noise, shows what `change_by_inertia` found."""
+    """Return True if a change from `change_by_inertia` shows in a trace with this noise."""
     size = float(np.sqrt(np.mean(np.square(rotation_rad))))
     noise_rad = max(noise_rad, _FINEST_NOISE * float(np.max(np.abs(rotation_rad))))
     return change * size > VISIBLE * noise_rad

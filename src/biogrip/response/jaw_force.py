@@ -10,9 +10,9 @@ b F = tau - Z phi, but where a liquid has given way that is a difference of near
 equal torques; here the constant and every mode are products of what is positive,
 and late in a phase only what is left of the slow modes is summed.
 
-What the nonlinear model adds follows from its correction, divided by the lever:
-F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction, all of
-them of second order, so that again no large terms cancel.
+In the nonlinear model, the arm's equation, divided by its lever, gives
+F - F_linear = g - (c u' + k u)/b_0^2 with g the load and u the correction. All of
+them are of second order, so that again no large terms cancel.
 """
 
 from math import factorial
@@ -40,12 +40,12 @@ from biogrip.response.nonlinear import FINE, computed_correction
 def jaw_force_response(
     gripper: Gripper, network: Network, *, symmetric: bool = True, inertia: bool = True
 ) -> StepResponse:
-    """Jaw force of n samples after unit torque steps, in N per N m.
+    """Compute the jaw force of n samples after unit torque steps, in N per N m.
 
     Parameters
     ----------
     gripper, network, symmetric, inertia
-        As of `step_response`. Without inertia a parallel damper makes the force jump
+        As in `step_response`. Without inertia a parallel damper makes the force jump
         with the torque.
 
     Returns
@@ -69,7 +69,7 @@ def jaw_force_response(
 
 
 def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
-    """Jaw force in N, shape (n, n_times), at any times, of the linear model.
+    """Compute the jaw force of the linear model in N, shape (n, n_times), at any times.
 
     Parameters
     ----------
@@ -111,18 +111,18 @@ def jaw_force(
     nonlinear: bool,
     inertia: bool = True,
 ) -> Array:
-    """Force that the jaws exert on the sample in N, positive while they press, (n, n_times).
+    """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
 
     Parameters
     ----------
     gripper, network, torque
-        What is simulated.
+        Arms, samples and protocol of the simulation.
     time_s : (n_times,)
         Ascending times; at the instant of a step: what follows it.
     nonlinear
-        Whether to solve corrected eqs. (1)-(3), or the linear (4)-(6).
+        True to solve corrected eqs. (1)-(3), False to solve the linear (4)-(6).
     inertia
-        Whether the arms ring for milliseconds after a step; if they do not, the force may jump.
+        True to include the arms' inertia; without it, the force may jump.
 
     Raises
     ------

@@ -54,7 +54,7 @@ class StepResponse:
 
 
 def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:
-    """Whether both arms move alike, so that one stands for both."""
+    """Return True if both arms move alike, so that one stands for both."""
     return torque.symmetric and gripper.left == gripper.right
 
 
@@ -75,12 +75,12 @@ def step_response(
     network
         The samples.
     symmetric
-        Whether both arms are driven alike; decides the drives, see `drives`.
+        True if both arms are driven alike; determines the drives, see `drives`.
     inertia
-        Without it the ring of the arms, over within milliseconds, is left out
-        and all rates are real and negative.
+        True to include inertia: arms ring for milliseconds. Without inertia, all rates are
+        real and negative.
     both_arms
-        Whether the right arm's rotation is wanted too.
+        True to compute the right arm's rotation, too.
     """
     if network.k.shape[1] > MOST_BRANCHES:
         static, rates, weights = modes_of_many(
@@ -102,16 +102,16 @@ def transfer_functions(
     inertia: bool = False,
     both_arms: bool = False,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Rotation over torque as quotients of polynomials in s; arguments as of `step_response`.
+    """Return rotation over torque as quotients of polynomials in s; see `step_response`.
 
-    Parameters may be complex: nothing but arithmetic is done to them.
+    Parameters may be complex, as only arithmetic is done with them.
 
     Returns
     -------
     numerators : (n_arms, n_drives, n, terms)
-        One a way from drive to arm, in ascending powers.
+        One for each drive and arm, in ascending powers.
     denominator : (n, terms)
-        The one that all share.
+        Their common denominator.
     """
     p, q = sample_polynomials(network)
     z_2, z_4 = (arm_polynomial(arm, inertia) for arm in (gripper.left, gripper.right))
@@ -137,11 +137,11 @@ def rotation(
     *,
     rate: bool = False,
 ) -> Array:
-    """Closing rotation of an arm in rad, or its rate in rad/s, (n, n_times), at any times.
+    """Compute an arm's closing rotation in rad, or its rate in rad/s, (n, n_times), at any times.
 
-    What sets in at different times superposes. A step response starts at zero,
+    Responses to changes of torque superpose. A step response starts at zero,
     so h(t) = sum_j w_j (e^(p_j t) - 1), which loses no digits to the constant
-    where a sample creeps far from its rest; ramps and parabolas are its integrals.
+    if a sample creeps far from its rest. Ramps and parabolas are its integrals.
     """
     phi = np.zeros((len(response.static), len(time_s)))
     # Arms that differ have a second drive, which does nothing if both are driven alike.
@@ -165,7 +165,7 @@ def rotation(
 
 
 def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
-    """Response of a mode, over its weight, to t^order/order!; of order -1, to an impulse."""
+    """Return a mode's response over its weight to t^order/order!; for order -1, to an impulse."""
     z = rates * elapsed
     if order < 0:
         return rates * np.exp(z)
@@ -175,7 +175,7 @@ def _growth(order: int, rates: NDArray[Any], elapsed: Array) -> NDArray[Any]:
 
 
 def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
-    """phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n, without cancellation near zero.
+    """Compute phi_n(z) = (e^z - sum_{k<n} z^k/k!) / z^n without cancellation near zero.
 
     References
     ----------
@@ -195,7 +195,7 @@ def phi_function(order: int, z: NDArray[Any]) -> NDArray[Any]:
 
 
 def sample_polynomials(network: Network) -> tuple[Array, Array]:
-    """P and Q of the sample's impedance P/Q, ascending powers, shape (terms, n).
+    """Return P and Q of the sample's impedance P/Q, ascending powers, shape (terms, n).
 
     Each branch enters as c_j s / (1 + T_j s) with its relaxation time T_j = c_j/k_j.
     """
@@ -210,7 +210,7 @@ def sample_polynomials(network: Network) -> tuple[Array, Array]:
 
 
 def arm_polynomial(arm: Arm, inertia: bool) -> Array:
-    """Impedance Z of a free arm, ascending powers, shape (terms, 1)."""
+    """Return the impedance Z of a free arm, ascending powers, shape (terms, 1)."""
     coefficients = [arm.stiffness_Nm_per_rad, arm.damping_Nms_per_rad, arm.inertia_kgm2]
     return np.array(coefficients if inertia else coefficients[:2])[:, None]
 
@@ -238,7 +238,7 @@ def _product(factors: list[Array], one: Array) -> Array:
 
 
 def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
-    """Roots of denominators, shape (n, n_modes), never quite coincident."""
+    """Compute the roots of denominators, shape (n, n_modes), moved apart if they coincide."""
     if denominator.shape[1] == 2:
         rates: NDArray[Any] = -(denominator[:, :1] / denominator[:, 1:])
         return rates
@@ -249,7 +249,7 @@ def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
 
 
 def slope_at_poles(denominator: NDArray[Any], rates: NDArray[Any]) -> NDArray[Any]:
-    """Derivative of the denominators at their roots, a product without differences of terms."""
+    """Compute the derivative of denominators at their roots, as a product over root distances."""
     slope = np.empty_like(rates, dtype=np.result_type(denominator, rates))
     slope[:] = denominator[:, -1:]
     for i, j in permutations(range(rates.shape[1]), 2):
@@ -260,7 +260,7 @@ def slope_at_poles(denominator: NDArray[Any], rates: NDArray[Any]) -> NDArray[An
 def partial_fractions(
     numerators: NDArray[Any], denominator: NDArray[Any], *, real: bool
 ) -> StepResponse:
-    """Step response of N(s)/D(s): N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
+    """Compute the step response of N/D, N(0)/D(0) + sum_j N(p_j) / (p_j D'(p_j)) e^(p_j t)."""
     rates = poles(denominator, real=real)
     slope = rates * slope_at_poles(denominator, rates)
     found = numerators[..., 0] / denominator[:, 0], evaluate(numerators, rates) / slope
@@ -269,7 +269,7 @@ def partial_fractions(
 
 
 def evaluate(coefficients: NDArray[Any], z: NDArray[Any]) -> NDArray[Any]:
-    """Polynomials in ascending powers, shape (..., n, terms), at z of shape (n, n_points)."""
+    """Evaluate polynomials, ascending powers, shape (..., n, terms), at z, (n, n_points)."""
     value: NDArray[Any] = np.zeros(1)
     for term in range(coefficients.shape[-1])[::-1]:
         value = value * z + coefficients[..., term, None]

@@ -1,6 +1,6 @@
 """The linear model without inertia, for samples of dozens of Maxwell branches.
 
-No polynomial of such a degree can be worked with. But the arms, seen from the sample,
+Polynomials of such a degree are numerically useless. But the arms, seen from the sample,
 have the impedance Z = Z_2 Z_4 / (Z_2 + Z_4), which is that of a spring, a damper and one
 Maxwell branch. So with the sample's
 
@@ -11,9 +11,9 @@ is a sum of poles again, and the rates x of the modes interlace with the r_j
 
     phi_2 = [Z_4/(Z_2 + Z_4) tau_2 + b^2 G/(Z_2 + Z_4) (tau_2 - tau_4)] / H,
 
-of phi_4 and of the jaw force follow from the arms alone; and a mode of N/H has the
-weight -N/S with S = A + sum_j K_j x^2/(x - r_j)^2, a sum of what is positive. Equal arms
-that are driven alike need no branch of theirs: then 2 phi = tau/H.
+of phi_4 and of the jaw force follow from the arms alone. A mode of N/H has the weight
+-N/S with S = A + sum_j K_j x^2/(x - r_j)^2, a sum of positive terms. Equal arms that are
+driven alike need no branch of theirs: then 2 phi = tau/H.
 """
 
 from dataclasses import dataclass, replace
@@ -30,13 +30,13 @@ from biogrip.interlacing import Zeros, interlaced_zeros
 from biogrip.response.many_branches_ringing import Ringing
 from biogrip.response.roots import SMALLEST_GAP
 
-# Equal arms differ by this share: their branch does nothing, but has its mode.
+# Least difference of the arms: the branch of equal arms has no effect, but a mode.
 _LEAST_DIFFERENCE = 1e-30
 
 
 @dataclass(frozen=True)
 class Impedance:
-    """H = Z + b^2 G of n samples.
+    """Impedance H = Z + b^2 G of n samples between the arms.
 
     Parameters
     ----------
@@ -51,11 +51,11 @@ class Impedance:
     level: NDArray[Any]
 
     def zeros(self) -> Zeros:
-        """Rates of the modes, of real elements."""
+        """Return the rates of the modes; elements must be real."""
         return interlaced_zeros(self.weights, self.rates, self.level)
 
     def steepness(self, zeros: Zeros) -> Array:
-        """S of each mode, (n_modes, n)."""
+        """Return S of each mode, (n_modes, n)."""
         x = zeros.values
         total = np.zeros_like(x)
         for weight, rate in zip(self.weights, self.rates, strict=True):
@@ -64,14 +64,14 @@ class Impedance:
 
 
 class Arms:
-    """Both arms, as the sample between them sees them.
+    """Impedance of both arms as seen from the sample between them.
 
     Parameters
     ----------
     gripper
         Its arms may differ.
     alike
-        Whether they are equal, and driven alike.
+        True if they are equal, and driven alike.
     """
 
     def __init__(self, gripper: Gripper, *, alike: bool) -> None:
@@ -87,7 +87,7 @@ class Arms:
         self._chi = (difference if abs(difference) > least else least) / (c_2 + c_4)
 
     def with_sample(self, network: Network) -> Impedance:
-        """Put a sample between the arms, its branches `separated`."""
+        """Return the impedance with a sample, its branches `separated`, between the arms."""
         b_2, k, c = self._lever_m**2, self._k, self._c
         weights, rates = b_2 * network.k.T, (network.k / network.c).T
         nothing = np.zeros((1, weights.shape[1]))
@@ -103,7 +103,7 @@ class Arms:
         )
 
     def rotations(self, zeros: Zeros) -> tuple[Array, Array]:
-        """N of the rotations of modes, (n_arms, n_drives, n_modes, n), and dN/dx."""
+        """Return N of the rotations of modes, (n_arms, n_drives, n_modes, n), and dN/dx."""
         if self.alike:
             half = np.full((2, 1, *zeros.pole.shape), 0.5)
             return half, np.zeros_like(half)
@@ -119,7 +119,7 @@ class Arms:
         )
 
     def forces(self, zeros: Zeros) -> Array:
-        """N of the jaw force of modes, (1, n_drives, n_modes, n)."""
+        """Return N of the jaw force of modes, (1, n_drives, n_modes, n)."""
         (c_2, c_4), b = self._c, self._lever_m
         if self.alike:
             return 0.5 / b * (c_2 * zeros.values - self._k[0])[None, None]
@@ -129,7 +129,7 @@ class Arms:
         return np.array([[-z_2 * z_4 / whole / b, (z_2 / whole) ** 2 * z_4 / b]])
 
     def rotations_at_rest(self, network: Network) -> Array:
-        """Final rotations under unit torques, (n_arms, n_drives, n)."""
+        """Return the final rotations under unit torques, (n_arms, n_drives, n)."""
         k_2, k_4 = self._k
         sample = self._lever_m**2 * network.k_p
         spring = self._k.prod() / self._k.sum() + sample
@@ -140,7 +140,7 @@ class Arms:
         return np.array(rows) / self._k.sum() / spring
 
     def forces_at_rest(self, network: Network) -> Array:
-        """Final jaw force under unit torques, (1, n_drives, n)."""
+        """Return the final jaw force under unit torques, (1, n_drives, n)."""
         sample = self._lever_m * network.k_p
         spring = self._k.prod() / self._k.sum() + self._lever_m * sample
         drives = [sample] if self.alike else [sample, -sample * self._k[0] / self._k.sum()]
@@ -164,18 +164,18 @@ def _ascending(weights: NDArray[Any], rates: NDArray[Any]) -> tuple[NDArray[Any]
 def modes_of_many(
     gripper: Gripper, network: Network, *, symmetric: bool, inertia: bool, force: bool = False
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
-    """Step responses of both arms, or of the jaw force: constants, rates in 1/s and weights.
+    """Compute step responses of both arms, or of the jaw force: constants, rates and weights.
 
     Parameters
     ----------
     gripper, network
         Arms, and n samples of more than `MOST_BRANCHES` branches.
     symmetric
-        Whether both arms are driven alike; decides the drives.
+        True if both arms are driven alike; determines the drives.
     inertia
-        Whether the arms have any.
+        True to include the inertia of the arms.
     force
-        Whether the jaw force, in N, takes the place of the arms.
+        True to compute the jaw force, in N, instead of the arms' rotations.
 
     Returns
     -------
@@ -206,14 +206,14 @@ def modes_of_many(
 def modes_with_slopes(
     gripper: Gripper, tilted: Network, tilt: float, count: int, *, symmetric: bool
 ) -> tuple[Array, Array, Array, Array]:
-    """Rates and weights of the left arm, with derivatives by the log-parameters.
+    """Compute rates and weights of the left arm, with derivatives by the log-parameters.
 
     With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow.
 
     Parameters
     ----------
     gripper, symmetric
-        As of `modes_of_many`.
+        As in `modes_of_many`.
     tilted
         n samples, and after them the same with each of `count` parameters tilted into the
         complex plane by the share `tilt`.

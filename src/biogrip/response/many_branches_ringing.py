@@ -5,11 +5,11 @@ With inertia the denominator of both rotations is
     E = Z + 2 b^2 G    or    E = Z_2 Z_4 + (Z_2 + Z_4) b^2 G
 
 for arms that move alike, or do not. Times the product of all s + r_j it is a polynomial,
-whose roots the iteration of `biogrip.response.roots` finds. It only ever asks for the
-quotient of the polynomial and its derivative, which a sum over the branches gives; and
-since a root is kept as its distance from the nearest branch, none of its digits is lost
-where a branch is weak. To begin with there are the rates without inertia, and the ring
-of arms on a sample whose dampers hold.
+whose roots the iteration of `biogrip.response.roots` finds. The iteration only needs the
+quotient of the polynomial and its derivative, a sum over the branches. A root is kept as
+its distance from the nearest branch, so that it has all digits where a branch is weak.
+Starts are the rates without inertia, and the ringing of arms on a sample whose Maxwell
+dampers are rigid.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.interlacing import Zeros
 from biogrip.response.roots import roots, swept
 
-# Off the real axis, which nothing that begins on it would leave.
+# Factor that moves starts off the real axis, which no iteration from a real start would leave.
 _ASIDE = 1 + 1e-3j
 
 
@@ -36,7 +36,7 @@ class Ringing:
     zeros
         Rates without inertia.
     alike
-        Whether both arms are equal, and driven alike.
+        True if both arms are equal, and driven alike.
     """
 
     def __init__(self, gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> None:
@@ -58,7 +58,7 @@ class Ringing:
         self._slope = arms_slope + self._b_2 * through
 
     def rotations(self) -> ComplexArray:
-        """Weights of the rotations in rad per N m, (n_arms, n_drives, n_modes, n)."""
+        """Return weights of the rotations in rad per N m, (n_arms, n_drives, n_modes, n)."""
         if self._alike:
             return self._weights([[np.ones_like(self.rates)]] * 2)
         left, right = (_value(arm, self.rates) for arm in self._arms)
@@ -66,7 +66,7 @@ class Ringing:
         return self._weights([[right, sample], [left, -(left + sample)]])
 
     def forces(self) -> ComplexArray:
-        """Weights of the jaw force in N per N m, (1, n_drives, n_modes, n)."""
+        """Return weights of the jaw force in N per N m, (1, n_drives, n_modes, n)."""
         force = self._lever_m * self._sample
         if self._alike:
             return self._weights([[2 * force]])
@@ -78,7 +78,7 @@ class Ringing:
         return weights.swapaxes(2, 3)
 
     def _begin(self, zeros: Zeros) -> tuple[Array, ComplexArray]:
-        """Where to begin."""
+        """Return starts of the iteration: their origins, and distances beyond them."""
         branches = self._k.shape[2]
         ring = roots(self._ring()) * _ASIDE
         origin = np.concatenate((zeros.pole[:branches].T, np.zeros(ring.shape)), axis=1)
@@ -86,7 +86,7 @@ class Ringing:
         return origin, np.concatenate((slow, ring), axis=1)
 
     def _ring(self) -> Array:
-        """E with a spring and a damper for the sample, ascending powers, (n, terms)."""
+        """Return E with a spring and a damper as sample, ascending powers, (n, terms)."""
         held = self._b_2 * np.concatenate((self._k_p + self._k.sum(axis=2), self._c_p), axis=1)
         z_2, z_4 = (_polynomial(arm) for arm in self._arms)
         arms, factor = (z_2, np.array([2.0])) if self._alike else (np.convolve(z_2, z_4), z_2 + z_4)
@@ -98,7 +98,7 @@ class Ringing:
         )
 
     def _newton_step(self, origin: Array, beyond: ComplexArray) -> ComplexArray:
-        """E times all s + r_j, over its derivative."""
+        """Return the polynomial, E times all s + r_j, divided by its derivative."""
         s = beyond - origin
         away = (self._rates - origin[..., None]) + beyond[..., None]
         own = self._rates == origin[..., None]
@@ -108,7 +108,7 @@ class Ringing:
         others_slope = self._b_2 * (self._c_p + (self._k * self._rates * inverse**2).sum(axis=2))
         value = arms + factor * others
         slope = arms_slope + factor_slope * others + factor * others_slope
-        # With a branch of its own: both sides times s + r.
+        # At the origin of a branch: value and slope times s + r.
         spring = self._b_2 * np.where(own, self._k, 0).sum(axis=2)
         has_own = np.any(own, axis=2)
         whole = value + beyond * slope + spring * (factor_slope * s + factor)
@@ -119,7 +119,7 @@ class Ringing:
     def _of_arms(
         self, s: ComplexArray
     ) -> tuple[ComplexArray, ComplexArray, ComplexArray, ComplexArray]:
-        """What is added to b^2 G, what it is multiplied by, each with its derivative."""
+        """Return the summand beside b^2 G, and the factor of b^2 G, each with its derivative."""
         (left, left_slope), (right, right_slope) = (
             (_value(arm, s), 2 * arm.inertia_kgm2 * s + arm.damping_Nms_per_rad)
             for arm in self._arms
@@ -135,7 +135,7 @@ def _polynomial(arm: Arm) -> Array:
 
 
 def _value(arm: Arm, s: ComplexArray) -> ComplexArray:
-    """Impedance of a free arm."""
+    """Return the impedance of a free arm."""
     k, c, inertia = _polynomial(arm)
     value: ComplexArray = k + s * (c + s * inertia)
     return value

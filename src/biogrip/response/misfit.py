@@ -1,4 +1,4 @@
-"""The misfit of populations against traces: the paper's search has a fast way of its own."""
+"""Misfit of populations to traces, with a fast method for the paper's protocols."""
 
 from collections.abc import Callable, Sequence
 
@@ -11,10 +11,10 @@ from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.residuals import Residuals
 
 Misfit = Callable[[Array], Array]
-"""Of parameters of shape (n, n_parameters), the RMS misfit in rad, (n,)."""
+"""Function from parameters, (n, n_parameters), to RMS misfits in rad, (n,)."""
 
 Misfits = Callable[[Array, IntArray], Array]
-"""Of (n_populations, n, n_parameters), and of which trace each is for, (n_populations, n)."""
+"""The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
 
 
 def misfit_of(
@@ -29,10 +29,10 @@ def misfit_of(
     Parameters
     ----------
     residuals
-        Of the trace; their misfit serves any protocol, sampling and noise.
+        Residuals of the trace; their misfit serves any protocol, sampling and noise.
     gripper, torque, time_s, rotation_rad
-        What they were made of. Torque steps, sampled uniformly from the start on, of the linear
-        model without inertia, in white noise alone, need no response at all.
+        Arguments of `residuals`. `SeriesMisfit` is used for torque steps, sampled uniformly
+        from the start on, with the linear model without inertia, in white noise alone.
     """
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
@@ -43,9 +43,9 @@ def misfit_of(
 
 
 def together(misfits: Sequence[Misfit]) -> Misfits:
-    """Return the misfits of one trace each as one function of a population for each trace.
+    """Combine the misfit functions of several traces into one of a population for each trace.
 
-    It has the same bits as the misfits by themselves.
+    Its results equal those of the single functions to the last bit.
     """
     series = [misfit for misfit in misfits if isinstance(misfit, SeriesMisfit)]
     if len(series) == len(misfits) and all(map(series[0].joins, series)):

@@ -3,13 +3,13 @@
 Between two torque steps the inertia-free response is a constant plus
 exponentials, so at uniform sampling it is sum_j a_j z_j^n. Its squared distance
 from the samples y_n expands into geometric series in z_i z_j, and into the
-projections of the trace on the response of each mode. Those are long sums, but
-functions of the mode's rate alone: computed once at some hundred rates, they are
+projections of the trace on the response of each mode. These projections are long sums,
+but functions of the mode's rate alone: computed once at some hundred rates, they are
 interpolated for all others.
 
-What concerns one individual is arithmetic element by element, in an order that is
-written out, and no reduction of an array: the same to the last bit whoever else is
-in the population, and however many populations are looked at together.
+The misfit of an individual is computed element by element, in a fixed order, without
+reductions of arrays: it does not depend, to the last bit, on the rest of the population
+or on the number of populations.
 """
 
 from collections.abc import Sequence
@@ -27,9 +27,9 @@ from biogrip.response.decay_table import DecayTable
 from biogrip.response.linear import LEFT, is_symmetric, step_response
 from biogrip.response.two_modes import two_modes
 
-# Individuals looked at together: enough to make calls worth their while, and to stay in the cache.
+# Individuals computed together: many enough for few calls, few enough for the cache.
 _AT_ONCE = 7000
-# Modes of a closed form; the rates of more are iterated for, until those of all have settled.
+# Most modes with rates in closed form; the rates of more are iterated until all have converged.
 _CLOSED_FORM = 2
 
 
@@ -39,7 +39,7 @@ class SeriesMisfit:
     Parameters
     ----------
     gripper, model, torque
-        What is simulated: the linear model without inertia, under torque steps.
+        Arms, sample model and protocol, of torque steps; the linear model without inertia.
     interval_s
         Sampling interval; the first sample is at t = 0.
     rotation_rad : (n_samples,) or (n_traces, n_samples)
@@ -58,28 +58,28 @@ class SeriesMisfit:
         self._traces = np.atleast_2d(rotation_rad)
         self._samples = self._traces.shape[1]
         heights = drives(torque.left[:, 0], torque.right[:, 0], torque.symmetric)
-        # What a drive does at the start of each phase, and what it has come to.
+        # Change of each drive at the start of each phase, and level after it.
         self._heights = heights[:, :, None, None]
         self._levels = np.cumsum(heights, axis=1)[:, :, None]
-        # Times in samples; rounding must not keep a sample from the step that it falls on.
+        # Times in sampling intervals; a reading at a step must not precede it by rounding.
         steps, nearest = torque.time_s / interval_s, np.rint(torque.time_s / interval_s)
         steps = np.where(np.isclose(steps, nearest, rtol=1e-12, atol=0), nearest, steps)
         starts = np.minimum(np.ceil(steps), self._samples)
         self._first_samples = starts.astype(np.int64)
-        # From a step to the first sample of its phase.
+        # Time from a step to the first reading of its phase.
         self._late = np.maximum(starts - steps, 0)
-        # One sample, and all of each phase.
+        # Numbers of readings: one, and those of each phase.
         lengths = np.concatenate(([1], np.diff(starts, append=self._samples)))
         self._lengths = lengths[:, None, None]
         self._square_sums = np.array([np.dot(trace, trace) for trace in self._traces])
 
     @classmethod
     def joined(cls, misfits: Sequence["SeriesMisfit"]) -> "SeriesMisfit":
-        """Take the traces of several that agree in all else, see `joins`, together."""
+        """Combine the traces of several objects that agree in all else, see `joins`."""
         return cls(*misfits[0]._simulated, np.concatenate([one._traces for one in misfits]))
 
     def of_model(self, model: SampleModel) -> "SeriesMisfit":
-        """Return the same traces for another model: what is tabulated of them is for any."""
+        """Return the misfit of another model to the same traces, sharing their table."""
         other = copy(self)
         other._simulated = (self._simulated[0], model, *self._simulated[2:])
         other.__dict__.pop("_closed_form", None)
@@ -87,7 +87,7 @@ class SeriesMisfit:
         return other
 
     def joins(self, other: "SeriesMisfit") -> bool:
-        """Whether populations against traces of both give the same bits together as apart."""
+        """Return True if misfits to traces of both have the same bits together as apart."""
         gripper, model, torque, interval_s = self._simulated
         others, others_model, others_torque, others_interval_s = other._simulated
         return (
@@ -103,12 +103,12 @@ class SeriesMisfit:
 
     @cached_property
     def projections(self) -> DecayTable:
-        """What `exact_projections` has, interpolated; made when it is first needed."""
+        """Table that interpolates `exact_projections`; made when it is first needed."""
         shortest = float(np.min(self._late, where=self._late > 0, initial=1.0))
         return DecayTable(self.exact_projections, self._samples, shortest)
 
     def __call__(self, parameters: Array) -> Array:
-        """Misfit in rad of each individual, (n,), against the only trace, or the first.
+        """Compute the misfit in rad of each individual, (n,), to the only or first trace.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class SeriesMisfit:
         return misfit
 
     def of_each(self, parameters: Array, traces: IntArray) -> Array:
-        """Misfit in rad of populations, each against a trace, (n_populations, n).
+        """Compute the misfits in rad of populations, each to one trace, (n_populations, n).
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class SeriesMisfit:
         return np.sqrt(square, out=square).reshape(shape)
 
     def _modes(self, parameters: Array) -> tuple[Array, Array, Array]:
-        """Static (n_drives, n), rates a sample (n_modes, n), weights (n_drives, n_modes, n)."""
+        """Return static (n_drives, n), rates (n_modes, n) and weights (n_drives, n_modes, n)."""
         gripper, model, torque, interval_s = self._simulated
         network = model.network(parameters)
         if is_symmetric(gripper, torque) and network.k.shape[1] == 1:
@@ -171,10 +171,10 @@ class SeriesMisfit:
         return self.projections(np.zeros(1))[:, 0]
 
     def _model_square_sums(self, static: Array, rates: Array, weights: Array) -> Array:
-        """Sums over all samples of squared responses, shape (n,).
+        """Sum squared responses over all readings, shape (n,).
 
-        In a phase of N samples, ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes.
-        Those of products follow from z^N - 1 and z - 1 without cancellation.
+        A phase of N readings has ((z_i z_j)^N - 1) / (z_i z_j - 1) for each pair of modes, which
+        follows from z^N - 1 and z - 1 without cancellation.
         """
         decayed = np.expm1(self._lengths * rates)
         amplitudes = self._amplitudes(rates, weights, 1 + decayed[1:])
@@ -199,10 +199,10 @@ class SeriesMisfit:
         return _sum(_sum(terms)) + _sum(constants)[0]
 
     def _amplitudes(self, rates: Array, weights: Array, decays: Array) -> Array:
-        """Amplitudes of modes at the first sample of each phase, (n_phases, n_modes, n).
+        """Compute amplitudes of modes at the first reading of each phase, (n_phases, n_modes, n).
 
-        Weights are those of unit steps, (n_drives, n_modes, n); decays, (n_phases, n_modes, n),
-        to what share a mode decays within each phase.
+        Weights, (n_drives, n_modes, n), are those of unit steps; decays, (n_phases, n_modes, n),
+        the shares that remain of modes at the end of each phase.
         """
         amplitudes = _sum(self._heights * weights[:, None])
         for phase, late in enumerate(self._late):
@@ -213,9 +213,9 @@ class SeriesMisfit:
         return amplitudes
 
     def exact_projections(self, rates: Array) -> Array:
-        """Projections of each trace on the response of a mode to each drive, summed up.
+        """Project each trace on the response of a mode to each drive, by direct summation.
 
-        Of rates over the sampling rate, (n,), they are (n_traces * n_drives, n).
+        For rates in units of the sampling rate, (n,), the result is (n_traces * n_drives, n).
         """
         sums = _power_sums(self._traces, self._first_samples, rates)
         decays = np.exp(self._lengths[1:] * rates)
@@ -228,7 +228,7 @@ class SeriesMisfit:
 
 
 def _sum(terms: Array) -> Array:
-    """Sum over the first axis, one after the other whatever the shape."""
+    """Sum over the first axis in order, whatever the shape."""
     total: Array = terms[0]
     for term in terms[1:]:
         total = total + term
@@ -236,11 +236,11 @@ def _sum(terms: Array) -> Array:
 
 
 def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
-    """sum_n exp(rate n) y_n of each phase of each trace, shape (n_traces, n_phases, n_rates).
+    """Compute sum_n exp(rate n) y_n of phases, shape (n_traces, n_phases, n_rates).
 
-    In two levels, n = B a + b: one matrix product with the phases folded to
-    (B, N/B), one weighted sum over rows. Traces go through it one by one, so that none
-    depends on the others.
+    With n = B a + b, it is one matrix product with the phases folded to (B, N/B), and
+    one weighted sum over rows. Traces are treated one by one, so that none depends on
+    the others.
     """
     longest = int(np.diff(first_samples, append=traces.shape[1]).max())
     block = max(1, int(np.sqrt(longest)))
@@ -260,7 +260,7 @@ def _power_sums(traces: Array, first_samples: IntArray, rates: Array) -> Array:
 
 
 def _fold(pieces: list[Array], block: int) -> tuple[Array, list[tuple[int, int]]]:
-    """Fold each piece to (block, rows), side by side; also the columns of each piece."""
+    """Fold each piece to (block, rows), side by side; return also the columns of each."""
     folded, columns, start = [], [], 0
     for piece in pieces:
         rows = -(-len(piece) // block)

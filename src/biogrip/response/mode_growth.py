@@ -1,4 +1,4 @@
-"""What a mode of unit weight does under a protocol, and how that changes with its rate."""
+"""Response of a mode of unit weight to a protocol, and its derivative by the mode's rate."""
 
 from typing import Any
 
@@ -16,21 +16,21 @@ _DECAYED = 40.0
 def growth_of_modes(
     rates: NDArray[Any], torque: TorqueHistory, time_s: Array
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Responses of modes of unit weight to a protocol, and their derivatives by the rate.
+    """Compute responses of modes of unit weight to a protocol, and derivatives by the rate.
 
-    From step to step a mode is carried on: with G what it has done at the last step, T the
+    A mode is carried on from step to step: with G its response at the last step, T the
     torque since, and e the time since,
 
         g(e) = G + (G + T) (e^(r e) - 1)    dg/dr = [G' + (G + T) e] e^(r e)
 
-    So it is from ramp to ramp and from sinusoid to sinusoid, which superposed would lose what
-    they have grown to over what they are.
+    Ramps and sinusoids are treated alike: a superposition of responses since the start would
+    lose digits by cancellation.
 
     Parameters
     ----------
     rates : (n, n_modes)
-        In 1/s, with negative real parts; those in a column alike, for what has decayed in
-        all of a column is not computed.
+        In 1/s, with negative real parts. Rates in a column should be similar: times at which
+        all of a column have decayed are not computed.
     torque
         The protocol.
     time_s : (n_times,)
@@ -39,7 +39,7 @@ def growth_of_modes(
     Returns
     -------
     growth, slope : (n, n_drives, n_modes, n_times)
-        In N m, and N m s; of each of the `drives`.
+        In N m, and N m s, for each of the `drives`.
     """
     n, m = rates.shape
     if not torque.only_steps:
@@ -58,7 +58,7 @@ def growth_of_modes(
                 rates[:, j], reached[..., j], slanted[..., j], levels, phase, elapsed
             )
             continue
-        # In the order in which it is computed elsewhere, so that it has the same bits.
+        # In the same order as elsewhere, so that the last bits agree.
         decayed = reached[..., j] - (reached[..., j] + levels)
         growth[:, :, j], slope[:, :, j] = decayed.take(phase, axis=2), 0.0
         seen = np.flatnonzero(live)
@@ -71,7 +71,7 @@ def growth_of_modes(
 def _from_phase_to_phase(
     rates: NDArray[Any], torque: TorqueHistory, time_s: Array
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Growth and slope of modes, (n, n_drives, n_modes, n_times), under any protocol."""
+    """Compute growth and slope, (n, n_drives, n_modes, n_times), phase by phase."""
     rate = rates[:, None, :, None]
     powers, swings = torque.within_phases
     shape = len(rates), powers.shape[1], rates.shape[1]
@@ -83,7 +83,7 @@ def _from_phase_to_phase(
     firsts = np.append(time_s.searchsorted(torque.time_s), len(time_s))
     for k, start in enumerate(torque.time_s):
         here = slice(firsts[k], firsts[k + 1])
-        # The next phase begins with what this one ends with.
+        # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], starts[k + 1]) - start
         decay = 1 + _expm1(rate * elapsed)
         grown, tilted = reached * decay, (slanted + reached * elapsed) * decay
@@ -107,7 +107,7 @@ def _carried_on(
     phase: IntArray,
     elapsed: Array,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """One mode of each sample, (n, n_drives, n_times), from what it has done at each step."""
+    """Return a mode of each sample, (n, n_drives, n_times), from its responses at the steps."""
     growing = _expm1(rates[:, None] * elapsed)[:, None]
     growth = (reached + levels).take(phase, axis=2)
     slope = growth * elapsed
@@ -121,7 +121,7 @@ def _carried_on(
 def _at_steps(
     rates: NDArray[Any], starts_s: Array, levels: Array
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """What modes have done when a step comes, and its derivative, (n, n_drives, n_steps, m)."""
+    """Return responses of modes at each step, and derivatives, (n, n_drives, n_steps, m)."""
     gaps = np.diff(starts_s)
     growing = _expm1(rates * gaps[:, None, None])
     reached = np.zeros((len(gaps) + 1, len(rates), len(levels), rates.shape[1]), rates.dtype)
@@ -135,7 +135,7 @@ def _at_steps(
 
 
 def _expm1(z: NDArray[Any]) -> NDArray[Any]:
-    """e^z - 1; of complex z by real functions, which are faster."""
+    """Compute e^z - 1; for complex z by real functions, which are faster."""
     if not np.iscomplexobj(z):
         return np.expm1(z)
     grown, half = np.expm1(z.real), 0.5 * z.imag
@@ -147,7 +147,7 @@ def _expm1(z: NDArray[Any]) -> NDArray[Any]:
 
 
 def _growth(order: int, rate: NDArray[Any], elapsed: Array) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Response of a mode to t^order/order!, over its weight, and its derivative by the rate.
+    """Return a mode's response to t^order/order! over its weight, and derivative by the rate.
 
     With z = r t these are r t^(n+1) phi_(n+1)(z) and t^(n+1) [phi_n(z) - n phi_(n+1)(z)],
     for z phi_n'(z) = phi_(n-1)(z) - n phi_n(z).
@@ -164,10 +164,10 @@ def _growth(order: int, rate: NDArray[Any], elapsed: Array) -> tuple[NDArray[Any
 def _swing(
     omega: float, rate: NDArray[Any], elapsed: Array, phasor: ComplexArray
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Response of a mode to Re(a e^(i omega t)), over its weight, and its derivative by the rate.
+    """Return a mode's response to Re(a e^(i omega t)) over its weight, and derivative by the rate.
 
-    Of a real mode that is the real part of the response to a e^(i omega t); of a complex
-    one, half of it and of the response to what is conjugate to the drive.
+    For a real mode, it is the real part of the response to a e^(i omega t). For a complex
+    mode, it is half the sum of the responses to the drive and to its complex conjugate.
     """
     ahead = _rotating(omega, rate, elapsed)
     if not np.iscomplexobj(rate):
@@ -182,7 +182,7 @@ def _swing(
 def _rotating(
     omega: float, rate: NDArray[Any], elapsed: Array
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Response of a mode to e^(i omega t), over its weight, and its derivative by the rate."""
+    """Return a mode's response to e^(i omega t) over its weight, and derivative by the rate."""
     decay = np.exp(rate * elapsed)
     difference = np.exp(1j * omega * elapsed) - decay
     share = rate / (1j * omega - rate)

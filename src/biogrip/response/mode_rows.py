@@ -1,9 +1,9 @@
-"""What modes do under a protocol, condensed to rows, as a tabulated function of the rate.
+"""Table of the responses of modes to a protocol, condensed to rows, against the rate.
 
-Under a given protocol and at given times the rows of a mode depend on its rate r
-alone, and smoothly (`biogrip.response.decay_table`). Divided by T r, T the last
-time, they are as large for slow modes as for any other, and polynomials of low
-degree in short pieces of
+For a given protocol and given times, the rows of a mode are a smooth function of its
+rate r alone (`biogrip.response.decay_table`). Divided by T r, T the last time, they are
+as large for slow modes as for fast ones, and polynomials of low degree in short pieces
+of
 
     u = log(1 - T r)
 
@@ -26,7 +26,7 @@ from biogrip.response.modes import Modes
 _SHORTER, _DEGREE = 16, 5
 _WIDTH = WIDTH / _SHORTER
 _ORDERS = np.arange(_DEGREE + 1)
-# exp(-40) is lost in rounding; under a ramp, something is left that falls with the rate.
+# exp(-40) is lost in rounding; under a ramp, a term remains that falls with the rate only.
 _DECAYED, _DECAYED_UNDER_RAMPS = 40.0, 1e12
 
 # On a short piece from -1/2 to 1/2.
@@ -37,18 +37,18 @@ _TO_POWERS = np.linalg.inv(np.vander(_SHORT_NODES, increasing=True))
 
 
 class ModeRows:
-    """Rows of the responses of any number of samples, with their derivatives.
+    """Computes condensed rows of the responses of many samples, with their derivatives.
 
     Parameters
     ----------
     torque
         The protocol.
     time_s : (n_times,)
-        Ascending times at which a response has to be known.
+        Ascending times at which responses are evaluated.
     to_rows : (n_times, n_rows)
-        Turns its values there, from their right, into rows.
+        Matrix that turns values there, multiplied from their right, into rows.
     shortest_s
-        Shortest time after a change of torque at which a mode is seen.
+        Shortest of these times after a change of torque.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class ModeRows:
             self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
 
     def __call__(self, modes: Modes) -> Array:
-        """Rows of responses and their derivatives, (n, 1 + n_parameters, n_rows) in rad.
+        """Return rows of responses and their derivatives, (n, 1 + n_parameters, n_rows) in rad.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ class ModeRows:
         u = np.minimum(u, np.nextafter(self._last, 0))
         piece = u.astype(np.intp)
         powers, power_slopes = _powers(u - piece - 0.5)
-        # What was divided by, and the place, with their derivatives by the log-parameters.
+        # The divisor, and the place, with their derivatives by the log-parameters.
         scale = np.where(decayed, np.expm1(_WIDTH * self._last), scaled)
         scale_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
         place_slopes = scale_slopes / (_WIDTH * (1 + scaled))[:, None]
@@ -99,14 +99,14 @@ class ModeRows:
         np.multiply(amplitudes[..., None], powers, out=mixed[:, 0])
         np.multiply(amplitude_slopes[..., None], powers[:, None], out=mixed[:, 1:])
         mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
-        # One product a sample: the order of its sums does not depend on how many there are.
+        # One product per sample: the order of its sums does not depend on the number of samples.
         pieces = self._table[piece].reshape(count, -1, self._rows)
         rows: Array = mixed.reshape(count, 1 + parameters, -1) @ pieces
         return rows
 
 
 def _powers(place: Array) -> tuple[Array, Array]:
-    """Powers, and their derivatives, of shape (..., 1, degree + 1)."""
+    """Return powers, and their derivatives, of shape (..., 1, degree + 1)."""
     powers = np.ones((*place.shape, 1, len(_ORDERS)))
     for order in _ORDERS[1:]:
         powers[..., 0, order] = powers[..., 0, order - 1] * place

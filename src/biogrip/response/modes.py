@@ -1,10 +1,10 @@
-"""Poles and weights of the linear model, and how they change with the sample's parameters.
+"""Poles and weights of the linear model, with derivatives by the sample's parameters.
 
 A parameter with a relative imaginary part of 1e-30 carries its derivative through
-the arithmetic of the transfer function without touching the real part (complex
-step). Poles and weights are differentiated by hand, with no cancellation at either
-end. What is found for a sample does not depend, to the last bit, on which others
-are looked at with it.
+the arithmetic of the transfer function without changing the real part (complex
+step). Poles and weights are differentiated analytically, without cancellation for slow
+or fast modes. The result for a sample does not depend, to the last bit, on the other
+samples.
 
 References
 ----------
@@ -70,7 +70,7 @@ class Polynomials:
     numerator_slopes: Array
 
     def of(self, rows: NDArray[Any]) -> "Polynomials":
-        """Those of some of the samples."""
+        """Return the polynomials of some of the samples."""
         return Polynomials(
             self.denominator[rows],
             self.denominator_slopes[:, rows],
@@ -80,7 +80,7 @@ class Polynomials:
 
 
 def tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Network, int]:
-    """Networks of samples, and after them, for slopes, with each of so many parameters tilted."""
+    """Return networks of samples and, for slopes, of copies with complex-step parameters."""
     if not slopes:
         return model.network(parameters), 0
     count = parameters.shape[1]
@@ -90,18 +90,18 @@ def tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Netw
 def polynomials_of(
     gripper: Gripper, network: Network, count: int, *, symmetric: bool, inertia: bool
 ) -> Polynomials:
-    """Transfer functions of samples, and their derivatives.
+    """Compute the transfer functions of samples, and their derivatives.
 
     Parameters
     ----------
     gripper
         Its arms may differ.
     network, count
-        From `tilted`: without slopes, there are those of no parameter.
+        From `tilted`; a count of zero gives no derivatives.
     symmetric
-        Whether both arms are driven alike; decides the drives.
+        True if both arms are driven alike; determines the drives.
     inertia
-        Whether the arms have any.
+        True to include the inertia of the arms.
     """
     numerators, denominator = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia
@@ -110,7 +110,7 @@ def polynomials_of(
 
 
 def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
-    """Modes of given poles, all of a denominator's, no two of them too close."""
+    """Compute the modes of given poles: all those of a denominator, no two of them close."""
     denominator, denominator_slopes = polynomials.denominator, polynomials.denominator_slopes
     slope = slope_at_poles(denominator, rates)
     # A pole stays where the denominator is zero.
@@ -136,18 +136,18 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
 def modes_of(
     gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
 ) -> Modes:
-    """Modes of samples without inertia, all real.
+    """Compute the modes of samples without inertia, all of them real.
 
     Parameters
     ----------
     gripper, model
-        What is simulated.
+        Arms and sample model of the simulation.
     parameters : (n, n_parameters)
         All positive.
     symmetric
-        Whether both arms are driven alike; decides the drives.
+        True if both arms are driven alike; determines the drives.
     slopes
-        Whether derivatives are wanted; without, there are those of no parameter.
+        True to compute derivatives; otherwise n_parameters is zero.
     """
     network, count = tilted(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:
@@ -158,7 +158,7 @@ def modes_of(
 
 
 def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
-    """Polynomials of n samples, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
+    """Return coefficients, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
     *others, _, terms = coefficients.shape
     of_tilts = coefficients.reshape(*others, count + 1, -1, terms).swapaxes(0, -3)
     return of_tilts[0].real, of_tilts[1:].imag / _TILT
@@ -166,7 +166,7 @@ def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
 
 @cache
 def _tilts(count: int) -> ComplexArray:
-    """Factors with the sample itself in the first row, and one parameter tilted in each other."""
+    """Return factors: ones in the first row, and one complex-step parameter in each other row."""
     tilts = np.ones((count + 1, count), dtype=np.complex128)
     tilts[1:].imag = _TILT * np.eye(count)
     return tilts

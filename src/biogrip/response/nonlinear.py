@@ -48,7 +48,7 @@ STAGES = 5
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How finely the correction is computed.
+    """Discretisation and tolerance of the correction.
 
     Parameters
     ----------
@@ -59,9 +59,9 @@ class Accuracy:
     per_period
         Elements in a period of the fastest sinusoid.
     tolerance
-        Stop when a sweep changes nothing by more than this share of the peak.
+        Largest change in the last sweep, relative to the peak.
     most_sweeps
-        Give up then.
+        Limit of sweeps.
     """
 
     first_s: float
@@ -72,10 +72,10 @@ class Accuracy:
 
 
 FINE = Accuracy(first_s=1e-8, growth=1.3, per_period=8.0, tolerance=1e-13, most_sweeps=200)
-"""For one trace: below 1e-7 of the peak everywhere that was tried (see the tests)."""
+"""For one trace: the error was below 1e-7 of the peak in all tests."""
 
 COARSE = Accuracy(first_s=1e-3, growth=2.0, per_period=4.0, tolerance=1e-8, most_sweeps=30)
-"""For a population: far below what noise can tell, at a hundredth of the cost."""
+"""For a population: the error is far below the noise, at a hundredth of the cost."""
 
 
 @dataclass(frozen=True)
@@ -87,11 +87,11 @@ class Correction:
     edges_s : (n_elements + 1,)
         The mesh.
     values_rad : (n, n_arms, n_elements, STAGES + 1)
-        At the start of each element and at its nodes.
+        Rotation at the start of each element and at its nodes.
     force_N : (n, n_elements, STAGES + 1)
         Nonlinear minus linear jaw force there; after a jump of the torque, at the start.
     converged : (n,)
-        Whether the sweeps came to rest.
+        True if the sweeps converged.
     """
 
     edges_s: Array
@@ -100,7 +100,7 @@ class Correction:
     converged: np.ndarray
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
-        """Evaluate at ascending times, shape (n, n_times)."""
+        """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""
         own = self.values_rad[:, min(arm, self.values_rad.shape[1] - 1)]
         return self._interpolated(own, time_s)
 
@@ -118,9 +118,9 @@ class Correction:
 
 
 def mesh_functions(edges_s: Array, time_s: Array) -> Array:
-    """Functions of ascending times that a `Correction` is a sum of, weighted by its values.
+    """Return the basis functions whose sum, weighted by its values, is a `Correction`.
 
-    There are (n_elements * (STAGES + 1), n_times) of a mesh of (n_elements + 1,) edges.
+    For a mesh of (n_elements + 1,) edges they are (n_elements * (STAGES + 1), n_times).
     """
     functions, start = np.zeros((len(edges_s) - 1, STAGES + 1, len(time_s))), 0
     for element, on_piece in enumerate(_interpolation(edges_s, time_s)):
@@ -131,7 +131,7 @@ def mesh_functions(edges_s: Array, time_s: Array) -> Array:
 
 
 def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
-    """Of each element, its polynomials at the times within, (STAGES + 1, n_times_within)."""
+    """Return each element's polynomials at the times within, (STAGES + 1, n_times_within)."""
     cuts = np.searchsorted(time_s, edges_s[1:-1], side="left")
     starts, lengths = (
         np.repeat(of_elements, np.diff(cuts, prepend=0, append=len(time_s)))
@@ -144,7 +144,7 @@ def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
 def nonlinear_rotation(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, arm: int = LEFT
 ) -> Array:
-    """Closing rotation of an arm in rad, shape (n, n_times), at ascending times.
+    """Compute the closing rotation of an arm in rad, (n, n_times), by the nonlinear model.
 
     Raises
     ------
@@ -159,7 +159,7 @@ def nonlinear_rotation(
 def computed_correction(
     gripper: Gripper, network: Network, torque: TorqueHistory, accuracy: Accuracy
 ) -> Correction:
-    """Compute what `correction` does, and make sure that it could be.
+    """Compute `correction`, and raise an error if it has not converged.
 
     Raises
     ------
@@ -189,9 +189,9 @@ def correction(
     gripper, network, torque
         The arms, n samples, the protocol.
     accuracy
-        How finely.
+        Discretisation and tolerance.
     factors : (n,)
-        By which the torque on each sample is multiplied, if at all.
+        Factors on the torque of each sample, if any.
     """
     symmetric = is_symmetric(gripper, torque)
     arms = [gripper.left] if symmetric else [gripper.left, gripper.right]
@@ -219,7 +219,7 @@ def correction(
     peak = np.abs(linear).max(axis=(1, 2, 3))
     extra, extra_rate, loads = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     converged = np.zeros(shape[0], dtype=bool)
-    # What has come to rest stays, lest it depended on the others how often it is swept.
+    # Converged samples stay, so that their number of sweeps does not depend on the others.
     left = np.arange(shape[0])
     for _ in range(accuracy.most_sweeps):
         u = b_0 * (linear[left] + extra[left])
@@ -245,8 +245,8 @@ def correction(
 def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
     """Complete values at the nodes by those at the starts of the elements.
 
-    The force goes on as it was, but where the torque jumps; the element that follows
-    a jump is short, and what its nodes say is extended to its start.
+    The force is continuous, but for jumps of the torque. The element that follows a jump
+    is short, and its polynomial is extrapolated to its start.
     """
     starts = np.concatenate((force[:, :1, 0], force[:, :-1, -1]), axis=1)
     sets_in = np.isin(edges_s[:-1], np.concatenate((torque.time_s, torque.harmonic_time_s)))
@@ -255,7 +255,7 @@ def _from_starts(force: Array, edges_s: Array, torque: TorqueHistory) -> Array:
 
 
 def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
-    """Element edges from 0 to the end, graded towards everything that sets in."""
+    """Return element edges from 0 to the end, graded towards every change of torque."""
     jumps = np.unique(np.concatenate((torque.time_s, torque.harmonic_time_s, [torque.end_s])))
     longest = np.inf
     if len(torque.omega_rad_per_s):
@@ -263,7 +263,7 @@ def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
     edges = [0.0]
     for start, end in pairwise(jumps[jumps <= torque.end_s]):
         length, here = accuracy.first_s, start
-        # An element that would leave a sliver takes it along.
+        # The last element takes a short remainder along.
         while here + 1.5 * min(length, longest) < end:
             here += min(length, longest)
             edges.append(here)
@@ -273,7 +273,7 @@ def mesh(torque: TorqueHistory, accuracy: Accuracy) -> Array:
 
 
 def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array) -> Array:
-    """The load g of every arm, shape (n, n_arms, n_elements, STAGES)."""
+    """Compute the load g of every arm, shape (n, n_arms, n_elements, STAGES)."""
     b_0 = gripper.lever_m
     phi = rotation_of_tip(gripper, u)
     b = gripper.arm_length_m * np.sin(np.radians(gripper.reference_angle_deg) - phi)
@@ -287,7 +287,7 @@ def _load(gripper: Gripper, arms: list[Arm], tau: Array, u: Array, u_rate: Array
 
 
 class _Modes:
-    """The linear modes, ready to respond to loads given at the nodes of a mesh."""
+    """Computes the response of linear modes to loads given at the nodes of a mesh."""
 
     def __init__(self, response: StepResponse, lengths_s: Array) -> None:
         a, ones = _radau()[1], np.ones(STAGES)
@@ -303,9 +303,9 @@ class _Modes:
         self._residues = response.weights * response.rates[:, None, None, :]
 
     def respond(self, load: Array, which: IntArray) -> tuple[Array, Array]:
-        """Rotation and rate of the arms at the nodes, (n, n_arms, n_elements, STAGES) each.
+        """Compute rotations and rates of arms at nodes, (n, n_arms, n_elements, STAGES) each.
 
-        Under loads there, (n, n_drives, n_elements, STAGES), on `which` of the samples, (n,).
+        The loads there are (n, n_drives, n_elements, STAGES), on samples with indices `which`.
         """
         forced = np.einsum("nmeij,ndej->ndmei", self._gain[which], load)
         start = np.zeros(forced.shape[:4])
@@ -324,7 +324,7 @@ class _Modes:
 
 @cache
 def _radau() -> tuple[Array, Array]:
-    """Nodes c and matrix A of the Radau IIA method with `STAGES` stages."""
+    """Return nodes c and matrix A of the Radau IIA method with `STAGES` stages."""
     legendre = np.polynomial.legendre
     ends = legendre.Legendre.basis(STAGES) - legendre.Legendre.basis(STAGES - 1)
     c = 0.5 * (np.sort(ends.roots().real) + 1)
@@ -336,14 +336,14 @@ def _radau() -> tuple[Array, Array]:
 
 
 def _nodes(edges: Array) -> Array:
-    """Collocation nodes, shape (n_elements, STAGES)."""
+    """Return collocation nodes, shape (n_elements, STAGES)."""
     nodes = edges[:-1, None] + np.diff(edges)[:, None] * _radau()[0]
     nodes[:, -1] = edges[1:]
     return nodes
 
 
 def _polynomials(points: Array, x: Array) -> Array:
-    """Values at x of the polynomials that are 1 at one of some points, (n_points, n)."""
+    """Evaluate the Lagrange polynomials of points at x, (n_points, n)."""
     values = np.ones((len(points), len(x)))
     for i, point in enumerate(points):
         for other in np.delete(points, i):

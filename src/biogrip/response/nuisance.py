@@ -1,9 +1,9 @@
-"""What an instrument adds to the rotation besides noise: an offset, and a drift linear in time.
+"""Nuisance functions that an instrument adds to the rotation: an offset and a linear drift.
 
-Both enter linearly, so they are not searched for. Whatever a trace shares with
-their span is taken out of trace and responses alike, and comes back as the
-best offset and drift once the sample is known (variable projection) [1]_. What is
-known to enter, but only with about some amplitude, is taken out in part [2]_.
+Their amplitudes are linear parameters and are not searched: their span is projected out
+of trace and responses alike, which is the same as fitting them (variable projection)
+[1]_. Functions whose amplitude has a known standard deviation are projected out in part
+[2]_.
 
 References
 ----------
@@ -11,14 +11,14 @@ References
    squares problems whose variables separate, SIAM Journal on Numerical Analysis 10 (1973),
    413-432.
 .. [2] A. M. Stuart, Inverse problems: a Bayesian perspective, Acta Numerica 19 (2010), 451-559:
-   what is uncertain with a Gaussian prior, marginalised, is a part of the noise.
+   a marginalised Gaussian uncertainty is a part of the noise.
 """
 
 import numpy as np
 
 from biogrip.arrays import Array
 
-# Squared norm of a function that is taken out whole, but for rounding.
+# Least squared norm of a function that is projected out completely, up to rounding.
 _WHOLE = 1 - 1e-9
 
 
@@ -30,7 +30,7 @@ def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
     time_s : (n_times,)
         Sampling times.
     offset, drift
-        Which of them the instrument may have.
+        True if the instrument may have it.
 
     Returns
     -------
@@ -43,31 +43,31 @@ def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
 
 
 def without(basis: Array, rows: Array) -> Array:
-    """Take the span of a basis out of functions of time, shape (..., n_times)."""
+    """Project the span of a basis out of functions of time, shape (..., n_times)."""
     return rows - (rows @ basis.T) @ basis if len(basis) else rows
 
 
 def within(basis: Array, rows: Array) -> Array:
-    """Return what `without` takes out."""
+    """Project functions of time, shape (..., n_times), on the span of a basis."""
     return (rows @ basis.T) @ basis
 
 
 def with_uncertain(basis: Array, functions: Array) -> Array:
-    """Add to a basis what a trace may contain with an amplitude of about one standard deviation.
+    """Add functions of random amplitude to a basis, so that `without` whitens noise with them.
 
     Parameters
     ----------
     basis : (n_basis, n_times)
         Orthonormal functions, of any amplitude.
     functions : (n_functions, n_times)
-        For each, a standard deviation's worth of it, in units of that of white noise.
+        Functions times the standard deviation of their amplitude, over that of white noise.
 
     Returns
     -------
     (n_basis + n_functions, n_times)
-        Orthogonal functions of norm one and less. What `without` leaves of noise and functions
-        together is white noise: with singular values s of the functions, the part
-        1 - 1/sqrt(1 + s^2) of each direction is taken out.
+        Orthogonal functions of norm one and less. With singular values s of the functions,
+        `without` removes the part 1 - 1/sqrt(1 + s^2) of each direction, so that the sum of
+        noise and functions becomes white noise.
     """
     rest = without(basis, functions)
     _, sizes, directions = np.linalg.svd(rest, full_matrices=False)
@@ -76,5 +76,5 @@ def with_uncertain(basis: Array, functions: Array) -> Array:
 
 
 def taken_out(basis: Array) -> int:
-    """Count the functions of a basis that are taken out whole."""
+    """Count the functions of a basis that are projected out completely."""
     return int(np.count_nonzero(np.sum(np.square(basis), axis=1) > _WHOLE))

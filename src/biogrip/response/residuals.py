@@ -21,9 +21,9 @@ from biogrip.response.sensitivity import (
     rotation_and_sensitivity,
 )
 
-# Numbers in the rows that are formed at once, and samples whose corrections are.
+# Most numbers in the rows that are formed at once, and samples whose corrections are.
 _AT_ONCE, _FEW_AT_ONCE = 100_000, 50
-# Samples of a trace whose derivatives are formed: more would be as much memory as all else.
+# Most readings whose derivatives are formed: more would double the memory.
 _SAMPLES_AT_ONCE = 100_000
 
 
@@ -33,14 +33,14 @@ class Residuals:
     Parameters
     ----------
     gripper, model, torque
-        What is simulated.
+        Arms, sample model and protocol of the simulation.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
     condensed
-        Of the protocol and the sampling times; knows whether the model is nonlinear, whether arms
-        ring, what the instrument may have added and the colour of the noise. Residuals are white.
+        Rows for the protocol and the sampling times; specify nonlinearity, inertia, nuisance
+        functions and noise model. Residuals are white.
     noise_rad
-        Standard deviation of the noise; by default what neighbouring samples suggest.
+        Standard deviation of the noise; by default estimated from neighbouring readings.
     """
 
     def __init__(
@@ -68,40 +68,40 @@ class Residuals:
             noise_rad = noise_of(self._rotation_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
-        # Rows of the trace without arms that ring, and with: of all models the same.
+        # Rows of the trace by inclusion of inertia, shared by all models.
         self._trace_rows: dict[bool, Array] = {}
 
     @property
     def free(self) -> int:
-        """Degrees of freedom that samples and nuisance leave to parameters and noise."""
+        """Number of readings minus that of nuisance functions of free amplitude."""
         return self.samples - taken_out(self._condensed.nuisance)
 
     def grip(self, log_parameters: Array) -> Grip:
-        """Force of the jaws on a sample, with which they press it or would have to pull."""
+        """Return the force with which the jaws press a sample or would have to pull it."""
         network = self.model.network(np.exp(log_parameters))
         return grip_of(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
     def of_model(self, model: SampleModel) -> "Residuals":
-        """Return the same trace for another model."""
+        """Return the residuals of another model against the same trace."""
         other = copy(self)
         other.model = model
         return other
 
     def without_inertia(self) -> "Residuals":
-        """Return the same trace for arms that do not ring."""
+        """Return the residuals of the same trace with the inertia of the arms neglected."""
         other = copy(self)
         other._condensed = self._condensed.without_ringing
         other.__dict__.pop("_trace_at_nodes", None)
         return other
 
     def with_freedom(self, freedom: float) -> "Residuals":
-        """Return the same, the colour of the noise known with so many degrees of freedom."""
+        """Return a copy whose noise model is known with so many degrees of freedom."""
         other = copy(self)
         other._freedom = freedom
         return other
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Residuals, (n_samples,), and their derivatives, (n_parameters, n_samples), in rad.
+        """Return residuals, (n_samples,), and derivatives, (n_parameters, n_samples), in rad.
 
         Parameters
         ----------
@@ -113,7 +113,7 @@ class Residuals:
         return residual, self._condensed.cleared(sensitivity)
 
     def gradient(self, log_parameters: Array) -> tuple[Array, float]:
-        """Sum the squares of the residuals, and find where they grow, to all digits.
+        """Compute the gradient of half the sum of squares, and the misfit, to all digits.
 
         Returns
         -------
@@ -125,7 +125,7 @@ class Residuals:
         if self.samples <= _SAMPLES_AT_ONCE:
             residual, sensitivity = self(log_parameters)
             return sensitivity @ residual, self._rms(residual)
-        # So many are dense: their sums are those of nodes, to rounding.
+        # So many readings are dense: their sums equal those of nodes up to rounding.
         condensed, (seen, rest) = self._condensed, self._trace_at_nodes
         rotation, sensitivity = self._simulated(log_parameters, condensed.dense.time_s)
         rows = condensed.rows_of_nodes(np.vstack((rotation, sensitivity)))
@@ -137,7 +137,7 @@ class Residuals:
         return self._condensed.dense.rows_of_samples(self._rotation_rad)
 
     def left(self, log_parameters: Array) -> Array:
-        """Residuals alone, (n_samples,) in rad."""
+        """Return the residuals alone, (n_samples,) in rad."""
         simulated = (
             self._simulated(log_parameters, self._time_s[some])[0]
             for some in parts(self.samples, _SAMPLES_AT_ONCE)
@@ -150,36 +150,36 @@ class Residuals:
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom with which the colour of the noise is known."""
+        """Degrees of freedom with which the noise model is known."""
         return self._freedom
 
     @property
     def coloured(self) -> bool:
-        """Whether noise was not white, and has been made so."""
+        """True if residuals are whitened, as the noise is autocorrelated."""
         return self._condensed.coloured
 
     @property
     def condensed_trace(self) -> Array:
-        """Rows of the trace, (n_rows,) in rad."""
+        """Condensed rows of the trace, (n_rows,) in rad."""
         if self.inertia not in self._trace_rows:
             self._trace_rows[self.inertia] = self._condensed.of_trace(self._rotation_rad)
         return self._trace_rows[self.inertia]
 
     def condensed_responses(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Rows of the responses of many samples.
+        """Compute condensed rows of the responses of many samples.
 
         Parameters
         ----------
         log_parameters : (n, n_parameters)
             Natural logarithms of the parameters in SI units.
         slopes
-            Whether the derivatives are wanted.
+            True to compute derivatives.
 
         Returns
         -------
         (n, 1 + n_parameters, n_rows)
             In rad; first the response, then its derivatives by the log-parameters. NaN where
-            the nonlinear model has no answer. Without `slopes`, (n, 1, n_rows).
+            the nonlinear model has no response. Without `slopes`, (n, 1, n_rows).
         """
         rows = self.condensed_linear(log_parameters, slopes=slopes)
         if self.nonlinear:
@@ -187,7 +187,7 @@ class Residuals:
         return rows
 
     def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Of `condensed_responses`, what the linear model gives."""
+        """Compute the part of `condensed_responses` that the linear model gives."""
         gripper, model, torque = self._gripper, self.model, self._torque
         parameters, condensed = np.exp(log_parameters), self._condensed
         if not condensed.reduced:
@@ -200,8 +200,8 @@ class Residuals:
         return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Of `condensed_responses`, what the nonlinear model has over the linear one."""
-        # As many modes at once, about.
+        """Compute the nonlinear minus the linear part of `condensed_responses`."""
+        # About as many modes at once for either kind of model.
         few = _FEW_AT_ONCE // 10 if self.model.power_law else _FEW_AT_ONCE
         every = (log_parameters[some] for some in parts(len(log_parameters), few))
         return np.concatenate([self._corrections(some, slopes) for some in every])
@@ -216,13 +216,13 @@ class Residuals:
             values = values.reshape(len(log_parameters), -1, len(condensed.time_s))
             return condensed.rows(differences(values))
         values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
-        # One product a sample: the order of its sums does not depend on how many there are.
+        # One product per sample: the order of its sums does not depend on the number of samples.
         shape = len(log_parameters), -1, len(condensed.of_corrections)
         rows: Array = differences(values.reshape(shape)) @ condensed.of_corrections
         return rows
 
     def condensed_misfit(self, parameters: Array) -> Array:
-        """RMS misfit of a population, (n,) in rad; a sample's does not depend on the others.
+        """Compute RMS misfits of a population, (n,) in rad, each independent of the others.
 
         Parameters
         ----------
@@ -239,18 +239,18 @@ class Residuals:
 
     @property
     def inertia(self) -> bool:
-        """Whether the arms ring."""
+        """True if the inertia of the arms is included."""
         return self._condensed.ringing_s > 0
 
     @property
     def plain(self) -> bool:
-        """Whether the model is linear, arms do not ring, and white noise alone is added."""
+        """True for the linear model without inertia, nuisance functions and whitening."""
         condensed = self._condensed
         bare = not (condensed.coloured or len(condensed.nuisance))
         return bare and not (self.nonlinear or self.inertia)
 
     def shares_responses(self, other: "Residuals") -> bool:
-        """Whether only the trace, and its noise, tell this from others."""
+        """Return True if `other` differs in its trace and noise only, so that responses agree."""
         alike = type(self) is type(other) and self._condensed is other._condensed
         return alike and (self._gripper, self.model) == (other._gripper, other.model)
 
@@ -267,10 +267,10 @@ class Residuals:
 
 
 def noise_of(rotation_rad: Array) -> float:
-    """Standard deviation of white noise on a smooth trace, about, without a model of the trace.
+    """Estimate the standard deviation of white noise on a smooth trace without a model.
 
-    From the median of second differences, in which neither slopes nor the jumps
-    of a protocol show. For a trace without noise, next to nothing.
+    The median of second differences is used, on which slopes and jumps of a protocol have
+    next to no effect. Of a trace without noise it is tiny.
     """
     second = np.abs(np.diff(rotation_rad, 2))
     # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.

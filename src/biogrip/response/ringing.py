@@ -1,10 +1,10 @@
 """Responses with the arms' inertia: rotations of whole populations, and exact derivatives.
 
-With inertia poles may be complex. Of two that are conjugate one is kept, its weight
-doubled, and the real part taken at the end. At critical damping two poles meet, and
-their weights and slopes grow beyond all bounds while the response does not. There the
-sum of the residues of those that are close is taken by the trapezoidal rule along a
-circle C around them,
+With inertia poles may be complex. Of a conjugate pair one is kept with its weight
+doubled, and the real part is taken at the end. At critical damping two poles meet, and
+their weights and slopes diverge while the response does not. There the sum of the
+residues of close poles is computed by the trapezoidal rule along a circle C around
+them,
 
     sum_j Res_j = (1 / 2 pi i) integral over C of N(s) (e^(s t) - 1) / (s D(s)) ds
 
@@ -32,15 +32,15 @@ from biogrip.response.roots import roots
 
 # Weights of poles a relative gap g apart lose eps/g^2, their slopes eps/g^3.
 _CLOSE = 0.05
-# The rule's error falls with the ratio of radius and distance to that power.
+# Number of nodes: the rule's error falls with the ratio of radius and distance to this power.
 _NODES = 48
-# Of a circle that has room, radius over room.
+# Radius of a circle relative to its room, if poles leave it so much.
 _WIDE = 0.4
-# Of a circle's radius, to the distance of its centre from growing rates.
+# Largest radius relative to the distance of the centre from growing rates.
 _DECAYING = 0.7
 # A root's imaginary part below this is rounding.
 _REAL = 1e-9
-# Numbers formed at once: what fits a processor's cache is faster than all at once.
+# Numbers formed at once, which should fit a processor's cache.
 _AT_ONCE = 400_000
 
 
@@ -53,18 +53,18 @@ def ringing_responses(
     *,
     slopes: bool = True,
 ) -> Array:
-    """Rotation of the left arm with inertia, and its derivatives d phi / d log p.
+    """Compute the rotation of the left arm with inertia, and its derivatives d phi / d log p.
 
     Parameters
     ----------
     gripper, model, torque
-        What is simulated; the linear model (corrected eqs. 4-6).
+        Arms, sample model and protocol of the simulation; the linear model (corrected eqs. 4-6).
     time_s : (n_times,)
         Ascending, from 0.
     parameters : (n, n_parameters)
         All positive.
     slopes
-        Whether the derivatives are wanted.
+        True to compute derivatives.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def ringing_responses(
 
 
 def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
-    """Weigh what modes do under a protocol, and what that changes with the log-parameters.
+    """Compute responses of modes to a protocol, and their derivatives by the log-parameters.
 
     Returns
     -------
@@ -105,7 +105,7 @@ def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
         both = both.reshape(-1, 2 * drives * m, len(time_s))
         if np.iscomplexobj(both):
             both = np.concatenate((both.real, both.imag), axis=1)
-        # One product a sample: the order of its sums does not depend on how many there are.
+        # One product per sample: the order of its sums does not depend on the number of samples.
         rows[some] = mixing[some] @ both
     return rows
 
@@ -118,19 +118,19 @@ def ringing_modes(
     symmetric: bool,
     slopes: bool = True,
 ) -> Iterator[tuple[IntArray, tuple[Modes, ...]]]:
-    """Modes with inertia, of samples that have as many complex ones together.
+    """Yield modes with inertia, grouping samples with equal numbers of complex modes.
 
     Parameters
     ----------
     gripper, model, parameters, symmetric, slopes
-        As of `modes_of`.
+        As in `modes_of`.
 
     Yields
     ------
     rows : (n_rows,)
-        Which samples.
+        Indices of the samples.
     modes
-        Real ones, and complex ones with weights of which the real part is meant.
+        Real modes, and complex modes of whose responses the real part is meant.
     """
     network, count = tilted(model, parameters, slopes=slopes)
     polynomials = polynomials_of(gripper, network, count, symmetric=symmetric, inertia=True)
@@ -145,7 +145,7 @@ def ringing_modes(
     pairs = np.where(close, -1, np.sum(side == 1, axis=1))
     for count in sorted({*pairs.tolist()} - {-1}):
         rows = np.flatnonzero(pairs == count)
-        # Of one row, numpy multiplies complex numbers by other instructions, with other last bits.
+        # For a single row, numpy's complex product uses other instructions, with other last bits.
         some = rows if len(rows) > 1 else rows.repeat(2)
         reals = rates.shape[1] - 2 * count
         rates[rows, :reals] = rates[rows, :reals].real
@@ -160,12 +160,12 @@ def ringing_modes(
 
 
 def _part(modes: Modes, rows: int, which: slice) -> Modes:
-    """Some of the modes of the first samples."""
+    """Return some of the modes of the first samples."""
     return Modes(*(of[:rows, ..., which] for of in modes))
 
 
 def _closest(rates: ComplexArray, size: Array) -> Array:
-    """Smallest distance between two poles of each sample, over their size, (n,)."""
+    """Return the smallest relative distance between two poles of each sample, (n,)."""
     distance = np.abs(rates[:, :, None] - rates[:, None, :]) / size[:, None, :]
     distance[:, range(rates.shape[1]), range(rates.shape[1])] = np.inf
     nearest: Array = distance.min(axis=(1, 2))
@@ -173,13 +173,13 @@ def _closest(rates: ComplexArray, size: Array) -> Array:
 
 
 def _circled(polynomials: Polynomials, rates: ComplexArray) -> Modes:
-    """Modes of one sample, of which some are so close that nodes stand for them."""
+    """Compute the modes of one sample, with nodes of a circle in place of close modes."""
     plain = modes_at(polynomials, rates[None])
     left, parts = list(range(len(rates))), []
     while left:
         first = min(left, key=lambda j: _next(rates, j))
         inside, centre, radius = _circle(rates, first)
-        # A larger circle may hold poles that a smaller one stands for: none counts twice.
+        # A larger circle may contain poles that a smaller one has replaced: none counts twice.
         if inside and set(inside) <= set(left):
             parts.append(_nodes(polynomials, centre, radius))
         else:
@@ -190,14 +190,14 @@ def _circled(polynomials: Polynomials, rates: ComplexArray) -> Modes:
 
 
 def _next(rates: ComplexArray, j: int) -> float:
-    """Relative distance of a pole to its nearest neighbour."""
+    """Return the relative distance of a pole to its nearest neighbour."""
     return float(np.min(np.abs(np.delete(rates, j) - rates[j]), initial=np.inf) / abs(rates[j]))
 
 
 def _circle(rates: ComplexArray, j: int) -> tuple[list[int], complex, float]:
-    """Poles that are close to one, centre and radius of a circle with no others near it.
+    """Find the poles close to one, and centre and radius of a circle with no others near it.
 
-    None if no circle has twice the radius of theirs and half the distance of all others.
+    There are none if no circle has twice the radius of theirs and half the distance of all others.
     """
     near = np.argsort(np.abs(rates - rates[j]), kind="stable")
     best: tuple[float, list[int], complex, float] = (4.0, [], 0j, 0.0)
@@ -209,7 +209,7 @@ def _circle(rates: ComplexArray, j: int) -> tuple[list[int], complex, float]:
         extent = float(np.max(np.abs(rates[inside] - centre)))
         others = np.abs(np.delete(rates, inside) - centre)
         room = min(float(np.min(others, initial=np.inf)), abs(centre), -centre.real * _DECAYING)
-        # On a small circle the denominator is a difference of what is much larger.
+        # On a small circle the denominator suffers from cancellation.
         extent = max(extent, _WIDE**2 * room)
         if room / extent > best[0]:
             best = room / extent, inside.tolist(), centre, float(np.sqrt(room * extent))
@@ -217,7 +217,7 @@ def _circle(rates: ComplexArray, j: int) -> tuple[list[int], complex, float]:
 
 
 def _nodes(polynomials: Polynomials, centre: complex, radius: float) -> Modes:
-    """Nodes of a circle as modes that do not move, of weights N(s) (s - centre) / (n s D(s))."""
+    """Return nodes of a circle as modes of fixed rates, weights N(s) (s - centre) / (n s D(s))."""
     turn = radius * np.exp(2j * np.pi * (np.arange(_NODES) + 0.5) / _NODES)
     s = (centre + turn)[None]
     denominator = evaluate(polynomials.denominator, s)

@@ -1,4 +1,4 @@
-"""Roots of polynomials whose coefficients are all positive, a batch at a time.
+"""Root finding for polynomials with positive coefficients, many at once.
 
 The coefficients of a gripper-sample polynomial span dozens of decades. An
 eigenvalue solver loses the small roots there; iterating on the polynomial
@@ -38,7 +38,7 @@ _SWEEPS = 80
 
 
 def real_quadratic_roots(coefficients: Array) -> Array:
-    """Roots of a + b s + c s^2 that are known to be real and negative.
+    """Compute the roots of a + b s + c s^2 that are known to be real and negative.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def real_quadratic_roots(coefficients: Array) -> Array:
 
 
 def roots(coefficients: Array) -> ComplexArray:
-    """Roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
+    """Compute the roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def swept(
     Parameters
     ----------
     z : (n, n_points)
-        Starting points; of each function as many as it has zeros.
+        Starts; for each function as many as it has zeros.
     newton_step
-        Function over derivative at such points.
+        Function divided by its derivative at such points.
     between : (n, n_points, n_points), optional
-        What the distance of two points is more than their difference, if points are counted from
-        origins of their own.
+        Differences of the points' origins, if each point is counted from an origin of its own:
+        they are added to differences of points.
 
     Returns
     -------
@@ -113,7 +113,7 @@ def swept(
                 distance = between + distance
             repulsion = np.where(off_diagonal, 1 / distance, 0).sum(axis=2)
             step = newton / (1 - newton * repulsion)
-            # What is done rests, so that its last bits do not depend on the other functions.
+            # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
             z = z - step
             if np.all(settled):
@@ -154,7 +154,7 @@ def _newton_step(coefficients: Array, z: ComplexArray) -> ComplexArray:
 
 
 def _newton_polygon_radii(coefficients: Array) -> Array:
-    """Moduli of the roots as the slopes of the concave hull of log(coefficient) over power."""
+    """Return moduli of the roots: slopes of the concave hull of log(coefficient) over power."""
     degree = coefficients.shape[1] - 1
     log = np.log(coefficients)
     hull = log.copy()

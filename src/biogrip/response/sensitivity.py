@@ -1,9 +1,9 @@
-"""How the rotation changes with the sample's parameters: exact derivatives, no differences.
+"""Rotation and its exact derivatives by the logarithms of the sample's parameters.
 
 Modes with their derivatives (`biogrip.response.modes`, with inertia
-`biogrip.response.ringing`) are superposed in time, and differentiated by hand there, too.
-Derivatives of what is small beside them are differences: of what the nonlinear model adds,
-and of the ring of arms on a springpot.
+`biogrip.response.ringing`) are superposed in time by analytic formulas. Only small terms have
+finite differences as derivatives: the correction of the nonlinear model, and the ringing of
+arms on a springpot.
 """
 
 import numpy as np
@@ -17,11 +17,11 @@ from biogrip.response.modes import modes_of
 from biogrip.response.nonlinear import COARSE, Correction, correction
 from biogrip.response.ringing import responses_of, ringing_responses
 
-# The correction is of second order itself; its derivative by differences is good to 1e-6 of that.
+# The correction is of second order; differences give its derivative to 1e-6 of that.
 _STEP = 1e-3
-# A ring has hundreds of radians behind it when it ends: its differences have to be closer.
+# Ringing runs through hundreds of radians before it ends: its differences need a shorter step.
 _RINGING_STEP = 1e-5
-# Samples at a time: of a million, what the modes do would take more memory than all else.
+# Times at once: the responses of modes at a million times would take too much memory.
 _AT_ONCE = 100_000
 
 
@@ -35,10 +35,10 @@ def linear_responses(
     inertia: bool,
     slopes: bool = True,
 ) -> Array:
-    """Rotations of the left arm on the linear model, and their derivatives d phi / d log p.
+    """Compute rotations of the left arm in the linear model, and derivatives d phi / d log p.
 
-    Arguments and result are those of `ringing_responses`; `inertia` tells whether the arms ring,
-    for milliseconds after every change of the torque.
+    Arguments and result are those of `ringing_responses`; `inertia` is True to include the
+    inertia of the arms.
     """
     if inertia and not model.power_law:
         return ringing_responses(gripper, model, torque, time_s, parameters, slopes=slopes)
@@ -64,25 +64,25 @@ def rotation_and_sensitivity(
     nonlinear: bool = False,
     inertia: bool = False,
 ) -> tuple[Array, Array]:
-    """Rotation of the left arm, and its derivatives d phi / d log p.
+    """Compute the rotation of the left arm, and its derivatives d phi / d log p.
 
     Parameters
     ----------
     gripper, model, torque
-        What is simulated.
+        Arms, sample model and protocol of the simulation.
     time_s : (n_times,)
         Ascending times.
     parameters : (n_parameters,)
         All positive.
     nonlinear
-        Whether to add what corrected eqs. (1)-(3) have over the linear model.
+        True to solve corrected eqs. (1)-(3) instead of the linear model.
     inertia
-        Whether the arms ring, for milliseconds after every change of the torque.
+        True to include the inertia of the arms.
 
     Returns
     -------
     rotation : (n_times,)
-        In rad; NaN where the nonlinear model has no answer.
+        In rad; NaN where the nonlinear model has no response.
     sensitivity : (n_parameters, n_times)
         In rad.
     """
@@ -105,23 +105,23 @@ def corrections(
     *,
     slopes: bool = True,
 ) -> Correction:
-    """Nonlinear minus linear rotation of samples, and of those that are a little different.
+    """Compute nonlinear minus linear rotation of samples and of slightly changed samples.
 
-    Arguments are as of `ringing_responses`.
+    Arguments are those of `ringing_responses`.
 
     Returns
     -------
     Correction
-        Of n (1 + 2 n_parameters) samples, see `differences`; without `slopes`, of n.
+        That of n (1 + 2 n_parameters) samples, see `differences`; without `slopes`, of n.
     """
     around = _around(parameters, _STEP, slopes=slopes)
     return correction(gripper, model.network(around), torque, COARSE)
 
 
 def differences(values: Array, step: float = _STEP) -> Array:
-    """What `corrections` found, (n, 1 + 2 n_parameters, ...), and derivatives by log-parameters.
+    """Turn values of `corrections`, (n, 1 + 2 n_parameters, ...), into values and derivatives.
 
-    The step is that of the log-parameters.
+    The derivatives are central differences with `step` in the log-parameters.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def differences(values: Array, step: float = _STEP) -> Array:
 
 
 def _around(parameters: Array, step: float, *, slopes: bool) -> Array:
-    """Each sample, and for slopes those with a parameter a little larger and smaller in turn."""
+    """Return each sample and, for slopes, copies with each parameter in turn changed by a step."""
     count = parameters.shape[1]
     steps = np.zeros((1, count))
     if slopes:

@@ -1,4 +1,4 @@
-"""The rotation that a sample gives, and its shortening, by whichever model is asked for."""
+"""Simulated rotation and shortening of samples, with the linear or the nonlinear model."""
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
@@ -12,16 +12,16 @@ from biogrip.response.nonlinear import nonlinear_rotation
 def simulated_rotation(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
 ) -> Array:
-    """Closing rotation of the left arm in rad, inertia included, shape (n, n_times).
+    """Simulate the closing rotation of the left arm in rad, with inertia, shape (n, n_times).
 
     Parameters
     ----------
     gripper, network, torque
-        What is simulated.
+        Arms, samples and protocol of the simulation.
     time_s : (n_times,)
         Ascending times.
     nonlinear
-        Whether to solve corrected eqs. (1)-(3), or the linear (4)-(6).
+        True to solve corrected eqs. (1)-(3), False to solve the linear (4)-(6).
 
     Raises
     ------
@@ -36,7 +36,7 @@ def simulated_rotation(
 def simulated_shortening(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
 ) -> Array:
-    """Shortening of the sample in m, shape (n, n_times); arguments as of `simulated_rotation`."""
+    """Simulate the shortening of samples in m, (n, n_times); see `simulated_rotation`."""
     if nonlinear:
         turns = (nonlinear_rotation(gripper, network, torque, time_s, a) for a in (LEFT, RIGHT))
         left, right = (displacement_of_tip(gripper, turn) for turn in turns)

@@ -1,7 +1,7 @@
-"""The linear model's modes where there are two: equal arms, one Maxwell branch, no inertia.
+"""Closed form of the linear model with two modes: equal arms, one Maxwell branch, no inertia.
 
-What `biogrip.response.linear` has for any arms and branches, written out, because a
-population of a genetic algorithm is small and most of its time goes into calls.
+This special case of `biogrip.response.linear` is written out for speed: populations of the
+genetic algorithm are small, and most time goes into calls.
 """
 
 import numpy as np
@@ -13,14 +13,14 @@ from biogrip.response.roots import real_quadratic_roots
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
-    """Response of an arm to a unit step of both torques.
+    """Compute the response of an arm to a unit step of both torques.
 
     Parameters
     ----------
     arm
-        Either of them.
+        Either of the equal arms.
     lever_m
-        Of both.
+        Lever of both arms.
     network
         n samples with one branch each.
 
@@ -31,7 +31,7 @@ def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array,
     rates : (2, n)
         Exponents in 1/s.
     weights : (2, n)
-        Of the exponentials, in rad per N m.
+        Weights of the exponentials, in rad per N m.
     """
     k_p, c_p, c = network.k_p, network.c_p, network.c[:, 0]
     relaxation_s = c / network.k[:, 0]

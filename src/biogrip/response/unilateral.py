@@ -1,16 +1,14 @@
-"""The linear model of jaws that press but do not pull: they leave the sample, and meet it again.
+"""The linear model with unilateral contact: jaws press but do not pull, and may lose contact.
 
-While the jaws touch, arms and sample are one system without inertia. Where the force
-between them reaches zero they part: each arm turns against its own hinge, and the
-sample recovers by itself from the state it was left in, with no force on it. Where
-the gap between them closes they touch again. Every stretch is solved exactly; only
-the instants at which one ends are sought.
+While the jaws touch, arms and sample are one system without inertia. When the contact
+force reaches zero, contact is lost: each arm turns against its own hinge, and the
+unloaded sample recovers. When the gap closes, jaws and sample touch again. Every
+stretch is solved exactly; only the instants at which it ends are found numerically.
 
-Parting and meeting leave every state as it is. That they do not follow at once upon
-one another is a matter of the equations: what the force would be if they touched and
-the rate at which the gap would open if they did not are proportional, with opposite
-signs. The sample may shift between the jaws freely, so that only the sum of both
-tips' displacements counts.
+All states are continuous when contact changes. Loss and contact do not alternate at
+once, for the force that contact would give and the rate at which the gap would open
+without contact are proportional, with opposite signs. The sample may shift between the
+jaws freely, so that only the sum of both tips' displacements counts.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,15 +24,15 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.free_recovery import Forcing, Modes, Motion, smooth_pieces
 
 _MOST_EVENTS = 100_000
-# Shares of the largest force and closing: less is rounding, and no contact lost or found.
+# Share of the largest force and closing below which a change of contact is rounding.
 _NOTHING = 1e-11
-# The grid on which an end of a stretch is looked for: growth, points a period, points at once.
+# Grid on which the end of a stretch is bracketed: growth, points per period, points at once.
 _GROWTH, _PER_PERIOD, _AT_ONCE = 1.1, 48, 2048
 
 
 @dataclass(frozen=True)
 class UnilateralResponse:
-    """What gripper and sample do when the jaws can only press.
+    """Response of gripper and sample with unilateral contact.
 
     Parameters
     ----------
@@ -43,13 +41,13 @@ class UnilateralResponse:
     jaw_force_N : (n_times,)
         Never negative.
     touching : (n_times,)
-        Whether the jaws touch the sample.
+        True while the jaws touch the sample.
     shortening_m : (n_times,)
-        Of the sample.
+        Shortening of the sample.
     dampers_m : (n_branches, n_times)
         Shortening of the damper of each Maxwell branch.
     parted_s, met_s
-        When contact was lost, and when it was regained.
+        Times at which contact was lost, and at which it was regained.
     """
 
     rotation_rad: Array
@@ -63,10 +61,10 @@ class UnilateralResponse:
 
 @dataclass(frozen=True)
 class _Stretch:
-    """From an instant on, with or without contact, as functions of the time since then.
+    """Solution from an instant on, with or without contact, as functions of the time since then.
 
-    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers; the margin is what
-    may not become negative: the force, or the gap.
+    The state, (n, n_times), is phi_2, phi_4, delta and the branches' dampers. The margin, which
+    may not become negative, is the contact force or the gap.
     """
 
     state: Callable[[Array], Array]
@@ -75,7 +73,7 @@ class _Stretch:
 
 
 class _System:
-    """Gripper and one sample, touching or apart."""
+    """Equations of motion of gripper and one sample, in contact or apart."""
 
     def __init__(self, gripper: Gripper, network: Network) -> None:
         self._b = b = gripper.lever_m
@@ -98,7 +96,7 @@ class _System:
             rest = np.sqrt(k)[:, None] * np.hstack((np.ones((n, 1)), -np.eye(n)))
             self._sample = Modes(np.vstack((own, rest)), np.diag(np.sqrt(np.append(c_p, c))))
         elif n:
-            # Without a damper of its own the sample is where its springs balance.
+            # Without a parallel damper the sample's springs are in equilibrium.
             whole = k_p + k.sum()
             self._balance = k / whole
             apart = np.tile(self._balance, (n, 1))
@@ -109,7 +107,7 @@ class _System:
         self._branches = n
 
     def in_contact(self, state: Array, torque: Forcing) -> _Stretch:
-        """Go on from a state while the jaws touch."""
+        """Solve from a state on, in contact."""
         motion = self._touching.follow(np.delete(state, 2), torque)
 
         def states(elapsed_s: Array) -> Array:
@@ -123,7 +121,7 @@ class _System:
         return _Stretch(states, force, float(self._touching.rates.max()))
 
     def apart(self, state: Array, torque: Forcing) -> _Stretch:
-        """Go on from a state while they do not."""
+        """Solve from a state on, without contact."""
         arms = self._arms.follow(state[:2], torque)
         sample = self._recovery(state)
 
@@ -137,7 +135,7 @@ class _System:
         return _Stretch(states, gap, float(self._arms.rates.max()))
 
     def _recovery(self, state: Array) -> Callable[[Array], Array]:
-        """Shortening and dampers of the sample alone."""
+        """Solve for the shortening and dampers of the unloaded sample."""
         if not self._has_damper and not self._branches:
             return lambda elapsed_s: np.zeros((1, len(elapsed_s)))
         nothing = Forcing(np.zeros((0, 3)), np.zeros(0), np.zeros((0, 0), complex))
@@ -156,19 +154,19 @@ class _System:
 def unilateral_response(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
 ) -> UnilateralResponse:
-    """Simulate one sample between jaws that do not pull, without inertia.
+    """Simulate one sample in unilateral contact with the jaws, without inertia.
 
     Parameters
     ----------
     gripper, network, torque
-        What is simulated; the first sample of the network.
+        Arms, samples and protocol of the simulation; the first sample of the network.
     time_s : (n_times,)
         Ascending times; at the instant of a step: what follows it.
 
     Raises
     ------
     BiogripError
-        If the jaws leave the sample too often to be followed.
+        If contact is lost too often.
     """
     system = _System(gripper, network)
     pieces = smooth_pieces(torque)
@@ -218,7 +216,7 @@ def unilateral_response(
 def _scales(
     gripper: Gripper, torque: TorqueHistory, pieces: list[tuple[float, float, Forcing]]
 ) -> tuple[float, float]:
-    """Largest torque, and the softer arm's stiffness."""
+    """Return the largest torque, and the softer arm's stiffness."""
     instants = np.concatenate(
         [start + length * np.linspace(0, 1, 65)[:-1] for start, length, _ in pieces]
     )
@@ -227,7 +225,7 @@ def _scales(
 
 
 def _coupled(arms: Array, shared: float) -> Array:
-    """Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T, without a difference."""
+    """Return the Cholesky factor of diag(c_2, c_4) + w (1, 1)(1, 1)^T without cancellation."""
     c_2, c_4 = arms
     first = np.sqrt(c_2 + shared)
     return np.array([[first, 0], [shared / first, np.sqrt(c_4 + shared * c_2 / (c_2 + shared))]])
@@ -240,7 +238,7 @@ def _block(corner: Array, diagonal: Array) -> Array:
 
 
 def _grid(fastest_per_s: float, omega_rad_per_s: Array, length_s: float) -> Iterator[Array]:
-    """Times from 0 to the end: ever further apart, but never further than part of a period."""
+    """Yield times from 0 to the end, at growing distances up to a part of a period."""
     longest = np.inf
     if len(omega_rad_per_s):
         longest = 2 * np.pi / float(omega_rad_per_s.max()) / _PER_PERIOD
@@ -262,7 +260,7 @@ def _grid(fastest_per_s: float, omega_rad_per_s: Array, length_s: float) -> Iter
 def _first_below(
     margin: Callable[[Array], Array], grid: Iterator[Array], least: float
 ) -> float | None:
-    """First time at which a margin falls to zero, on its way to clearly below."""
+    """Find the first time at which a margin falls to zero and then clearly below."""
     before, last = None, 0.0
     for times in grid:
         values = margin(times)

@@ -1,11 +1,10 @@
-"""Noise that remembers made white: sums of squares that weigh each frequency by its noise.
+"""Whitening of autocorrelated noise, for generalised least squares.
 
-The correlation of noise is taken for a sum of exponentials of the time between two
-samples, beside what is white: one of any relaxation time, and a geometric series of
-them, which is 1/f noise. Its matrix C then has a Cholesky factor L that is found, and
-solved with, in as many steps as there are samples [1]_. What is L^-1 r of residuals r
-is as large as r in the mean, and white, so that all that fits and judges white
-residuals does it with these: generalised least squares [2]_.
+The autocorrelation is that of white noise plus exponentials of the time between two
+readings (Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric
+series of them for 1/f noise. The Cholesky factor L of its matrix C is computed, and
+solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and on
+average as large as r. Least squares of these are generalised least squares [2]_.
 
 References
 ----------
@@ -25,21 +24,21 @@ from biogrip.experiment.noise_parts import flicker_rates
 from biogrip.response.nuisance import with_uncertain, without
 
 MOST_SAMPLES = 50_000
-"""In coloured noise each sample weighs differently, and few cannot stand for all."""
+"""Most readings with autocorrelated noise, which cannot be condensed to fewer nodes."""
 
 
 @dataclass(frozen=True)
 class Colour:
-    """What share of a noise's variance remembers, and how long.
+    """Autocorrelation model of noise, by the shares of its components in the variance.
 
     Parameters
     ----------
     relaxing
-        Share that is forgotten with one time constant.
+        Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling.
     time_s
-        That time.
+        Its relaxation time.
     flicker
-        Share of spectrum 1/f. The rest is white.
+        Share of noise with spectrum 1/f. The rest is white.
     """
 
     relaxing: float
@@ -48,29 +47,29 @@ class Colour:
 
     @property
     def white(self) -> float:
-        """Share that is white."""
+        """Share of white noise."""
         return 1 - self.relaxing - self.flicker
 
 
 class Whitening:
-    """Turns noise of a colour into white noise of the same variance, and takes a nuisance out.
+    """Transforms autocorrelated into white noise of the same variance, and projects nuisance out.
 
     Parameters
     ----------
     time_s : (n_samples,)
         Ascending sampling times.
     colour
-        Of the noise.
+        Autocorrelation model of the noise.
     nuisance : (n_functions, n_samples)
-        What the instrument may have added, with whatever amplitude.
+        Functions that the instrument may have added, with any amplitude.
     uncertain : (n_functions, n_samples), optional
-        What is added with an amplitude that is known about, see `with_uncertain`.
+        Functions added with a random amplitude, see `with_uncertain`.
     """
 
     def __init__(
         self, time_s: Array, colour: Colour, nuisance: Array, uncertain: Array | None = None
     ) -> None:
-        # Celerite has taken a tenth of a second to load.
+        # Imported here, for loading celerite takes a tenth of a second.
         from celerite2 import driver
 
         flicker = flicker_rates(time_s)
@@ -80,19 +79,19 @@ class Whitening:
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
         self._left = np.tile(shares, (len(time_s), 1))
         ones = np.ones_like(self._left)
-        # What is white keeps the matrix regular, however little of it there is.
+        # White noise keeps the matrix regular, however small its share.
         diagonal = np.full(len(time_s), 1.0)
         pivots, self._right = driver.factor(
             self._time_s, rates, diagonal, self._left, ones, np.empty_like(diagonal), ones.copy()
         )
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))
-        """Of the correlation matrix."""
+        """Logarithm of the determinant of the correlation matrix."""
         self.nuisance = self._white(nuisance, uncertain)
-        """What is taken out, white, (n_functions, n_samples)."""
+        """Whitened functions that are projected out, (n_functions, n_samples)."""
 
     def __call__(self, rows: Array) -> Array:
-        """Whiten functions of time, shape (..., n_samples), and take the nuisance out."""
+        """Whiten functions of time, shape (..., n_samples), and project the nuisance out."""
         return without(self.nuisance, self._whitened(rows))
 
     def _white(self, nuisance: Array, uncertain: Array | None) -> Array:
