@@ -21,7 +21,8 @@ from biogrip.identify.problem import Problem
 from biogrip.identify.settling import settled
 
 # Changes of the springs' logarithms in additional starts for ringing arms.
-_BESIDE = np.array([-0.3, -0.25, -0.2, -0.15, -0.1, -0.05, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
+_STIFFER = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
+_BESIDE = np.concatenate((-_STIFFER[::-1], _STIFFER))
 
 FINISHED = 4
 """Number of a trace's best rough fits that are continued to the optimum."""
