@@ -12,6 +12,7 @@ from pkgutil import iter_modules
 from tempfile import TemporaryDirectory
 from unittest import mock
 
+import numpy as np
 import pandas as pd
 
 import biogrip.products.files
@@ -31,6 +32,7 @@ VERDICTS = PUBLISHED / "tables"
 NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
+ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
 CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
@@ -39,6 +41,13 @@ _CASES = {
     "liquid_drop_1": "drop 1",
     "liquid_drop_2": "drop 2",
 }
+_JUDGED_IN_NOISE = (
+    (("liquid_drop_1", "liquid_drop_2"), "c + c_p"),
+    (("liquid_drop_2",), "k"),
+    (("liquid_drop_1",), "k"),
+    (("endothelial_cell",), "k"),
+    (("endothelial_cell",), "k_p"),
+)
 _WAYS = {
     "the study's, repeated": "the paper's, repeated",
     "each designed after those before": "the paper's, then each designed after those before",
@@ -130,7 +139,50 @@ def simulated_noise() -> str:
     )
 
 
+def errors_by_noise() -> str:
+    """What the genetic algorithm errs by, and the bound, at several levels of noise."""
+    table = pd.read_csv(ROBUSTNESS)
+    rows = []
+    for cases, quantity in _JUDGED_IN_NOISE:
+        ours = table[table["case"].isin(cases) & (table["quantity"] == quantity)]
+        levels = [(level, ours[ours["row"] == level]) for level in (2, 10, 40)]
+        name = _CASES[cases[0]] if len(cases) == 1 else "both drops"
+        rows.append(
+            {"quantity": f"{quantity} of {name}"}
+            | {
+                f"{level:g} % noise": f"{_range(of['error_genetic'], '.2g', ' %')} "
+                f"({_range(of['bound_percent'], '.2g', ' %')})"
+                for level, of in levels
+            }
+            | {
+                "runs near a noise of 2 %": _range(
+                    100 * levels[0][1]["near_noise_genetic"], ".0f", " %"
+                )
+            }
+        )
+    return _table(iter(rows))
+
+
+def methods_compared() -> str:
+    """How often each method reaches the optimum, and with how many responses."""
+    table = pd.read_csv(VERDICTS / "methods.csv")
+    return _table(
+        {"method": method}
+        | {
+            f"optimum, {_CASES[row['case']]}": f"{100 * row['optimum_share']:.0f} %"
+            for row in rows.to_dict("records")
+        }
+        | {
+            "near the noise": _range(100 * rows["near_noise_share"], ".0f", " %"),
+            "median responses": _range(rows["median_evaluations"], ".0f"),
+        }
+        for method, rows in table.groupby("method", sort=False)
+    )
+
+
 def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
+    if np.isinf(values.max()):
+        return "none"
     low, high = format(values.min(), how), format(values.max(), how)
     return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
 
@@ -289,7 +341,11 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
-    ROOT / "docs" / "identifiability.md": {"noise": simulated_noise},
+    ROOT / "docs" / "identifiability.md": {
+        "noise": simulated_noise,
+        "methods": methods_compared,
+    },
+    ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
     ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
     ROOT / "docs" / "design.md": {"sequential": experiments_needed, "shapes": bounds_by_shape},
     ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
