@@ -23,7 +23,7 @@ rule all:
 
 rule all_maps:
     input:
-        [file for file in ALL_FILES if "/robustness_" in file],
+        [file for file in ALL_FILES if Path(file).name.startswith("robustness_")],
     message:
         "All maps of robustness"
 

@@ -83,3 +83,16 @@ def test_every_page_has_a_picture_and_says_what_it_shows(document: str | Path) -
     assert pictures
     assert all(len(shown) > 10 for shown, _ in pictures)
     assert all((ROOT / document).parent.joinpath(path).is_file() for _, path in pictures)
+
+
+def test_the_documentation_stays_short() -> None:
+    """In words; comments, and marks of tables, are none."""
+    docs = ROOT / "docs"
+    pages = [file for file in docs.rglob("*.md") if docs / "reference" not in file.parents]
+    assert _words(ROOT / "README.md") <= 900
+    assert sum(map(_words, pages)) <= 18_000
+
+
+def _words(document: Path) -> int:
+    text = re.sub(r"<!--.*?-->", "", document.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return sum(bool(re.search(r"\w", word)) for word in text.split())

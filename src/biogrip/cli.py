@@ -226,7 +226,8 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
         "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
     )
     command.add_argument(
-        "--noise-model", help="white, or coloured: intervals that allow for noise that remembers"
+        "--noise-model",
+        help="white, or coloured: intervals that allow for autocorrelated noise and outliers",
     )
     command.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"

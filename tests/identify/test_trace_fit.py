@@ -16,6 +16,7 @@ from biogrip.identify.multi_start import identify_from
 from biogrip.identify.outliers import FAR, outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
+from biogrip.identify.uncertain_gripper import gripper_functions
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.simulation import simulated_rotation
 from biogrip.response.whitening import MOST_SAMPLES
@@ -51,6 +52,30 @@ def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
     assert fit.colour is None
     assert not fit.outliers.any()
     assert fit.notes() == []
+
+
+def test_an_uncertain_inertia_changes_the_ring_where_one_shows() -> None:
+    """By half of what twice the uncertainty does; without a ring, nothing of it is fitted."""
+    arm = POSED.gripper.left
+    unsure = 0.05 * arm.inertia_kgm2
+    posed = replace(POSED, uncertainty={"left": {"inertia_kgm2": unsure}})
+    times, parameters = np.arange(1, 400) * 1e-6, np.exp(TRUTH)
+    assert gripper_functions(posed, times, parameters, inertia=False).shape == (0, len(times))
+    (row,) = gripper_functions(posed, times, parameters, inertia=True)
+    heavy, light = (
+        simulated_rotation(
+            replace(
+                POSED.gripper, left=replace(arm, inertia_kgm2=arm.inertia_kgm2 + sign * unsure)
+            ),
+            POSED.searched.network(parameters),
+            POSED.torque,
+            times,
+            nonlinear=False,
+        )[0]
+        for sign in (1, -1)
+    )
+    np.testing.assert_allclose(row, 0.5 * (heavy - light), rtol=1e-9)
+    assert np.max(np.abs(row)) > 1e-3 * np.max(np.abs(heavy))
 
 
 def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
@@ -110,7 +135,7 @@ def test_noise_is_found_and_said() -> None:
     assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
     assert np.count_nonzero(fit.outliers & (away == 0)) <= 1
     model, outliers = fit.notes()
-    assert "remembered for some" in model
+    assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
     other = posed.for_model(fit.problem, POSED.searched)

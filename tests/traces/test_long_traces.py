@@ -35,7 +35,10 @@ def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
 
 
 def wanted(path: Path) -> Wanted:
-    return Wanted(path, MODEL.name, ReadAs(), None)
+    """A trace to be identified with its own model alone: others take as much memory, and time."""
+    config = path.with_suffix(".yaml")
+    config.write_text("model_selection: {models: []}\n")
+    return Wanted(path, MODEL.name, ReadAs(), config)
 
 
 def judged(path: Path, time_s: Array, rotation_rad: Array) -> dict[str, Any]:

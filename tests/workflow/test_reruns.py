@@ -88,7 +88,7 @@ def test_a_setting_reruns_what_depends_on_it(
     assert run.status == 0, run.output
     stages = {"target", "measurement", "identification"}
     assert {stage for stage in stages if run.jobs(stage)} == rerun
-    assert run.jobs("case_tables") == 1
+    assert run.jobs("errors") == 1
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,8 @@ def test_a_setting_reruns_nothing_that_does_not_use_it(
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: Path) -> None:
     run = snakemake(tiny_copy, "-n", config=TINY + NEW_CASE)
     assert run.status == 0, run.output
-    together = {"tables", "model_difference", "study_figures", "contact_loss", "report"}
+    together = {"all_errors", "tables", "model_difference", "study_figures", "contact_loss"}
+    together.add("report")
     jobs = run.all_jobs()
     assert together <= set(jobs)
     assert {rule: jobs.pop(rule) for rule in together} == dict.fromkeys(together, 1)
@@ -133,14 +134,14 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: P
     batches = {"measurement": 2, "identification": 4, "model_fits": 2, "intervals": 2}
     assert {rule: jobs.pop(rule) for rule in batches} == batches
     once = {"target", "identifications", "all_times", "all_intervals", "all_model_fits"}
-    once |= {"judgement", "expectation", "case_tables", "case_figures"}
+    once |= {"judgement", "expectation", "errors", "verdicts", "case_figures"}
     assert jobs == dict.fromkeys(once, 1)
 
 
 def test_a_setting_of_the_genetic_algorithm_leaves_other_methods_alone(tiny_copy: Path) -> None:
     run = snakemake(tiny_copy, "-n", config=replaced(TINY, "population: 20", "population: 22"))
     assert run.status == 0, run.output
-    assert (run.jobs("identification"), run.jobs("case_tables")) == (2, 1)
+    assert (run.jobs("identification"), run.jobs("errors")) == (2, 1)
     assert not {"target", "measurement", "model_fits", "intervals"} & set(run.all_jobs())
     assert run.output.count(" by genetic, ") == run.output.count("Identifying ") == 2
 
@@ -181,7 +182,7 @@ def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree
     with edited(tree.root / "src/biogrip/identify/genetic.py"):
         run = tree.run("-n", config=TINY)
     jobs = run.all_jobs()
-    assert (jobs["identification"], jobs["identifications"], jobs["case_tables"]) == (2, 1, 1)
+    assert (jobs["identification"], jobs["identifications"], jobs["errors"]) == (2, 1, 1)
     untouched = {"target", "measurement", "judgement", "expectation", "model_fits", "intervals"}
     untouched |= {"model_difference"}
     assert not untouched & set(jobs)

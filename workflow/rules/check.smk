@@ -27,7 +27,7 @@ rule check:
         published=PUBLISHED / "tables",
     log:
         "results/logs/check.log",
-    threads: workflow.cores
+    threads: lambda _: workflow.cores
     params:
         snakefile=workflow.main_snakefile,
         config="",
@@ -42,7 +42,7 @@ rule check:
 rule publish:
     log:
         "results/logs/publish.log",
-    threads: workflow.cores
+    threads: lambda _: workflow.cores
     params:
         snakefile=workflow.main_snakefile,
         config="",
@@ -62,7 +62,7 @@ for overlay, (configs, target, only) in OVERLAYS.items():
             f"publish_{overlay}"
         log:
             f"results/logs/publish_{overlay}.log",
-        threads: workflow.cores
+        threads: lambda _: workflow.cores
         params:
             snakefile=workflow.main_snakefile,
             config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",

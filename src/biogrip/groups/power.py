@@ -17,6 +17,7 @@ References
    chapter 2.
 """
 
+from bisect import bisect_left
 from math import ceil, exp, hypot, log, sqrt
 
 import numpy as np
@@ -74,11 +75,11 @@ def cells_needed(
     most = FEWEST_CELLS
     while power(ratio, most, spread, error, confidence) < wanted:
         most *= 2
-    return next(
-        cells
-        for cells in range(max(FEWEST_CELLS, most // 2), most + 1)
-        if power(ratio, cells, spread, error, confidence) >= wanted
-    )
+    allowed = range(max(FEWEST_CELLS, most // 2), most + 1)
+    # More cells show more.
+    return allowed[
+        bisect_left(allowed, wanted, key=lambda n: power(ratio, n, spread, error, confidence))
+    ]
 
 
 def ratio_seen(

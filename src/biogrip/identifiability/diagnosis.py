@@ -110,8 +110,8 @@ def _pulling(grip: Grip, last_s: float) -> Iterator[str]:
     """Doubt samples at which the jaws would have to pull what was identified."""
     if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
         yield (
-            f"With the best fit {grip.words()}. Unless it sticks to them they left it there, and "
-            "what follows is no response of the sample: identify it from the samples before."
+            f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
+            "there: fit only the samples before that."
         )
 
 

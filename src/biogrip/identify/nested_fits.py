@@ -7,10 +7,11 @@ richer model's search range, it is the richer model's answer: with elements that
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.experiment.nesting import as_richer, contained_in, different_in
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.answer import Identification, silent
@@ -21,6 +22,8 @@ from biogrip.identify.problem import Problem
 # What an element that has vanished is over the usual one, or under it, where a fit starts; and
 # of an experiment, the time in which what is usual relaxes.
 _AWAY, _SHARE = (3.0, 100.0), 0.1
+# Relaxation times at which a further branch starts, over the usual one.
+_FURTHER = 0.03, 1.0, 30.0
 # Models that are the same in other parameters may lead one another on.
 _MOST_ROUNDS = 3
 
@@ -65,6 +68,7 @@ def fit_models(
             points += [near[name][trace]] if near and name in near else []
             further.append(np.reshape(points, (-1, len(problem.low))))
         found[name] = identify_many(problems[name], settings, rngs[name], silent, further)
+        _add_branches(name, problems[name], found)
         done()
     _fit_again(problems, found)
     _take_simpler(problems, found)
@@ -88,6 +92,39 @@ def _of_contained(
                 usual = _usual(kinds[index], kinds, parameters, ~gone, longest_s)
                 start[index] = usual * times if parameters[index] else usual / times
             yield start
+
+
+def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answers]) -> None:
+    """Take, in place, better fits that start with one branch more than a fit of fewer branches.
+
+    Beside strong branches a weak one takes long to show: rough fits would not tell.
+    """
+    branches = CANDIDATES[name].model.free_branches
+    fewer = [
+        inner
+        for inner in contained_in(name, found)
+        if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
+    ]
+    for inner, (trace, problem) in product(fewer, enumerate(problems)):
+        parameters = as_richer(name, inner, found[inner][trace].parameters)
+        for start in _with_a_branch_more(parameters, np.array(branches)):
+            again = found[name][trace].at(fit_from([problem], _within(start, problem)))
+            if _digits(again) < _digits(found[name][trace]):
+                found[name][trace] = again
+
+
+def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array]:
+    """Starting points with a branch in the place of one that is gone, weaker than the others."""
+    sizes = parameters[branches]
+    there = np.all((sizes > 0) & np.isfinite(sizes), axis=1)
+    gone = np.flatnonzero(sizes[:, 0] == 0)
+    if not (len(gone) and there.any()):
+        return
+    k, c = np.exp(np.mean(np.log(sizes[there]), axis=0)) / _AWAY[0]
+    for times in _FURTHER:
+        start = parameters.copy()
+        start[branches[gone[-1]]] = k, times * c
+        yield start
 
 
 def _usual(kind: str, kinds: Array, values: Array, there: BoolArray, longest_s: float) -> float:

@@ -72,11 +72,11 @@ class TraceFit:
         colour, left_out = self.colour, int(np.count_nonzero(self.outliers))
         parts = [f"{_percent(colour.white)} white"]
         if colour.relaxing >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.relaxing)} remembered for some {colour.time_s:.2g} s")
+            parts.append(f"{_percent(colour.relaxing)} correlated over some {colour.time_s:.2g} s")
         if colour.flicker >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.flicker)} of spectrum 1/f")
+            parts.append(f"{_percent(colour.flicker)} 1/f")
         said = [
-            f"Noise model: {', '.join(parts)} of the variance; an offset and a drift of the "
+            f"Noise model: of the variance {', '.join(parts)}; an offset and a drift of the "
             "instrument are fitted along, and the intervals allow for all of it."
         ]
         if left_out:
@@ -151,7 +151,8 @@ def _in_turn(
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
-        uncertain = gripper_functions(posed, time_s, found.parameters)
+        inertia = problem.residuals.inertia
+        uncertain = gripper_functions(posed, time_s, found.parameters, inertia=inertia)
         left = problem.residuals.free - len(found.parameters)
         noise_rad = posed.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
         before: Colour | None = colour
@@ -160,7 +161,6 @@ def _in_turn(
             directions = np.vstack((sensitivity, nuisance, uncertain))
             likelihood = ColourLikelihood(time_s, residual, directions)
             colour = likelihood.best(near=before)
-        inertia = problem.residuals.inertia
         condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, inertia=inertia)
         problem = posed.of(time_s, rotation_rad, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))

@@ -1,6 +1,6 @@
 """What a gripper that is only known about may do to a rotation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +10,12 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.simulation import simulated_rotation
 
-# A slow sample is not rung by its arms: their inertia is left out of what is fitted.
-_SEEN = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
+_WITHOUT_RING = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
 
 
-def gripper_functions(posed: CaseProblem, time_s: Array, parameters: Array) -> Array:
+def gripper_functions(
+    posed: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
+) -> Array:
     """Return what a standard uncertainty of each property of the arms adds to a rotation.
 
     Half of the difference between the property a standard uncertainty above and below its
@@ -28,6 +29,8 @@ def gripper_functions(posed: CaseProblem, time_s: Array, parameters: Array) -> A
         Ascending times.
     parameters : (n_parameters,)
         Those that are searched, SI units.
+    inertia
+        True if the trace shows the arms ringing.
 
     Returns
     -------
@@ -45,18 +48,19 @@ def gripper_functions(posed: CaseProblem, time_s: Array, parameters: Array) -> A
         rows = simulated_rotation(gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear)
         return rows[0]
 
-    pairs = _pairs(posed.gripper, posed.uncertainty)
+    properties = (*_WITHOUT_RING, "inertia_kgm2") if inertia else _WITHOUT_RING
+    pairs = _pairs(posed.gripper, posed.uncertainty, properties)
     found = [0.5 * (simulated(above) - simulated(below)) for above, below in pairs]
     return np.reshape(found, (len(found), len(time_s)))
 
 
 def _pairs(
-    gripper: Gripper, uncertainty: Mapping[str, Mapping[str, float]]
+    gripper: Gripper, uncertainty: Mapping[str, Mapping[str, float]], properties: Sequence[str]
 ) -> Iterator[tuple[Gripper, Gripper]]:
     """Two grippers for each property, one above and one below."""
     for name, known in uncertainty.items():
         arm = getattr(gripper, name)
-        for key in _SEEN:
+        for key in properties:
             if known.get(key):
                 above, below = (
                     replace(arm, **{key: getattr(arm, key) + sign * known[key]}) for sign in (1, -1)

@@ -38,7 +38,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     ]
     if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
         alone = f"{50 * (1 + found['confidence']):g} %"
-        lines.append(f"A limit that stands alone is an end of an interval with two: {alone}")
+        lines.append(f"One-sided limits hold with {alone} confidence.")
     lines += [trade["words"] for trade in found["trades"]]
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")

@@ -41,7 +41,6 @@ ALL_ERRORS = table(
     stem="results/tables/errors",
     item="errors",
     caption=CAPTION,
-    sheet="tables",
     settings=lambda study: study.near_noise_tolerance,
     reads={"tables": of_cases(ERRORS.writes["csv"], lambda study: study.cases)},
 )

@@ -149,6 +149,5 @@ ERRORS = table(
     settings=settings,
     reads={"identifications": the(PATH)},
     cases=lambda study: study.cases,
-    sheet="case_tables",
     weight=EVALUATION,
 )

@@ -107,6 +107,5 @@ VERDICTS = table(
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,
-    sheet="case_tables",
     weight=JUDGEMENT,
 )
