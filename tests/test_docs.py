@@ -40,6 +40,13 @@ def test_no_mark_cuts_a_cell(document: Path) -> None:
     assert [mark for mark in marks if re.search(r"(?<!\\)\|", mark)] == []
 
 
+@pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
+def test_no_mark_ends_a_paragraph(document: Path) -> None:
+    """As a comment does that begins a line, on GitHub."""
+    lines = document.read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if line.lstrip().startswith("<!--=")] == []
+
+
 def test_the_readme_leads_to_every_document() -> None:
     """Directly or by another: else nobody would find it, nor the test above its links."""
     found, left = set(), ["README.md"]
