@@ -176,7 +176,7 @@ def test_a_slow_camera_is_asked_for_what_it_can_tell(
     promised = {name: percent for name, _, percent in lines}
     assert promised.pop("c_p") == "none"
     for place in (said.getvalue(), (tmp_path / "out.html").read_text()):
-        assert "with readings at 20 Hz no torque that was tried tells it: c_p" in place
+        assert "no torque that was tried determines it with readings at 20 Hz: c_p" in place
     # That c_p may be anything costs them little, and of plausible samples theirs is the worst.
     known = replace(case.problem, fixed={"c_p": 0.02})
     for quantity, bound in bounds_percent(known, case.noise, case.parameters, times)[:3]:

@@ -494,7 +494,7 @@ def test_the_chosen_model_is_held_against_others(
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (["--output", "x.json"], "--output: is of one trace"),
+        (["--output", "x.json"], "--output: only for one trace"),
         (["--report", "no/such/out.html"], "cannot be written"),
         (["--report", "theirs.html"], "biogrip did not write it"),
         (["--report", "x.html", "--csv", "x.html"], "to be written twice"),

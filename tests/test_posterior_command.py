@@ -61,7 +61,7 @@ def test_a_prior_and_the_evidence(trace: Path, capsys: pytest.CaptureFixture[str
         assert words in said
     text = page.read_text()
     assert "k log-normal, median 1, spread 0.02" in text
-    assert "The posterior: every parameter alone, and against each other" in text
+    assert "Posterior: marginals and pairs of parameters" in text
     samples = trace.with_name("drop.identified.parquet")
     assert f"{samples}" in said
     names = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m"]

@@ -64,7 +64,7 @@ def test_it_says_so_in_a_line_and_leaves_nothing(
     assert run.returncode == 128 + number
     assert run.stdout == "said before\n"
     how = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}[number]
-    assert run.stderr == f"biogrip: {how}; nothing was written by halves.\n"
+    assert run.stderr == f"biogrip: {how}; no file was left half-written.\n"
     assert list(tmp_path.iterdir()) == []
 
 

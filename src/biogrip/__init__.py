@@ -1,6 +1,6 @@
-"""How well a MEMS microgripper identifies the viscoelastic parameters of a cell.
+"""Identification of viscoelastic parameters of cells with a MEMS microgripper: a study.
 
-What a notebook needs stands in `biogrip.library`, and can be had from here::
+`biogrip.library` has the functions for notebooks, which can also be imported from here::
 
     import biogrip
 
@@ -20,9 +20,9 @@ _LIBRARY = frozenset(
 
 
 def __getattr__(name: str) -> object:
-    # Jobs import this package hundreds of times, and the library never.
+    # Imported lazily: jobs import this package hundreds of times without the library.
     if name in _LIBRARY:
-        # Nor anything else, before it can be stopped without a stack.
+        # Imported here, after the handlers of signals are installed.
         from importlib import import_module
 
         return getattr(import_module("biogrip.library"), name)

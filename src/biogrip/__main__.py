@@ -1,4 +1,4 @@
-"""The ``biogrip`` command as a process of its own, which can be stopped while it loads."""
+"""The ``biogrip`` command as a process, stoppable while it loads."""
 
 import sys
 
@@ -7,7 +7,7 @@ from biogrip.terminal import open_closed_streams
 
 
 def main() -> int:
-    """Run the command line of this process; return its exit status."""
+    """Run the command line of this process, and return its exit status."""
     open_closed_streams()
     end_when_stopped()
     import atexit
@@ -15,7 +15,7 @@ def main() -> int:
 
     from biogrip.cli import main as command
 
-    # A fifth of a short job's time would go into looking for cycles when the process ends.
+    # Skip garbage collection at exit, a fifth of a short job's time.
     atexit.register(gc.freeze)
     return command()
 

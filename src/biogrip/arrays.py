@@ -1,4 +1,4 @@
-"""The array types that the library's signatures speak of, and the parts of long arrays."""
+"""Array types for signatures, and slicing of long arrays."""
 
 from collections.abc import Iterator
 from typing import TypeAlias
@@ -13,5 +13,5 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 
 
 def parts(count: int, at_once: int) -> Iterator[slice]:
-    """Divide so many items into parts of no more than can be looked at at once."""
+    """Yield slices that divide `count` items into parts of at most `at_once`."""
     return (slice(start, start + at_once) for start in range(0, count, at_once))

@@ -20,23 +20,23 @@ if TYPE_CHECKING:
 RESULTS = Path("results")
 _SHOWN = 200
 
-# Imports stay inside their command: a job pays only for what it uses.
+# Imports are inside the commands, so that jobs import only what they use.
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; return its exit status."""
+    """Run the command line, and return its exit status."""
     given = sys.argv[1:] if arguments is None else list(arguments)
     parser = _parser()
     if given[:1] == ["run"] and not {"-h", "--help"} & set(given):
-        # What follows is for Snakemake to read.
+        # All other arguments are for Snakemake.
         options = parser.parse_args(given[:1])
         options.rest = given[1:]
     else:
         options = parser.parse_args(given)
-    # Matrices are small: BLAS' threads, started when NumPy is loaded, cost more than they bring.
+    # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # What a person writes elsewhere is theirs to replace.
+        # Protect only files inside a study's results.
         with watched(_refuse_others) if options.recorded else nullcontext():
             options.command(options)
             sys.stdout.flush()
@@ -44,11 +44,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
         return 1
     except BrokenPipeError:
-        # Whoever was reading has gone. Python would say so once more on its way out.
+        # The reader has closed the pipe. Python would report that again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 128 + signal.SIGPIPE
     except OSError as error:
-        # What only the system knows of a path: no permission, too long a name, ...
+        # Errors of the operating system: no permission, a name too long, ...
         place = "" if error.filename is None else f"{visible(error.filename)[:_SHOWN]}: "
         print(f"biogrip: {place}{error.strerror or error}.", file=sys.stderr)
         return 1
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse_others(path: Path, scratch: Path) -> None:
-    """Refuse to replace what the study has no record of; Snakemake has removed what it has."""
+    """Refuse to replace files without a record; Snakemake has removed those that have one."""
     if os.path.lexists(path):
         from biogrip.running.manifest import Manifest
         from biogrip.running.wholeness import refuse_others
@@ -65,10 +65,10 @@ def _refuse_others(path: Path, scratch: Path) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Says what is wrong with a command so that a terminal obeys nothing that was typed."""
+    """Argument parser whose error messages are safe to print on a terminal."""
 
     def error(self, message: str) -> NoReturn:
-        """Refuse a command."""
+        """Print a usage error and exit."""
         super().error(visible_lines(message))
 
 
@@ -92,22 +92,24 @@ def _parser() -> argparse.ArgumentParser:
     _groups_parser(commands)
     _design_parser(commands)
 
-    text = "make something of the study that was last run here, as its jobs do"
+    text = "make products of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
     make.set_defaults(command=_make, recorded=True)
-    make.add_argument("products", nargs="+", metavar="PRODUCT", help="what, e.g. errors")
+    make.add_argument(
+        "products", nargs="+", metavar="PRODUCT", help="name of a product, e.g. errors"
+    )
     for name, text in (
-        ("case", "of which case"),
-        ("method", "by which method"),
-        ("batch", "of which seeds, e.g. seeds_0-49"),
-        ("sweep", "of which sweep"),
-        ("seed", "of which seed"),
+        ("case", "name of the case"),
+        ("method", "name of the method"),
+        ("batch", "batch of seeds, e.g. seeds_0-49"),
+        ("sweep", "name of the sweep"),
+        ("seed", "number of the seed"),
     ):
         make.add_argument(f"--{name}", help=text)
     make.add_argument("--made-for", help=argparse.SUPPRESS)
 
     for name, command, text in (
-        ("verify", _verify, "read all results and hold them against their record"),
+        ("verify", _verify, "compare all results with their record"),
         ("clean", _clean, "remove the results of a study, and nothing else"),
     ):
         parser_of = commands.add_parser(name, help=text, description=text)
@@ -127,7 +129,7 @@ def _parser() -> argparse.ArgumentParser:
     publish.set_defaults(command=_publish)
     publish.add_argument("results", type=Path, help="results of a finished study")
     publish.add_argument("published", type=Path, help="folder to publish in")
-    publish.add_argument("--only", default="*", help="those with such names, e.g. readings*")
+    publish.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
 
     compare = commands.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
@@ -145,12 +147,12 @@ def _identify_parser(stages: Any) -> None:
     )
     _trace_options(identify)
     identify.add_argument(
-        "--posterior", action="store_true", help="sample the posterior, too: some seconds a trace"
+        "--posterior", action="store_true", help="also sample the posterior: some seconds per trace"
     )
     identify.add_argument(
-        "--report", type=Path, metavar="PAGE", help="HTML file: all of it on a page, with figures"
+        "--report", type=Path, metavar="PAGE", help="HTML page with all results and figures"
     )
-    identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file: a row a trace")
+    identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, one row per trace")
     identify.add_argument(
         "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
     )
@@ -161,14 +163,16 @@ def _groups_parser(stages: Any) -> None:
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
     groups.add_argument(
-        "table", type=Path, help="CSV file with the columns file, cell and group, a line a trace"
+        "table",
+        type=Path,
+        help="CSV file with the columns file, cell and group, one line per trace",
     )
     _trace_options(groups)
     groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
 
 
 def _design_parser(stages: Any) -> None:
-    text = "find the torque, and when to look, with which every parameter shows"
+    text = "design torque and sampling times that determine every parameter"
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design, noise_model=None)
     design.add_argument(
@@ -179,7 +183,7 @@ def _design_parser(stages: Any) -> None:
         help="YAML file with a block `design`, laid over the default study",
     )
     design.add_argument(
-        "--case", action="append", default=[], help="for which case [all with such a block]"
+        "--case", action="append", default=[], help="name of a case [all with such a block]"
     )
     design.add_argument(
         "--after",
@@ -188,15 +192,15 @@ def _design_parser(stages: Any) -> None:
         action="append",
         default=[],
         metavar=("TRACE", "CONFIG"),
-        help="CSV file with a header: what to do next; recorded as the config says, or as YAML "
-        "files say that are laid over it; again for every trace of the sample",
+        help="CSV file of an earlier trace, recorded as the config says, or as YAML files merged "
+        "over it say; repeat for every trace of the sample",
     )
     _reading_options(design)
     design.add_argument(
         "--output",
         type=Path,
         default=Path("designed.yaml"),
-        help="YAML file that a study takes; a page is written beside it [%(default)s]",
+        help="config for a study, YAML; a page is written beside it [%(default)s]",
     )
     design.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
@@ -204,7 +208,7 @@ def _design_parser(stages: Any) -> None:
 
 
 def _reading_options(command: argparse.ArgumentParser) -> None:
-    """Add what tells how recorded traces are to be read, and what the instrument added."""
+    """Add options for columns, noise and nuisance terms of recorded traces."""
     command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
     command.add_argument(
         "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
@@ -217,7 +221,7 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:
-    """Add what tells how recorded traces are to be read and identified."""
+    """Add options for reading and identifying recorded traces."""
     _reading_options(command)
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
@@ -226,8 +230,7 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
         "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
     )
     command.add_argument(
-        "--noise-model",
-        help="white, or coloured: intervals that allow for autocorrelated noise and outliers",
+        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
     )
     command.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"

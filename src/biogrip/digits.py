@@ -1,4 +1,4 @@
-"""How numbers and their units are written."""
+"""Formatting and rounding of numbers, with units."""
 
 from typing import Any
 
@@ -6,21 +6,21 @@ import numpy as np
 
 from biogrip.arrays import Array
 
-# Far more than is determined, far fewer than those in which processors differ.
+# More digits than data determine, and fewer than those in which processors differ.
 _DIGITS = 5
 _MOST_DIGITS = 9
-# Fits know chi^2 to 0.001; in what lies below, processors may differ.
+# Fits are converged to 0.001 in chi^2; smaller digits may differ between processors.
 _RISE_DECIMALS = 2
 
-# Powers of ten as Python reads them: a processor may compute others.
+# Parsed by Python: powers computed by different processors may differ.
 _LARGEST = 300
 _TENS = np.array([float(f"1e{exponent}") for exponent in range(-_LARGEST, _LARGEST + 1)])
 
 
 def rounded(value: float | None) -> float | None:
-    """Return a number to five significant digits, or more where it would later round otherwise.
+    """Round to five significant digits, or more if later rounding to fewer would change.
 
-    What is 1.16499 is 1.16 to three digits, and what is 1.165 is not.
+    For example, 1.16499 is 1.16 to three digits, but 1.165 is 1.17.
     """
     if value is None:
         return None
@@ -32,7 +32,7 @@ def rounded(value: float | None) -> float | None:
 
 
 def rounded_numbers(data: Any) -> Any:
-    """Return plain data, lists and dictionaries, its numbers to five significant digits."""
+    """Round all numbers in plain data (lists and dictionaries) to five significant digits."""
     if isinstance(data, dict):
         return {key: rounded_numbers(value) for key, value in data.items()}
     if isinstance(data, list):
@@ -41,27 +41,27 @@ def rounded_numbers(data: Any) -> Any:
 
 
 def rounded_rise(rise: float) -> float:
-    """Return a rise of chi^2 to five digits, and no finer than fits know it."""
+    """Round an increase of chi^2 to five digits, and to the tolerance of fits."""
     return float(f"{round(rise, _RISE_DECIMALS):.{_DIGITS}g}") + 0.0
 
 
 def significant(values: Array, digits: int) -> Array:
-    """Round numbers to significant digits, to the same bits on every processor."""
+    """Round numbers to significant digits, with the same bits on every processor."""
     values = np.array(values, dtype=float)
     sizes = np.abs(values)
     usual = (sizes > _TENS[2 * digits]) & (sizes < _TENS[-2 * digits])
     shift = digits + _LARGEST - _TENS.searchsorted(sizes[usual], side="right")
-    # Numbers and powers of ten are whole or divided once, so that decimals come out as such.
+    # Multiply and divide by exact powers of ten only, so that decimals are the nearest floats.
     up, down = np.maximum(shift, 0) + _LARGEST, np.maximum(-shift, 0) + _LARGEST
     values[usual] = np.rint(values[usual] / _TENS[down] * _TENS[up]) / _TENS[up] * _TENS[down]
     return values
 
 
 def counted(count: object, noun: str) -> str:
-    """Return a number with what it counts, a regular noun: ``1 row``, ``3 rows``."""
+    """Return a count with a regular noun: ``1 row``, ``3 rows``."""
     return f"{count} {noun}" if str(count) == "1" else f"{count} {noun}s"
 
 
 def with_unit(name: str, unit: str) -> str:
-    """Return a quantity's name with its unit behind it, if it has one: ``k (N/m)``, ``alpha``."""
+    """Return a name followed by its unit, if it has one: ``k (N/m)``, ``alpha``."""
     return f"{name} ({unit})" if unit else name

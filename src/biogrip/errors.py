@@ -1,11 +1,11 @@
-"""The one exception whose text is meant for the person at the keyboard."""
+"""The exception for errors that users can correct."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
 
 class BiogripError(Exception):
-    """Something the user can put right; its text says what was found and what is allowed."""
+    """Error that the user can correct; its message says what was found and what is allowed."""
 
 
 def nearest(name: object, allowed: Iterable[str]) -> str:

@@ -1,4 +1,4 @@
-"""Files written whole or not at all."""
+"""Atomic writing of files."""
 
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -10,17 +10,17 @@ from biogrip.stopping import unfinished
 from biogrip.terminal import visible
 
 Watch = Callable[[Path, Path], None]
-"""Is told of a file, and of the scratch file with its contents, just before it is in place."""
+"""Callback with the final path and the scratch file, just before the file is moved in place."""
 
 Begin = Callable[[Path], None]
-"""Is told of a scratch file before it is written."""
+"""Callback with a scratch file, before it is written."""
 
 _watches: list[tuple[Watch, Begin | None]] = []
 
 
 @contextmanager
 def watched(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
-    """Have every file told to `watch` that is written whole meanwhile, and before to `begin`."""
+    """Call `watch` for every file written atomically within a context, and `begin` before."""
     both = watch, begin
     _watches.append(both)
     try:
@@ -31,7 +31,7 @@ def watched(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
 
 @contextmanager
 def written_whole(path: Path) -> Iterator[Path]:
-    """Give a scratch path beside `path`, and move it into place if all went well.
+    """Yield a scratch path beside `path`, and move it into place if no error occurs.
 
     Raises
     ------
@@ -54,32 +54,32 @@ def written_whole(path: Path) -> Iterator[Path]:
             f"{visible(path)}: cannot be written: {error.strerror or error}."
         ) from error
     finally:
-        # Why it could not be written is said already.
+        # The error is reported already.
         with suppress(OSError):
             scratch.unlink(missing_ok=True)
         unfinished.discard(str(scratch))
 
 
 def scratch_of(path: Path) -> Path:
-    """Where this process writes a file before it is whole."""
+    """Return the scratch path of a file, unique to this process."""
     return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file whole."""
+    """Write a text file atomically."""
     with written_whole(path) as scratch:
         scratch.write_text(text, encoding="utf-8", newline="\n")
 
 
 def refuse_inputs(outputs: Iterable[Path], inputs: Iterable[Path]) -> None:
-    """Refuse to write a file over one that is read, under whatever name.
+    """Refuse outputs that are also inputs, under any name.
 
     Raises
     ------
     BiogripError
-        Names the first.
+        Names the first such output.
     """
-    # Of a path that no system allows, Path.exists raises what it thinks of it.
+    # Path.exists raises for invalid paths; os.path.exists returns False.
     read = [path for path in inputs if os.path.exists(path)]
     for output in outputs:
         if os.path.exists(output) and any(output.samefile(path) for path in read):

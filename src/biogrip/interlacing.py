@@ -1,15 +1,13 @@
 """Zeros of sums of simple poles, which interlace with the poles: relaxation rates of networks.
 
-A network of springs and dampers that has Maxwell branches side by side has as many
-modes as branches, or one more, and with the branches' rates p_0 < p_1 < ... theirs
-are the zeros of
+A network of springs and dampers with parallel Maxwell branches has as many modes as branches, or
+one more. With branch rates p_0 < p_1 < ... the rates of the modes are the zeros of
 
     f(x) = sum_j w_j / (x - p_j) - b,    w_j, b > 0,
 
-one in each interval between neighbouring rates and one beyond the last. However
-many branches there are, each zero is sought on its own, as its distance from the
-nearer pole: none of the digits of a zero close to a pole is lost, and no polynomial
-is formed, whose coefficients would span hundreds of decades.
+one in each interval between neighbouring rates and one beyond the last. Each zero is found
+independently, as its distance from the nearer pole. So a zero close to a pole keeps all its
+digits, and no polynomial is needed, whose coefficients would span hundreds of decades.
 
 References
 ----------
@@ -30,7 +28,7 @@ from biogrip.arrays import Array
 
 _MOST_SWEEPS = 60
 _ROUNDING, _SHORT = 4e-16, 1e-9
-# Numbers in an array that stays in a processor's cache.
+# Numbers in an array that fits into a processor's cache.
 _FITS = 70_000
 
 
@@ -41,10 +39,10 @@ class Zeros:
     Parameters
     ----------
     pole : (n_zeros, n)
-        The pole that each zero is counted from.
+        Pole that each zero is counted from.
     beyond : (n_zeros, n)
-        How far beyond it the zero is; complex where the weights were, with the derivative
-        in its imaginary part.
+        Distance of the zero from that pole; for complex weights its derivative is the imaginary
+        part.
     """
 
     pole: Array
@@ -52,18 +50,18 @@ class Zeros:
 
     @property
     def values(self) -> NDArray[Any]:
-        """The zeros themselves, (n_zeros, n), ascending."""
+        """Zeros, (n_zeros, n), ascending."""
         return self.pole + self.beyond
 
     def from_pole(self, pole: Array) -> NDArray[Any]:
-        """Distances of the zeros from a pole of each function, (n,), without cancellation."""
+        """Return distances of zeros from a pole of each function, (n,), without cancellation."""
         return (self.pole - pole) + self.beyond
 
 
 def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
-    """Find the zeros of sum_j w_j / (x - p_j) - b.
+    """Return the zeros of sum_j w_j / (x - p_j) - b.
 
-    What is found for a function does not depend, to the last bit, on the others.
+    The zeros of a function are bitwise independent of the other functions.
 
     Parameters
     ----------
@@ -77,16 +75,16 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
     Returns
     -------
     Zeros
-        As many as poles, each above its own pole and below the next.
+        As many zeros as poles, each above its own pole and below the next.
     """
     if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
         return _real_zeros(weights, poles, level)
-    # Samples that are tilted in one parameter or another have the same real parts.
+    # Samples that differ only in which derivative they carry have the same real parts.
     real = np.concatenate((weights.real, poles, level.real[None]))
     _, first, which = np.unique(real, axis=1, return_index=True, return_inverse=True)
     of_some = _real_zeros(weights.real[:, first], poles[:, first], level.real[first])
     found = Zeros(of_some.pole[:, which], of_some.beyond[:, which])
-    # One step of Newton's method takes an infinitesimal change of the weights all the way.
+    # A Newton step is exact for an infinitesimal change of the weights.
     change = -np.imag(level) * np.ones_like(found.pole)
     slope = np.zeros_like(found.pole)
     for pole, weight in zip(poles, weights, strict=True):
@@ -99,7 +97,7 @@ def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -
 
 @dataclass(frozen=True)
 class _Sides:
-    """Sums over the poles below some points and over those above, and their derivatives."""
+    """Sums over the poles below given points and over those above, and derivatives of the sums."""
 
     below: Array
     below_slope: Array
@@ -110,8 +108,8 @@ class _Sides:
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     pole, side, gap, start = _intervals(weights, poles, level)
     found = np.empty_like(pole)
-    # Of what is still searched for: which functions; for each zero its pole, on which side of it
-    # and how far the next one is; bounds of its distance, and the distance; whether it is found.
+    # State of the search: indices of unfinished functions; for each zero its pole, the side of it,
+    # the gap to the next one, bounds of the distance, the distance, and whether it has converged.
     which = np.arange(len(level))
     search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start])
     settled = np.zeros(pole.shape, dtype=bool)
@@ -126,7 +124,7 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
         outside = ~((moved > low) & (moved < high))
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=settled)
-        # The error is squared by a step, so one that is short takes it below rounding.
+        # Convergence is quadratic, so after a short step the error is below rounding.
         settled |= np.abs(moved - at) <= _SHORT * moved
         at[:] = found[:, which] = moved
         left_over = ~np.all(settled, axis=0)
@@ -139,9 +137,9 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
 
 
 def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array, Array, Array]:
-    """Nearest pole of each zero, the side of it, the way to the next, and where to begin."""
+    """Return for each zero the nearest pole, the side of it, the gap to the next, and a start."""
     gaps = np.diff(poles, axis=0)
-    # The sign at the middle of a gap tells which end the zero is nearer to.
+    # The sign at the middle of a gap tells which pole the zero is nearer to.
     middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
     value = middle.below + middle.above - level
     pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
@@ -149,26 +147,26 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     side[:-1], gap[:-1] = np.where(value > 0, -1.0, 1.0), gaps
     guess = _between(value, middle.below_slope, middle.above_slope, side[:-1], gaps, 0.5 * gaps)
     start[:-1] = np.where((guess > 0) & (guess < 0.5 * gaps), guess, 0.25 * gaps)
-    # No further than the last pole by itself, or all poles at zero, would have the last zero.
+    # Lower bounds of the last zero: with the last pole only, and with all poles at zero.
     start[-1] = np.maximum(weights[-1], sum(weights) - level * poles[-1]) / level
     return pole, side, gap, start
 
 
 def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
-    """Sum up in the order of the poles, all at once where that fits into a cache."""
+    """Return the sums in the order of the poles, vectorised if that fits into the cache."""
     few = len(poles) * at.pole.size <= _FITS
     return _sides_at_once(weights, poles, at) if few else _sides_in_turn(weights, poles, at)
 
 
 def _sides_at_once(weights: Array, poles: Array, at: Zeros) -> _Sides:
-    # (n_poles, n, n_zeros): the longest last.
+    # Shape (n_poles, n, n_zeros), with the longest axis last.
     pole, beyond = np.ascontiguousarray(at.pole.T), np.ascontiguousarray(at.beyond.T)
     slope = pole - poles[:, :, None]
     slope += beyond
     term = weights[:, :, None] / slope
     np.divide(term, slope, out=slope)
     is_below, is_above = _which_side(*at.pole.shape[:1], *poles.shape[:1])
-    # A sum over the first of several axes adds one after the other.
+    # Reducing the first of several axes adds in sequence, so the result is reproducible.
     below, above, below_slope, above_slope = (
         np.add.reduce(of * which, axis=0).T
         for of in (term, slope)
@@ -179,7 +177,7 @@ def _sides_at_once(weights: Array, poles: Array, at: Zeros) -> _Sides:
 
 @cache
 def _which_side(zeros: int, poles: int) -> tuple[Array, Array]:
-    """Ones where a pole is below a zero, and where it is above, (n_poles, 1, n_zeros)."""
+    """Return ones where a pole is below a zero, and where it is above, (n_poles, 1, n_zeros)."""
     is_below = np.tri(zeros, poles).T[:, None]
     return is_below, 1 - is_below
 
@@ -200,11 +198,11 @@ def _sides_in_turn(weights: Array, poles: Array, at: Zeros) -> _Sides:
 
 
 def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array) -> Array:
-    """Distances of zeros from their poles, from a guess that is nearer or further."""
+    """Return improved distances of zeros from their poles."""
     found = np.empty_like(value)
     inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
     found[:-1] = _between(*(of[:-1] for of in inner))
-    # Beyond all poles one over their sum is concave and nearly straight: Newton's method on it.
+    # Beyond all poles the reciprocal of the sum is concave and nearly linear: Newton's method.
     found[-1] = at[-1] - sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
     return found
 
@@ -212,9 +210,9 @@ def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, lev
 def _between(
     value: Array, below_slope: Array, above_slope: Array, side: Array, gap: Array, at: Array
 ) -> Array:
-    """Zero of c + p/d - q/(gap - d), which agrees in value and slopes, one pole a side [1].
+    """Return the zero of c + p/d - q/(gap - d), matched in value and slopes, one pole per side [1].
 
-    Seen from the nearer pole, so that none of the digits of d is lost.
+    Distances are from the nearer pole, so that d keeps all its digits.
     """
     rest = gap - at
     p = -np.where(side > 0, below_slope, above_slope) * at * at

@@ -1,43 +1,42 @@
-"""How a key of the config is defined: beside the field that holds it.
+"""Definition of config keys, as annotations of dataclass fields.
 
 A field of a frozen dataclass is a key if it is annotated with a `Key`, e.g.
 ``fingers: Annotated[int, Key("Number of floating fingers.", low=1)]``. Checks, messages, the JSON
-Schema and the documentation follow from it (`biogrip.study`). What only several keys together can
-get wrong says the class' method ``problems``, if it has one.
+Schema and the documentation follow from it (`biogrip.study`). Conflicts between keys are found by
+the optional method ``problems`` of the class.
 """
 
 from collections.abc import Hashable
 from dataclasses import dataclass
 
 Problem = tuple[tuple[Hashable, ...], str]
-"""Path of a key, from the block that says it, and what was found and what is allowed."""
+"""Path of a key, relative to its block, and a message: what was found and what is allowed."""
 
 
 @dataclass(frozen=True)
 class Key:
-    """What is said of a key beside its type and its default.
+    """Description and constraints of a config key.
 
     Parameters
     ----------
     text
-        What it means.
+        Description of the key.
     unit
-        Of its value.
+        Unit of its value.
     low, above, high
-        The value is at least, greater than, at most.
+        Lower bound, exclusive lower bound, and upper bound.
     choices
-        All that it may be.
+        Allowed values.
     pattern, form
-        All of a text, as a regular expression; the same in words.
+        Regular expression for the whole text, and the same in words.
     fewest, most
-        Items of a list, characters of a text, or keys of a block.
+        Bounds on the items of a list, characters of a text, or keys of a block.
     unique
-        Whether no item of a list may be there twice.
+        True if all items of a list must differ.
     needed
-        Whether a config must give it although the class has a default.
+        True if a config must give the key although the class has a default.
     spread
-        Whether it has no name of its own: it holds the keys of its block that no other field is
-        named like.
+        True if the field collects all keys of its block that no other field names.
     """
 
     text: str = ""
@@ -56,7 +55,7 @@ class Key:
 
 
 def printed(text: str) -> Key:
-    """Define a name in print, of which tables, figures and file formats make no more than text."""
+    """Return a key for text that is safe in tables, figures and file formats."""
     return Key(
         text,
         pattern=r"(?![ +-])[\w .,:;()+/%'-]{1,60}",

@@ -1,6 +1,6 @@
-"""What a notebook needs: simulate, add noise, identify, judge, plot.
+"""Functions for notebooks: simulate, add noise, identify, judge, plot.
 
-The command and the workflow are made of the same functions.
+The commands and the workflow use the same functions.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from biogrip.response.simulation import simulated_rotation
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# As in the default study.
+# Ranges of the default study.
 _RANGES = {
     "k": GeneRange((-3, 8), (1, 9)),
     "k_p": GeneRange((-3, 8), (1, 9)),
@@ -43,20 +43,20 @@ def set_up(
     fixed: Mapping[str, float] | None = None,
     nonlinear: bool = False,
 ) -> CaseProblem:
-    """Describe an experiment.
+    """Return an experiment: gripper, protocol and sample model, with search ranges.
 
     Parameters
     ----------
     gripper, protocol
-        With what, and under which torques.
+        Gripper, and phases of the torque.
     sample
-        The constitutive model.
+        Constitutive model of the sample.
     ranges
-        Range that is searched, by the name of the range; by default that of the default study.
+        Search ranges by name; by default those of the default study.
     fixed
-        Parameters that are known, by name, SI units.
+        Fixed parameters by name, SI units.
     nonlinear
-        Whether the nonlinear model is solved.
+        If true, use the nonlinear equations.
     """
     return CaseProblem(
         gripper,
@@ -74,16 +74,16 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
     Parameters
     ----------
     experiment
-        From `set_up`.
+        Experiment from `set_up`.
     parameters
-        Those of the sample by name, SI units.
+        Parameters of the sample by name, SI units.
     time_s : (n_samples,)
-        Ascending.
+        Sampling times, ascending.
 
     Returns
     -------
     (n_samples,)
-        In rad.
+        Rotation in rad.
     """
     rotation: Array = simulated_rotation(
         experiment.gripper,
@@ -98,16 +98,16 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
 def identify_sample(
     experiment: CaseProblem, time_s: Array, rotation_rad: Array, seed: int = 0
 ) -> Identification:
-    """Identify the sample by least squares from many starting points.
+    """Identify the sample by least squares from many starts.
 
     Parameters
     ----------
     experiment
-        From `set_up`.
+        Experiment from `set_up`.
     time_s, rotation_rad : (n_samples,)
-        The trace.
+        Trace.
     seed
-        Of the starting points.
+        Seed of the starts.
     """
     problem = experiment.of(time_s, rotation_rad)
     return identify_many([problem], _BUDGET, [np.random.default_rng(seed)], silent)[0]
@@ -120,18 +120,18 @@ def judge(
     found: Identification,
     confidence: float = 0.95,
 ) -> Diagnosis:
-    """Judge what the trace determines, by profile likelihoods.
+    """Compute confidence limits and verdicts from profile likelihoods.
 
     Parameters
     ----------
     experiment
-        From `set_up`.
+        Experiment from `set_up`.
     time_s, rotation_rad : (n_samples,)
-        The trace.
+        Trace.
     found
-        What `identify_sample` found in it.
+        Result of `identify_sample`.
     confidence
-        Of the limits.
+        Confidence level of the limits.
     """
     problem = experiment.of(time_s, rotation_rad)
     return diagnose(problem, experiment.searched, found, confidence=confidence)
@@ -140,7 +140,7 @@ def judge(
 def plot(
     experiment: CaseProblem, time_s: Array, rotation_rad: Array, found: Identification
 ) -> "Figure":
-    """Draw a trace, its fit, and what the fit leaves of it."""
+    """Draw a trace, its fit and the residuals."""
     from biogrip.products.figures.fit import draw_fit
     from biogrip.products.figures.results import Fit
     from biogrip.products.figures.style import styled

@@ -1,4 +1,4 @@
-"""How far a long job has come, said every few seconds and not at all in a short one; warnings."""
+"""Progress of long jobs, printed every few seconds, and warnings."""
 
 import sys
 import time
@@ -11,17 +11,17 @@ _CLEARED = "\r\x1b[K"
 
 
 class Progress:
-    """Counts what is done.
+    """Counter of the completed pieces of a job.
 
     Parameters
     ----------
     what
         Name of the job.
     total
-        How many pieces it has.
+        Number of pieces.
     live
-        Whether somebody who waits at a terminal sees every phase as it begins, in a line
-        that goes when all is done. Not for jobs that share a terminal.
+        If true, show every phase on the terminal in a line that is cleared at the end. Not for
+        jobs that share a terminal.
     """
 
     def __init__(self, what: str, total: int, *, live: bool = False) -> None:
@@ -33,27 +33,27 @@ class Progress:
         self._said = time.monotonic()
 
     def __enter__(self) -> Self:
-        """Begin."""
+        """Return the counter."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Leave nothing on the terminal."""
+        """Clear the line on the terminal."""
         if self._live:
             print(_CLEARED, end="", file=sys.stderr, flush=True)
 
     def done(self, pieces: int = 1) -> None:
-        """Count what is done."""
+        """Count completed pieces, and print the progress."""
         self._done += pieces
         self._phase = ""
         self._say("")
 
     def doing(self, phase: str) -> None:
-        """Name what comes next, until it is done."""
+        """Set the name of the current phase."""
         self._phase = f", {visible(phase)}"
         self._say("")
 
     def within(self, evaluations: int, misfit_rad: float) -> None:
-        """Follow what an identifier does within a piece."""
+        """Print the progress of an identification within a piece."""
         self._say(f", {evaluations} responses, misfit {misfit_rad:.4g} rad")
 
     def _say(self, more: str) -> None:
@@ -63,12 +63,12 @@ class Progress:
             print(f"{_CLEARED}{said}", end="", file=sys.stderr, flush=True)
         elif now - self._said >= _EVERY_S:
             self._said = now
-            # Past the job's log, to whoever waits at the terminal.
+            # To standard output, so that it does not fill the job's log.
             print(said, flush=True)
 
 
 def warn(text: str) -> None:
-    """Say what should be doubted: to whoever waits at the terminal, and in the job's log."""
+    """Print a warning to the terminal and to the job's log."""
     line = f"biogrip: warning: {visible_lines(text)}"
     print(line, flush=True)
     if not sys.stderr.isatty():

@@ -1,8 +1,7 @@
-"""A command that is stopped ends at once and says so in a line, wherever it happens to be.
+"""Handlers that end a command at once with a one-line message when it is stopped.
 
-An exception would not do: what is raised while a library is loaded, or calls back, is made another
-error of, or swallowed. Files are written whole or not at all, so that nothing else is to be tidied
-up than what is not yet in its place.
+An exception would not do: libraries that are loading, or call back, replace or swallow it. Files
+are written atomically, so only scratch files need to be removed.
 """
 
 import os
@@ -17,33 +16,33 @@ _SAID = {signal.SIGINT: "stopped", signal.SIGTERM: "ended by SIGTERM"}
 _CLEARED = "\r\x1b[K"
 
 unfinished: set[str] = set()
-"""Files that are being written, and removed if the command is stopped meanwhile."""
+"""Scratch files that are being written, to be removed if the command is stopped."""
 
 
 def end_when_stopped() -> None:
-    """Take the signals that stop a command, but for those that are ignored, as with ``nohup``."""
+    """Install handlers for stop signals, except those ignored, as with ``nohup``."""
     for number in _SAID:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, _end)
 
 
 def end_at_once(number: int, line: str) -> None:
-    """End by a signal, with a line about it.
+    """Exit with a message, as if ended by a signal.
 
     Parameters
     ----------
     number
-        The signal's. The exit status is a shell's for it: 128 more.
+        Number of the signal; the exit status is 128 plus it, as in a shell.
     line
-        What to say, the name of the command before it.
+        Message, printed after the name of the command.
     """
-    # Whoever stops it twice changes nothing.
+    # Ignore further signals.
     for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(other, signal.SIG_IGN)
     for path in unfinished:
         with suppress(OSError):
             os.unlink(path)
-    # This may have come in the middle of a write to either.
+    # A signal may arrive during a write to either stream.
     with suppress(OSError, RuntimeError, ValueError):
         sys.stdout.flush()
     with suppress(OSError):
@@ -53,4 +52,4 @@ def end_at_once(number: int, line: str) -> None:
 
 
 def _end(number: int, _: FrameType | None) -> None:
-    end_at_once(number, f"{_SAID[signal.Signals(number)]}; nothing was written by halves.")
+    end_at_once(number, f"{_SAID[signal.Signals(number)]}; no file was left half-written.")

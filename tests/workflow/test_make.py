@@ -191,7 +191,7 @@ def test_a_folder_without_a_study_is_said(
     monkeypatch.chdir(tmp_path)
     assert main(["make", "errors", *CASE]) == 1
     said = capsys.readouterr().err
-    assert said.startswith("biogrip: results/study.json: there is none, for no study was run here")
+    assert said.startswith("biogrip: results/study.json: there is none, as no study was run here")
     assert list(tmp_path.iterdir()) == []
 
 

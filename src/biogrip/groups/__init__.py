@@ -1,1 +1,1 @@
-"""Cells of whole dishes: replicates fitted jointly, populations, and how far two are apart."""
+"""Groups of cells: replicates fitted jointly, populations, and differences between groups."""

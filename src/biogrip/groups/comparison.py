@@ -1,7 +1,7 @@
-"""How far the populations of two dishes are apart, in logarithms: as a ratio of medians.
+"""Difference between the populations of two dishes, as a ratio of medians (Welch's t test).
 
-The difference of two means whose variances differ is judged by Welch's t, with the degrees of
-freedom of Satterthwaite. Where cells are known exactly that is Welch's test of their logarithms.
+Means of logarithms with unequal variances are compared by Welch's t, with Satterthwaite's degrees
+of freedom. If estimation errors are negligible this is Welch's test of the cells' logarithms.
 
 References
 ----------
@@ -22,16 +22,16 @@ from biogrip.groups.population import Population
 
 @dataclass(frozen=True)
 class Difference:
-    """One population's median over another's.
+    """Ratio of the medians of two populations.
 
     Parameters
     ----------
     log_ratio, deviation
         Logarithm of the ratio, and its standard deviation.
     freedom
-        Degrees of freedom of the deviation, no whole number.
+        Degrees of freedom of the deviation; need not be an integer.
     confidence
-        Of the interval, e.g. 0.95.
+        Confidence level of the interval, e.g. 0.95.
     """
 
     log_ratio: float
@@ -56,7 +56,7 @@ class Difference:
 
     @property
     def p_value(self) -> float:
-        """Probability of a ratio as far from 1, either way, if there is none."""
+        """Two-sided p value of the hypothesis that the ratio is 1."""
         from scipy.special import stdtr
 
         return float(2 * stdtr(self.freedom, -abs(self.log_ratio) / self.deviation))
@@ -69,7 +69,7 @@ class Difference:
 
 
 def difference(one: Population, other: Population) -> Difference:
-    """Compare a population with another, whose median is the denominator."""
+    """Return the difference of a population from another, whose median is the denominator."""
     first, second = one.deviation**2, other.deviation**2
     freedom = (first + second) ** 2 / (first**2 / one.freedom + second**2 / other.freedom)
     return Difference(
@@ -81,7 +81,7 @@ def difference(one: Population, other: Population) -> Difference:
 
 
 def adjusted(p_values: Sequence[float]) -> list[float]:
-    """Return p values of several comparisons such that none of them errs with more (Holm)."""
+    """Return p values adjusted for multiple comparisons by Holm's method."""
     from statsmodels.stats.multitest import multipletests
 
     return [float(p) for p in multipletests(p_values, method="holm")[1]]

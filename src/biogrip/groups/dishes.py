@@ -1,4 +1,4 @@
-"""What the cells of several groups tell: their populations, and how far these are apart."""
+"""Populations of cells in several groups, and differences between the groups."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import DETERMINED, Finding
 
 USUAL_POWER = 0.8
-"""With which a difference that is there should be found (Cohen 1988)."""
+"""Power at which the smallest detectable ratio is given (Cohen 1988)."""
 
 
 @dataclass(frozen=True)
 class JudgedCell:
-    """A cell of a group, and what its traces tell."""
+    """A cell of a group, with the joint fit of its traces."""
 
     name: str
     group: str
@@ -30,18 +30,18 @@ class JudgedCell:
 
 @dataclass(frozen=True)
 class GroupFinding:
-    """One quantity in one group.
+    """Cells and population of one quantity in one group.
 
     Parameters
     ----------
     group, quantity, unit
-        Which.
+        Group, label of the quantity, and its unit.
     estimates
-        Cells that determine the quantity.
+        Estimates of cells that determine the quantity.
     others
-        Names of the cells that do not.
+        Names of the other cells.
     population
-        Where they come from; None of too few cells.
+        Population of the estimates; None if there are too few cells.
     """
 
     group: str
@@ -54,20 +54,20 @@ class GroupFinding:
 
 @dataclass(frozen=True)
 class GroupDifference:
-    """One quantity in one group, over the first group.
+    """Difference of one quantity between a group and the first group.
 
     Parameters
     ----------
     quantity, group, against
-        Which.
+        Label of the quantity, the group, and the reference group.
     difference
-        Of the populations.
+        Ratio of the medians of the populations.
     adjusted_p
-        For as many groups as the quantity is compared in.
+        p value adjusted for the number of groups that the quantity is compared in.
     ranks
-        The logarithm of the ratio whatever the distribution.
+        Distribution-free estimate of the difference of logarithms.
     ratio_seen
-        Smallest ratio that so many cells, scattering like these, show with `USUAL_POWER`.
+        Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`.
     """
 
     quantity: str
@@ -82,16 +82,16 @@ class GroupDifference:
 def findings_of_groups(
     cells: Sequence[JudgedCell], groups: Sequence[str], confidence: float
 ) -> list[GroupFinding]:
-    """Judge every quantity in every group.
+    """Estimate the population of every quantity in every group.
 
     Parameters
     ----------
     cells
-        Of the same model, at least one.
+        Judged cells with the same sample model, at least one.
     groups
-        Names, in the order of what is returned; a group may have no cells.
+        Names of groups in the order of the result; a group may be empty.
     confidence
-        Of the intervals, e.g. 0.95.
+        Confidence level of the intervals, e.g. 0.95.
     """
     quantities = [finding.quantity for finding in cells[0].fit.diagnosis.findings]
     return [
@@ -102,7 +102,7 @@ def findings_of_groups(
 
 
 def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDifference]:
-    """Compare every group with the first, in every quantity that both determine often enough."""
+    """Compare every group with the first, in quantities that enough cells of both determine."""
     compared: list[GroupDifference] = []
     for quantity in dict.fromkeys(finding.quantity for finding in findings):
         own = [finding for finding in findings if finding.quantity == quantity]
@@ -132,7 +132,7 @@ def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDiffere
 
 
 def log_deviation(finding: Finding, likelihood: Likelihood) -> float:
-    """Standard deviation of a determined quantity's logarithm: that of its interval."""
+    """Return the standard deviation of a quantity's logarithm from its interval's width."""
     low, high = finding.profile.low, finding.profile.high
     assert low is not None
     assert high is not None
@@ -170,6 +170,6 @@ def _finding(
 
 def _ratio_seen(one: Population, other: Population) -> float:
     fewer = 1 + min(one.freedom, other.freedom)
-    # Spread and errors together; of these, a cell that is badly known counts less.
+    # `deviation` includes spread and errors; badly known cells have less weight in it.
     variances = [(1 + each.freedom) * each.deviation**2 for each in (one, other)]
     return ratio_seen(fewer, USUAL_POWER, sqrt(sum(variances) / 2), 0.0, one.confidence)

@@ -1,9 +1,9 @@
-"""One cell from all its traces: shared parameters, and a noise for each trace.
+"""Joint fit of one cell's traces: shared parameters, and a noise level for each trace.
 
-Where the noise is not known, likelihood is greatest where each trace's is what its residual is;
-that and the best fit are found in turn (iteratively reweighted least squares), until neither
-changes. Limits then hold the noises there, as the F threshold of a single trace does: with the
-hundreds of samples of a trace they could not tell the difference.
+Unknown noise levels have their maximum likelihood at each trace's RMS residual. Levels and best
+fit are updated in turn until both converge (iteratively reweighted least squares). Profile
+likelihoods then keep the levels fixed and use the F threshold of a single trace: with hundreds of
+samples per trace the difference is negligible.
 
 References
 ----------
@@ -28,26 +28,26 @@ from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 
-# Noise is known to a share of one over the root of twice the samples; this is far below.
+# Relative convergence tolerance, far below the accuracy 1/sqrt(2 n) of a noise level.
 _SETTLED = 1e-9
 _MOST_ROUNDS = 100
 _MOST_OPTIMA = 5
-# Replicates of one cell differ so much by chance once in a thousand.
+# p value below which replicates count as traces of different samples.
 _DISAGREE = 1e-3
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """What all traces of a cell tell together.
+    """Joint fit of all traces of a cell.
 
     Parameters
     ----------
     diagnosis
-        Best fit and verdicts, as of one trace.
+        Best fit and verdicts, as for one trace.
     noise_rad
         Standard deviation of the noise of each trace.
     agreement
-        Probability that traces of one and the same sample differ as much; None of a single one.
+        p value of the hypothesis that all traces have the same parameters; None for a single trace.
     """
 
     diagnosis: Diagnosis
@@ -63,18 +63,18 @@ def fitted_jointly(
     confidence: float,
     noise_rad: float | None = None,
 ) -> JointFit:
-    """Identify a cell from all its traces, and judge what is identified.
+    """Fit all traces of a cell jointly, and compute confidence limits.
 
     Parameters
     ----------
     problems
-        One a trace.
+        Fit problem of each trace.
     model
-        Whose parameters are searched.
+        Sample model, without fixed parameters.
     identify
-        Finds the global optimum of a problem.
+        Function that finds the global optimum of a problem.
     confidence
-        Of the limits, e.g. 0.95.
+        Confidence level of the limits, e.g. 0.95.
     noise_rad
         Standard deviation of the noise if it is known, the same for all traces.
     """
@@ -93,7 +93,7 @@ def fitted_jointly(
         best = np.exp(told.likelihood.best)
         if noise_rad is not None or np.array_equal(best, found.parameters):
             break
-        # A profile has led to a deeper optimum, with other noises.
+        # A profile found a lower optimum, which has other noise levels.
         found = replace(found, parameters=best, misfit_rad=told.likelihood.misfit_rad)
     agreement = _agreement(problems, told.likelihood.best, noise_rad)
     if agreement < _DISAGREE:
@@ -107,11 +107,11 @@ def fitted_jointly(
 def _reweighted(
     problems: Sequence[Problem], joint: Problem, found: Identification, levels: list[float]
 ) -> tuple[Problem, Identification, list[float]]:
-    """Fit, and weight each trace by what is left of it, until neither changes."""
+    """Alternate between fitting and weighting traces by their residuals, until both converge."""
     x = np.log(found.parameters)
     free, shared = joint.residuals.free, len(x)
     for _ in range(_MOST_ROUNDS):
-        # Of the parameters, each trace bears a share.
+        # The shared parameters take a share of each trace's degrees of freedom.
         left = [problem.residuals.free * (1 - shared / free) for problem in problems]
         sums = [_square_sum(problem, x) for problem in problems]
         before, levels = levels, [sqrt(s / own) for s, own in zip(sums, left, strict=True)]
@@ -124,7 +124,7 @@ def _reweighted(
 
 
 def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None) -> float:
-    """Probability of so much better fits with parameters of each trace's own (Wilks 1938)."""
+    """Return the likelihood-ratio p value of shared against separate parameters (Wilks 1938)."""
     from scipy.special import chdtrc
 
     gained = 0.0

@@ -1,4 +1,4 @@
-"""Which trace is of which cell, and which cell of which group: a table of the user's, CSV."""
+"""Reader of the user's table that assigns traces to cells and cells to groups, CSV."""
 
 import csv
 import os
@@ -18,14 +18,14 @@ _SHOWN = 100
 
 @dataclass(frozen=True)
 class Cell:
-    """One cell.
+    """A cell and the files of its traces.
 
     Parameters
     ----------
     name, group
-        As in the table.
+        Names in the table.
     traces
-        Files of its recorded traces, its replicates, in the order of their paths.
+        Files of its recorded traces (replicates), sorted by path.
     """
 
     name: str
@@ -56,13 +56,13 @@ def read_cells(table: Path) -> list[Cell]:
     Returns
     -------
     list of Cell
-        In the order in which they first appear.
+        Cells in the order of their first rows.
 
     Raises
     ------
     BiogripError
-        If the file cannot be read as text; lacks a column or has it twice; a row has too few or
-        too many cells, or an empty one; a trace is there twice, or a cell in two groups.
+        If the file cannot be read as text, lacks a column or repeats it, a row has too few, too
+        many or empty cells, a trace occurs twice, or a cell is in two groups.
     """
     try:
         text = table.read_text(encoding="utf-8-sig")
@@ -140,10 +140,10 @@ def _index(table: Path, line: int, names: list[str], column: str) -> int:
 
 
 def _refuse_repeated(table: Path, rows: list[_Row]) -> None:
-    """A trace counted twice would pass for two that agree."""
+    """Refuse a trace that is listed twice, since copies would count as agreeing replicates."""
     first: dict[str, int] = {}
     for row in rows:
-        # Whatever way leads to it.
+        # Compare resolved paths, so that links are detected.
         if (before := first.setdefault(os.path.realpath(row.file), row.line)) != row.line:
             raise BiogripError(
                 f"{place(table, row.line, 'file')}: found '{row.file}' again, as on line {before}; "

@@ -1,4 +1,4 @@
-"""The cells of one dish as a sample of a population: its median, its spread, and shrunk cells.
+"""Population of the cells of one dish by random-effects meta-analysis: median, spread, shrinkage.
 
 A quantity's logarithm in cell i is estimated as y_i with standard deviation s_i, and scatters
 from cell to cell with the spread tau about the population's mu:
@@ -33,25 +33,25 @@ import numpy as np
 from biogrip.arrays import Array
 
 FEWEST_CELLS = 3
-"""Of fewer cells a population is not spoken of: the 95 % interval of the median of two reaches
-from it, either way, six times as far as one of them is from the other."""
+"""Fewest cells for a population: with two, the 95 % interval of the median would reach six
+times their distance to either side."""
 
-# From the smallest errors, the estimate of tau comes near by doubling.
+# Iterations for tau, which may start many doublings below its value.
 _MOST_STEPS = 500
 
 
 @dataclass(frozen=True)
 class Estimates:
-    """What is known of one quantity in the cells of one dish.
+    """Estimates of one quantity in the cells of one dish, as logarithms.
 
     Parameters
     ----------
     cells
-        Names.
+        Names of the cells.
     log_values : (n_cells,)
         Logarithms of the quantity.
     deviations : (n_cells,)
-        Their standard deviations, above zero.
+        Standard deviations of the logarithms, above zero.
     """
 
     cells: tuple[str, ...]
@@ -61,22 +61,22 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Population:
-    """Where the cells of a dish come from; all are logarithms of the quantity.
+    """Population of the cells of a dish; all values are logarithms of the quantity.
 
     Parameters
     ----------
     estimates
-        Its cells.
+        Estimates that the population is fitted to.
     confidence
-        Of all intervals, e.g. 0.95.
+        Confidence level of all intervals, e.g. 0.95.
     centre, deviation
         Mean of the logarithms, that is the logarithm of the median, and its standard deviation.
     spread
-        Standard deviation from cell to cell, without what is the error of each.
+        Standard deviation between cells, without estimation errors.
     spread_low, spread_high
-        Its confidence limits.
+        Confidence limits of the spread.
     shrunk, shrunk_deviations : (n_cells,)
-        Cells as they are most probable given all others, and their standard deviations.
+        Empirical Bayes estimates of the cells, and their standard deviations.
     """
 
     estimates: Estimates
@@ -96,7 +96,7 @@ class Population:
 
     @property
     def reach(self) -> float:
-        """How many standard deviations an interval reaches to either side."""
+        """Half width of an interval in standard deviations."""
         from scipy.special import stdtrit
 
         return float(stdtrit(self.freedom, (1 + self.confidence) / 2))
@@ -118,14 +118,14 @@ class Population:
 
 
 def population_of(estimates: Estimates, confidence: float) -> Population:
-    """Estimate the population that the cells of a dish come from.
+    """Estimate the population of the cells of a dish.
 
     Parameters
     ----------
     estimates
-        At least two cells.
+        Estimates of at least two cells.
     confidence
-        Of the intervals, e.g. 0.95.
+        Confidence level of the intervals, e.g. 0.95.
     """
     from statsmodels.stats.meta_analysis import combine_effects
 
@@ -133,7 +133,7 @@ def population_of(estimates: Estimates, confidence: float) -> Population:
     combined = combine_effects(y, error, method_re="pm", maxiter=_MOST_STEPS)
     variance, centre = float(combined.tau2), float(combined.mean_effect_re)
     deviation = sqrt(combined.var_hksj_re)
-    # Of what a cell differs from the median by, so much is not its error.
+    # Share of a cell's variance that is not its estimation error.
     own = variance / (variance + error)
     low, high = _spread_limits(y, error, confidence)
     return Population(
@@ -150,7 +150,7 @@ def population_of(estimates: Estimates, confidence: float) -> Population:
 
 
 def _spread_limits(y: Array, error: Array, confidence: float) -> tuple[float, float]:
-    """Limits of tau, zero where Q is below the quantile without any spread."""
+    """Return limits of tau; a limit is 0 if Q is below the quantile even without spread."""
     from scipy.optimize import brentq
     from scipy.special import chdtri
 
@@ -167,7 +167,7 @@ def _spread_limits(y: Array, error: Array, confidence: float) -> tuple[float, fl
         if beyond(0.0, quantile) <= 0:
             limits.append(0.0)
         else:
-            # Q is no more than it is about the plain mean, and without the errors.
+            # Upper bound: Q is largest about the plain mean without errors.
             most = 2 * largest
             limits.append(sqrt(brentq(beyond, 0.0, most, (quantile,), xtol=1e-15 * most)))
     return limits[0], limits[1]

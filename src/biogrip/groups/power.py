@@ -1,4 +1,4 @@
-"""How likely a difference between two dishes is seen, and how many cells it takes.
+"""Power of the comparison of two dishes, and number of cells needed for a given power.
 
 Of n cells a dish that scatter by the spread tau, each estimated with the error s, the logarithm
 of the ratio of medians has the variance 2 (tau^2 + s^2)/n, and t is distributed with 2 (n - 1)
@@ -26,20 +26,20 @@ from biogrip.groups.population import FEWEST_CELLS
 
 
 def power(ratio: float, cells: int, spread: float, error: float, confidence: float = 0.95) -> float:
-    """Probability that a difference is found at all.
+    """Return the probability that a difference between two populations is detected.
 
     Parameters
     ----------
     ratio
-        Of the medians of the two populations.
+        Ratio of the medians of the populations.
     cells
-        How many cells each dish has, at least 2.
+        Number of cells per dish, at least 2.
     spread
-        Standard deviation of the logarithm from cell to cell.
+        Standard deviation of the logarithm between cells.
     error
-        Standard deviation of each estimate of it.
+        Standard deviation of each cell's estimate.
     confidence
-        Of the interval that is not to hold 1.
+        Confidence level of the interval that must exclude 1.
     """
     return _power(abs(log(ratio)) / hypot(spread, error), cells, confidence)
 
@@ -49,8 +49,8 @@ def _power(size: float, cells: int, confidence: float) -> float:
 
     freedom = 2 * (cells - 1)
     limit = float(stdtrit(freedom, (1 + confidence) / 2))
-    # The trapezoidal rule errs by less than 1e-10 with two steps to the narrower of both widths,
-    # of Z and of its limit, and 9 standard deviations leave out 2e-19.
+    # With two steps per width of the narrower factor the trapezoidal rule errs by less than 1e-10,
+    # and cutting at 9 standard deviations by 2e-19.
     step = min(1.0, limit / sqrt(2 * freedom)) / 2
     z = step * np.arange(-ceil(9 / step), ceil(9 / step) + 1)
     weights = np.exp(-z * z / 2)
@@ -61,16 +61,16 @@ def _power(size: float, cells: int, confidence: float) -> float:
 def cells_needed(
     ratio: float, wanted: float, spread: float, error: float, confidence: float = 0.95
 ) -> int:
-    """Cells that each dish must have for a difference to be found with a probability.
+    """Return the number of cells per dish needed to detect a difference with a given power.
 
-    Fewer than are compared at all it never is.
+    It is at least `FEWEST_CELLS`, the fewest that are compared.
 
     Parameters
     ----------
     ratio, spread, error, confidence
-        As of `power`; the ratio is not 1.
+        Arguments of `power`; the ratio is not 1.
     wanted
-        The probability, e.g. 0.8.
+        Power, e.g. 0.8.
     """
     most = FEWEST_CELLS
     while power(ratio, most, spread, error, confidence) < wanted:
@@ -85,7 +85,7 @@ def cells_needed(
 def ratio_seen(
     cells: int, wanted: float, spread: float, error: float, confidence: float = 0.95
 ) -> float:
-    """Smallest ratio above 1 that is found with a probability; parameters as of `cells_needed`."""
+    """Return the smallest ratio above 1 detected with a given power; see `cells_needed`."""
     from scipy.optimize import brentq
 
     large = 1.0

@@ -1,9 +1,9 @@
-"""Replicates: several traces of one cell, posed as one problem with shared parameters.
+"""Replicates: several traces of one cell as one fit problem with shared parameters.
 
-Each trace has its own noise sigma_i, so what is summed is chi^2: every trace's residuals count in
-units of its own noise. The rows of all traces stand below one another, each trace's multiplied by
-sigma/sigma_i, where sigma is the noise of the whole; so all that fits, profiles and judges one
-trace does it with several, and a trace alone is as it was.
+Each trace has its own noise sigma_i, and chi^2 is summed over residuals in units of that noise.
+Rows of all traces are concatenated, each trace's multiplied by sigma/sigma_i with the joint noise
+sigma. So all code for fits, profiles and verdicts of one trace works for several, and for a
+single trace nothing changes.
 """
 
 from collections.abc import Sequence
@@ -23,14 +23,14 @@ from biogrip.response.residuals import Residuals
 class JointResiduals(Residuals):
     """Residuals of several traces of one sample, each in units of its own noise.
 
-    Times of sampling, and what the instrument may have added, are each trace's own.
+    Sampling times and nuisance terms of the instrument are separate for each trace.
 
     Parameters
     ----------
     parts
-        Residuals of each trace, for the same model.
+        Residuals of each trace, for the same sample model.
     noise_rad
-        Standard deviation of the noise of each.
+        Standard deviation of each trace's noise.
     """
 
     def __init__(self, parts: Sequence[Residuals], noise_rad: Sequence[float]) -> None:
@@ -49,7 +49,7 @@ class JointResiduals(Residuals):
 
     @property
     def free(self) -> int:
-        """Degrees of freedom that samples and nuisance leave to parameters and noise."""
+        """Degrees of freedom after the nuisance terms are fitted."""
         return sum(part.free for part in self._parts)
 
     def grip(self, log_parameters: Array) -> Grip:
@@ -62,11 +62,11 @@ class JointResiduals(Residuals):
         return JointResiduals(parts, (1 / self.weights).tolist())
 
     def __call__(self, log_parameters: Array) -> tuple[Array, Array]:
-        """Residuals (n_samples,) and derivatives (n_parameters, n_samples), trace after trace."""
+        """Return residuals (n_samples,) and derivatives (n_parameters, n_samples) of all traces."""
         return self._stacked([part(log_parameters) for part in self._parts])
 
     def gradient(self, log_parameters: Array) -> tuple[Array, float]:
-        """Of half the sum of squares, (n_parameters,) in rad^2, and the RMS misfit in rad."""
+        """Return the gradient of half the sum of squares, (n_parameters,), and the RMS in rad."""
         found = [part.gradient(log_parameters) for part in self._parts]
         counted = zip(self.weights, self._parts, found, strict=True)
         squares = (w**2 * part.samples * rms**2 for w, part, (_, rms) in counted)
@@ -74,48 +74,48 @@ class JointResiduals(Residuals):
         return np.sum(gradients, axis=0), sqrt(fsum(squares) / self.samples)
 
     def left(self, log_parameters: Array) -> Array:
-        """Residuals alone, trace after trace, (n_samples,) in rad."""
+        """Return residuals only, trace after trace, (n_samples,) in rad."""
         return self._side_by_side([part.left(log_parameters) for part in self._parts])
 
     @property
     def freedom(self) -> float:
-        """Degrees of freedom with which the colour of the noise of the least known is known."""
+        """Degrees of freedom of the noise's correlation, of the trace that has least."""
         return min(part.freedom for part in self._parts)
 
     @property
     def coloured(self) -> bool:
-        """Whether noise was not white, and has been made so."""
+        """True if the noise of all traces is coloured, and was whitened."""
         return all(part.coloured for part in self._parts)
 
     @property
     def inertia(self) -> bool:
-        """Whether the arms ring in any of the traces."""
+        """True if the arms ring in any of the traces."""
         return any(part.inertia for part in self._parts)
 
     @cached_property
     def condensed_trace(self) -> Array:
-        """Rows of the traces, (n_rows,) in rad."""
+        """Condensed rows of all traces, (n_rows,) in rad."""
         return self._side_by_side([part.condensed_trace for part in self._parts])
 
     def condensed_linear(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Of `condensed_responses`, what the linear model gives."""
+        """Return the linear model's part of `condensed_responses`."""
         return self._side_by_side(
             [part.condensed_linear(log_parameters, slopes=slopes) for part in self._parts]
         )
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
-        """Of `condensed_responses`, what the nonlinear model has over the linear one."""
+        """Return the nonlinear correction in `condensed_responses`."""
         return self._side_by_side(
             [part.condensed_corrections(log_parameters, slopes=slopes) for part in self._parts]
         )
 
     def without_inertia(self) -> "JointResiduals":
-        """Return the same traces for arms that do not ring."""
+        """Return the same traces for arms without inertia."""
         parts = [part.without_inertia() for part in self._parts]
         return JointResiduals(parts, (1 / self.weights).tolist())
 
     def shares_responses(self, other: Residuals) -> bool:
-        """Whether only the traces tell this from others; weights are in the responses."""
+        """Return whether problems differ only in traces; weights are part of the responses."""
         return self is other
 
     def _stacked(self, found: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
@@ -123,20 +123,20 @@ class JointResiduals(Residuals):
         return self._side_by_side(rows), self._side_by_side(slopes)
 
     def _side_by_side(self, rows: Sequence[Array]) -> Array:
-        """Rows of all traces along the last axis, each trace's in units of its noise."""
+        """Concatenate rows of all traces along the last axis, in units of each trace's noise."""
         weighted = (weight * own for weight, own in zip(self.weights, rows, strict=True))
         return np.concatenate(list(weighted), axis=-1)
 
 
 def joint_problem(problems: Sequence[Problem], noise_rad: Sequence[float]) -> Problem:
-    """Pose the identification of one cell from several traces.
+    """Return the fit problem of one cell with several traces.
 
     Parameters
     ----------
     problems
-        Of each trace, for the same model and range.
+        Problems of each trace, with the same model and search range.
     noise_rad
-        Standard deviation of the noise of each.
+        Standard deviation of each trace's noise.
     """
     residuals = JointResiduals([problem.residuals for problem in problems], noise_rad)
     return replace(problems[0], misfit=residuals.condensed_misfit, residuals=residuals)

@@ -1,8 +1,8 @@
-"""How far two dishes are apart whatever the distribution of their cells: Hodges and Lehmann.
+"""Distribution-free difference between two dishes: the Hodges-Lehmann estimator.
 
-The estimate is the median of all differences between a cell of one and a cell of the other; its
-limits are those of the differences at which the rank test of Wilcoxon, Mann and Whitney turns.
-It checks what rests on normal distributions, and takes no account of the errors of the cells.
+The estimate is the median of all differences between a cell of one dish and a cell of the other.
+Its limits invert the rank test of Wilcoxon, Mann and Whitney. It checks results that assume
+normal distributions, and ignores estimation errors of the cells.
 
 References
 ----------
@@ -21,14 +21,14 @@ from biogrip.arrays import Array
 
 @dataclass(frozen=True)
 class Shift:
-    """By how much the values of one sample exceed those of another.
+    """Shift between the values of two samples.
 
     Parameters
     ----------
     estimate
         Median of the differences.
     low, high
-        Confidence limits; None where there are too few cells for any.
+        Confidence limits; None if there are too few cells.
     """
 
     estimate: float
@@ -37,10 +37,10 @@ class Shift:
 
 
 def shift(one: Array, other: Array, confidence: float) -> Shift:
-    """Estimate a shift from samples of shapes (n,) and (m,)."""
+    """Estimate the shift of a sample (n,) over another (m,)."""
     differences = np.sort(np.subtract.outer(one, other).ravel())
     outside = (1 - confidence) / 2
-    # So many differences may be left out at either end.
+    # Number of differences outside the limits at either end.
     left_out = int(np.sum(np.cumsum(_chances(len(one), len(other))) <= outside))
     estimate = float(np.median(differences))
     if not left_out:
@@ -49,13 +49,13 @@ def shift(one: Array, other: Array, confidence: float) -> Shift:
 
 
 def _chances(first: int, second: int) -> Array:
-    """Probability of every value of the rank statistic U if the samples are alike, (n m + 1,)."""
-    # Ways to choose `first` of the ranks by their sum, less the smallest; one rank after another.
+    """Return the null distribution of the rank statistic U, (n m + 1,)."""
+    # Count selections of `first` ranks by rank sum minus the smallest sum, adding rank by rank.
     ways = np.zeros((first + 1, first * second + 1))
     ways[0, 0] = 1.0
     for rank in range(first + second):
         for chosen in range(min(first, rank + 1), 0, -1):
-            # The rank takes the place `chosen`, so many places above where it could be at least.
+            # As the `chosen`-th smallest, the rank lies this many places above its lowest position.
             by = rank - (chosen - 1)
             if by <= second:
                 ways[chosen, by:] += ways[chosen - 1, : ways.shape[1] - by]

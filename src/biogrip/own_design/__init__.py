@@ -1,1 +1,1 @@
-"""The command that designs an experiment: what is asked, and what it writes."""
+"""The command ``biogrip design``: experimental design, written as a config and a page."""

@@ -1,4 +1,4 @@
-"""A design as a config that is laid over the study's."""
+"""Designs as a YAML config to merge over the study's."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,7 +9,7 @@ from biogrip.own_traces.outputs import WRITTEN_BY
 
 
 def as_config(designs: Iterable[Designed]) -> str:
-    """Return the YAML that gives each case its designed protocol and sampling."""
+    """Return YAML that gives each case its designed protocol and sampling."""
     lines = [
         f"# {WRITTEN_BY} {__version__}: experiments by `biogrip design`.",
         "cases:",
@@ -35,7 +35,7 @@ def _case(found: Designed) -> Iterator[str]:
 
 
 def _keys(phase: Phase) -> Iterator[tuple[str, float]]:
-    """Keys of a phase, and what they are; of what is computed, as many digits as were set."""
+    """Yield keys and values of a phase; computed values are rounded to 12 digits."""
     yield "duration_s", phase.duration_s
     yield "torque_Nm", phase.left.value_Nm
     if phase.left.slope_Nm_per_s:
@@ -46,6 +46,6 @@ def _keys(phase: Phase) -> Iterator[tuple[str, float]]:
 
 
 def _number(value: float) -> str:
-    """Print a number to its last digit, with the point that YAML asks for before an exponent."""
+    """Return a number's shortest exact text, with the dot that YAML needs before an exponent."""
     mantissa, e, exponent = repr(float(value)).partition("e")
     return mantissa + ("" if "." in mantissa or not e else ".0") + e + exponent

@@ -1,4 +1,4 @@
-"""What the command does."""
+"""The command ``biogrip design``."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -32,23 +32,23 @@ def design(
     Parameters
     ----------
     configs
-        YAML files laid over the default study, with a block `design`.
+        YAML files merged over the default study; they have a block `design`.
     names
-        Cases; by default all that have such a block.
+        Names of cases; by default all that have such a block.
     output
-        YAML file; the page stands beside it.
+        YAML file to write; the page is beside it.
     after
-        Traces of one sample, whose telling is used: a CSV file, and, if it was not recorded as the
-        config says, the YAML files to be laid over that. In the order of the experiments.
+        Earlier traces of the sample in experimental order: each a CSV file and, if recorded under
+        another config, YAML files to merge over that of `configs`.
     read_as
-        How these files are to be read.
+        Options for reading these files.
     force
-        Whether to replace files that this program did not write.
+        If true, replace even files that biogrip did not write.
 
     Raises
     ------
     BiogripError
-        If nothing can be designed as asked.
+        If an option, config or trace cannot be used, or no design is found.
     """
     files = [default_config(), *configs]
     study = load_study(read_configs(files), files, for_workflow=False)
@@ -57,7 +57,7 @@ def design(
     if page == output:
         raise BiogripError(f"{output}: allowed is the name of a YAML file; the page is beside it.")
     if after and len(chosen) > 1:
-        raise BiogripError("--after: is of one case; choose it with --case.")
+        raise BiogripError("--after: allowed with one case only; choose it with --case.")
     if read_as != ReadAs() and not after:
         raise BiogripError("found options of a trace, allowed are these with --after only.")
     refuse_inputs([output, page], [*configs, *chain.from_iterable(after)])
@@ -74,7 +74,7 @@ def design(
 
             found.append(designed(case, study.study_seed, tried, told))
             progress.done()
-    # Drawing takes a second to begin with.
+    # Imported lazily: Matplotlib takes a second.
     from biogrip.own_design.page import write_page
 
     write_text(output, as_config(found))
@@ -84,7 +84,7 @@ def design(
 
 
 def _recorded(files: Sequence[Path], own: Sequence[Path], name: str) -> Recorded:
-    """Read how a trace was recorded."""
+    """Return a trace's file with the case that describes how it was recorded."""
     trace, *over = own
     laid = [*files, *over]
     return Recorded(load_study(read_configs(laid), laid, for_workflow=False).cases[name], trace)

@@ -1,4 +1,4 @@
-"""A case's experiment, designed, beside the one that its config has."""
+"""Design of a case's experiment, compared with the experiment in its config."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -24,16 +24,16 @@ class Designed:
     Parameters
     ----------
     case
-        For which sample.
+        Case that the experiment is for.
     wanted
-        What was asked, without what no torque tells.
+        Inputs of the design, without parameters that no torque determines.
     plan
-        The experiment.
+        The designed experiment.
     before, after : (n, n_parameters)
-        Relative bounds of the plausible samples with the protocol and the sampling of the config,
-        and with the plan, at the same noise and with the arms' inertia.
+        Relative bounds for the plausible samples with the config's protocol and sampling (before)
+        and with the plan (after), at the same noise and with inertia.
     force_time_s, force_N : (n_times,), (n, n_times)
-        Jaw force with the plan.
+        Jaw force under the plan.
     """
 
     case: Case
@@ -56,19 +56,19 @@ def designed(
     Parameters
     ----------
     case
-        With a block `design`.
+        Case with a block `design`.
     study_seed
-        Of the search.
+        Seed of the random search.
     progress
-        Is told how many torques were tried, and the lowest typical relative bound.
+        Callback with the number of torques tried and the lowest typical relative bound.
     earlier
-        What earlier traces told. All bounds are then with it: the first, of the experiment that the
-        config has done again.
+        Information from earlier traces. All bounds then include it, the first ones assuming that
+        the config's experiment is repeated.
 
     Raises
     ------
     BiogripError
-        If nothing was found with which the jaws press throughout, or that tells what is asked.
+        If no torque keeps the jaws pressing throughout and determines the quantities.
     """
     asked = case.block.design
     assert asked is not None
@@ -91,7 +91,7 @@ def designed(
 
 
 def in_words(found: Designed) -> str:
-    """Print a design: bounds before and after, and what is to be set."""
+    """Return a design in words: settings, and bounds before and after."""
     plan, model = found.plan, found.wanted.model
     lines = [f"{found.case.title}: {_setting(found)}."]
     worst = [np.max(bounds, axis=0) for bounds in (found.before, found.after)]
@@ -109,12 +109,12 @@ def in_words(found: Designed) -> str:
 
 
 def left_out(wanted: Wanted) -> str:
-    """Say what no torque tells, and what to change."""
+    """Return a sentence on parameters that no torque determines, and on remedies."""
     names = ", ".join(wanted.model.names[index] for index in sorted(wanted.out_of_reach))
     return (
-        f"left out, as with readings at {wanted.fastest_Hz:g} Hz no torque that was tried tells "
-        f"it: {names}; the other bounds allow for a factor of e to the {NO_BOUND:g} in it. A "
-        "faster camera (fastest_Hz), more torque or other shapes may tell it."
+        "left out, as no torque that was tried determines it with readings at "
+        f"{wanted.fastest_Hz:g} Hz: {names}; the other bounds allow for a factor of e to the "
+        f"{NO_BOUND:g} in it. A faster camera (fastest_Hz), more torque or other shapes may help."
     )
 
 
@@ -127,25 +127,25 @@ def _setting(found: Designed) -> str:
 
 
 def in_numbers(phases: Sequence[Phase]) -> str:
-    """Say how many phases of which kind there are, as ``4 sinusoids, 1 step``."""
+    """Return the number of phases of each kind, e.g. ``4 sinusoids, 1 step``."""
     kinds = Counter(map(kind, phases))
     return ", ".join(f"{count} {name}{'s' * (count > 1)}" for name, count in kinds.items())
 
 
 def kind(phase: Phase) -> str:
-    """Whether a phase is a sinusoid, a ramp or a step."""
+    """Return the kind of a phase: sinusoid, ramp or step."""
     if phase.left.harmonics:
         return "sinusoid"
     return "ramp" if phase.left.slope_Nm_per_s else "step"
 
 
 def largest_Nm(phase: Phase) -> float:
-    """Largest torque of a phase."""
+    """Return the largest torque of a phase."""
     load = phase.left
     swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
     return max(load.value_Nm + swing, load.value_Nm + load.slope_Nm_per_s * phase.duration_s)
 
 
 def percent(bound: float) -> str:
-    """Print a relative bound."""
+    """Return a relative bound as text."""
     return "none" if bound > NO_BOUND else f"{100 * bound:.2g} %"

@@ -1,4 +1,4 @@
-"""What a designed experiment looks like: torque, readings, what they tell, and the jaw force."""
+"""Figures of a designed experiment: torque, readings, sensitivities and jaw force."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ from biogrip.response.ringing import ringing_responses
 
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 _AFTER = 120
-# Periods of which each can be seen.
+# Most periods that are drawn one by one.
 _MOST_DRAWN = 40
 
 
@@ -40,7 +40,7 @@ def draw_experiment(found: Designed) -> Figure:
 
 
 def _draw_torque(axes: Axes, found: Designed) -> None:
-    """Draw the torque as a line, or, where many periods are on the page, what it sweeps over."""
+    """Draw the torque as a line, or as a band where a sinusoid has too many periods."""
     history, phases = found.plan.torque, found.plan.phases
     start_s, times, torques = 0.0, [0.0], [0.0]
     for start_s, phase in zip(history.time_s, phases, strict=True):
@@ -61,7 +61,7 @@ def _draw_torque(axes: Axes, found: Designed) -> None:
 def draw_told(found: Designed) -> Figure:
     """Draw sensitivities in units of the noise after the steps with the most readings.
 
-    Of sinusoids the last whole period is drawn, with all of their readings.
+    For a sinusoid the last whole period is drawn, with all readings folded into it.
     """
     plan, wanted = found.plan, found.wanted
     history, times = plan.torque, plan.time_s
@@ -101,7 +101,7 @@ def draw_told(found: Designed) -> Figure:
 
 
 def _period_s(phase: Phase) -> float | None:
-    """Period of a sinusoid of which there is a whole one."""
+    """Return the period of a sinusoid that lasts at least one."""
     for harmonic in phase.left.harmonics:
         if phase.duration_s * harmonic.frequency_Hz >= 1:
             return 1 / harmonic.frequency_Hz
@@ -109,13 +109,13 @@ def _period_s(phase: Phase) -> float | None:
 
 
 def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
-    """All figures of a design, with their titles."""
+    """Yield all figures of a design with their titles."""
     yield (
         "Torque, readings (a bar is 1/200 of the experiment), jaw force of each plausible sample",
         draw_experiment(found),
     )
     yield (
-        "What a reading tells of each parameter, in units of the noise, after the steps with the "
+        "Sensitivity of a reading to each parameter over the noise, after the steps with the "
         "most readings (ticks); in the last period of a sinusoid",
         draw_told(found),
     )

@@ -1,4 +1,4 @@
-"""What recorded traces have told already, for the experiment that comes next."""
+"""Fits of earlier recorded traces, as prior information for the next experiment."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -16,18 +16,18 @@ from biogrip.study.asked_design import plausible_ends
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 
-# What a fit may leave of traces, in units of the noise, before they are of something else.
+# Misfit in units of the noise above which a trace counts as one of another sample.
 _UNLIKE = 2.0
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """A trace, and how it was recorded.
+    """A recorded trace, with the case that describes how it was recorded.
 
     Parameters
     ----------
     case
-        Its protocol and gripper are the trace's.
+        Case with the trace's protocol and gripper.
     file
         CSV file.
     """
@@ -37,24 +37,23 @@ class Recorded:
 
 
 def told_by_recorded(traces: Sequence[Recorded], read_as: ReadAs, study_seed: int) -> Earlier:
-    """Fit the traces of one sample together, one more after the other.
+    """Fit the traces of one sample jointly, adding one after another.
 
     Parameters
     ----------
     traces
-        In the order of their experiments. Search range, least squares, and the block `design` with
-        the noise, are those of the first one's case.
+        Traces in the order of the experiments. Search range, least squares and the block `design`
+        are those of the first trace's case.
     read_as
-        Where in their files they stand, what the instrument added, and their noise, if it is not
-        that of the block; noise is taken for white.
+        Columns, offset and drift of the files, and their noise if it differs from the block's;
+        noise is assumed white.
     study_seed
-        Of starting points and draws.
+        Seed of random starts and of posterior samples.
 
     Raises
     ------
     BiogripError
-        With the option, or with file and line, if a trace cannot be used, or is not what the
-        configs say.
+        With the option, or file and line, if a trace cannot be used or contradicts the configs.
     """
     case = traces[0].case
     asked = case.block.design

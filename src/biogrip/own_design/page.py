@@ -1,4 +1,4 @@
-"""Designed experiments on one page that needs nothing else."""
+"""HTML page of designed experiments, self-contained."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class _Column:
-    """What is to be set on the generator: its heading, how it is printed, and of which kind."""
+    """A column of generator settings: heading, formatter, and the kind of phase it is for."""
 
     head: str
     cell: Callable[[Phase, CombDrive], str]
@@ -31,7 +31,7 @@ class _Column:
 
 
 def _volts(phase: Phase, comb: CombDrive) -> str:
-    """Voltages from the start of a phase to its end, or the lowest and the highest."""
+    """Return voltages at the ends of a phase, or the lowest and the highest of a sinusoid."""
     load = phase.left
     swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
     ends = [load.value_Nm - swing, load.value_Nm + swing]
@@ -70,7 +70,7 @@ _COLUMNS = (
 
 
 def write_page(designs: Iterable[Designed], page: Path) -> None:
-    """Write the page, HTML."""
+    """Write the page as HTML."""
     template = Path(__file__).with_name("designed.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(

@@ -1,1 +1,1 @@
-"""Recorded traces of one's own, from files to verdicts, without a workflow."""
+"""Identification of recorded traces from CSV files to verdicts, without Snakemake."""

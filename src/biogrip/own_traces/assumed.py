@@ -1,4 +1,4 @@
-"""What an identification relies on: enough to repeat it."""
+"""Record of all that an identification assumes, so that it can be repeated."""
 
 from importlib.metadata import version
 from pathlib import Path
@@ -21,17 +21,17 @@ def _block(case: Case, name: str) -> Any:
 
 
 def by_default(config: Path | None) -> list[str]:
-    """Which of gripper and protocol nobody has given, so that they are the default study's."""
+    """Return which of ``gripper`` and ``protocol`` the config omits, so that defaults hold."""
     given = read_configs([config]) if config else {}
     return [name for name in ("gripper", "protocol") if name not in given]
 
 
 def names_models(config: Path | None) -> bool:
-    """Whether somebody has named the sample models that are tried."""
+    """Return whether the config names the sample models to try (``model_selection.models``)."""
     given = read_configs([config]) if config else {}
     return "models" in (given.get("model_selection") or {})
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what the numbers come from."""
+    """Return the versions of biogrip, NumPy and SciPy."""
     return {name: version(name) for name in ("biogrip", "numpy", "scipy")}

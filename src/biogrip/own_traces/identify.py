@@ -1,4 +1,4 @@
-"""The command that identifies recorded traces: what it writes, and what it says."""
+"""The command ``biogrip identify``: the files it writes and the text it prints."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -26,22 +26,22 @@ def identify(
     posterior: bool,
     force: bool,
 ) -> int:
-    """Identify traces, write what is found, and print it.
+    """Identify traces, write the results, and print them.
 
     Parameters
     ----------
     traces
         CSV files.
     model, read_as, config
-        As of `Wanted`.
+        Fields of `Wanted`.
     output
-        JSON file, of a single trace; else each has one beside it.
+        JSON file for a single trace. By default each trace has one beside it.
     report, table
-        HTML and CSV file, if they are wanted.
+        HTML and CSV file to write, if any.
     posterior
-        As of `Wanted`.
+        Field of `Wanted`.
     force
-        Whether to replace files that this program did not write.
+        If true, replace even files that biogrip did not write.
 
     Returns
     -------
@@ -51,10 +51,10 @@ def identify(
     Raises
     ------
     BiogripError
-        If nothing can be identified as asked, or the only trace cannot be used.
+        If an option or the config cannot be used, or the only trace cannot.
     """
     if output is not None and len(traces) > 1:
-        raise BiogripError("--output: is of one trace; of several, each has its own beside it.")
+        raise BiogripError("--output: only for one trace; each of several gets its own file.")
     if len(traces) == 1:
         check_trace_file(traces[0])
     problems = {trace: trace_file_problem(trace) for trace in traces}
@@ -63,7 +63,7 @@ def identify(
     wanted = Wanted((there or traces)[0], model, read_as, config, posterior)
     samples = posterior
     if there and (len(traces) > 1 or config is not None):
-        # What is wrong with all of them is said once.
+        # Errors of options and config concern all traces: raise them once, here.
         (case,) = study_of(wanted).cases.values()
         samples = case.posterior is not None
     outputs = {trace: output or trace.with_suffix(".identified.json") for trace in there}

@@ -1,4 +1,4 @@
-"""Recorded traces of the cells of several groups, from files to differences, without a workflow."""
+"""The command ``biogrip groups``: recorded traces of cells, compared between groups of cells."""
 
 import json
 from collections.abc import Callable, Iterable, Sequence
@@ -43,7 +43,7 @@ from biogrip.terminal import visible, visible_lines
 
 @dataclass(frozen=True)
 class _Posed:
-    """A recorded trace that can be used, and how it is judged."""
+    """A recorded trace that can be used, its fit problem and the settings of the fit."""
 
     trace: Path
     problem: Problem
@@ -59,18 +59,18 @@ def groups(
     output: Path | None,
     force: bool,
 ) -> int:
-    """Compare the groups of a table, write what is found, and print it.
+    """Compare the groups of cells that a table lists, write the results, and print them.
 
     Parameters
     ----------
     table
         CSV file, see `read_cells`.
     model, read_as, config
-        As of `Wanted`.
+        Fields of `Wanted`.
     output
-        JSON file; by default beside the table.
+        JSON file. By default it is beside the table.
     force
-        Whether to replace a file that this program did not write.
+        If true, replace even a file that biogrip did not write.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def groups(
     Raises
     ------
     BiogripError
-        If nothing can be compared as asked.
+        If options, config, table or all traces cannot be used.
     """
     if problem := trace_file_problem(table):
         raise BiogripError(f"TABLE: {problem}")
@@ -96,25 +96,25 @@ def groups(
 
 
 def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
-    """Identify every cell from its traces, and compare the groups of cells.
+    """Identify every cell from all its traces, and compare the groups of cells.
 
-    Traces that cannot be used are left out, and told of.
+    Traces that cannot be used are left out and listed under ``skipped``.
 
     Parameters
     ----------
     wanted
-        How to read and to identify each trace; its trace is the table of cells.
+        Options for all traces; its own trace is the table of cells.
     cells
-        What the table holds.
+        Rows of the table.
     output
-        Is written with what is returned, its numbers rounded, JSON.
+        JSON file to write; it holds the returned value with rounded numbers.
 
     Raises
     ------
     BiogripError
-        If an option or the config cannot be used, or none of the traces.
+        If an option or the config cannot be used, or no trace can.
     """
-    # What is wrong with the options is no trace's fault, and is said once.
+    # Errors of options and config concern all traces: raise them once, here.
     study = study_of(wanted)
     (case,) = study.cases.values()
     posed, confidence = case.problem, case.confidence
@@ -152,7 +152,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
             f"{visible(wanted.trace)}: none of its traces can be used; the first: "
             f"{traces.skipped[0]['reason']}"
         )
-    # The first in the table is compared with, whichever of its traces can be used.
+    # The reference group is the first in the table, even if none of its traces can be used.
     names = list(dict.fromkeys(cell.group for cell in cells))
     findings = findings_of_groups(judged, names, confidence)
     found = {
@@ -171,7 +171,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
 
 
 def in_words(found: dict[str, Any]) -> str:
-    """Return what `compare_groups` found as tables to read."""
+    """Return the result of `compare_groups` as tables in plain text."""
     percent = f"{100 * found['confidence']:g} %"
     parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
     parts += [_cell_in_words(cell) for cell in found["cells"]]
@@ -189,7 +189,7 @@ def in_words(found: dict[str, Any]) -> str:
 
 
 class _Traces:
-    """Reads traces, and notes those that cannot be used."""
+    """Reader of traces that collects those that cannot be used in ``skipped``."""
 
     def __init__(self, wanted: Wanted) -> None:
         self.skipped: list[dict[str, str]] = []
@@ -197,7 +197,7 @@ class _Traces:
         self._read: dict[bytes, Path] = {}
 
     def of(self, cell: Cell) -> list[_Posed]:
-        """Pose the problems of a cell's traces."""
+        """Return the fit problems of the usable traces of a cell."""
         posed = []
         for trace in cell.traces:
             try:
@@ -214,17 +214,17 @@ class _Traces:
         (case,) = study.cases.values()
         recorded = self._wanted.read_as.read(trace, case.gripper, case.problem)
         rotation_rad = recorded.rotation_rad[0]
-        # Noise is never the same twice; copies would pass for cells that agree to the last digit.
+        # Noise never repeats: equal rotations are a copied file, and would feign agreement.
         same = sha256(rotation_rad.tobytes()).digest()
         if (before := self._read.setdefault(same, trace)) != trace:
             raise BiogripError(
-                f"{visible(trace)}: found the very rotations of {visible(before)}, "
+                f"{visible(trace)}: found the same rotations as in {visible(before)}, "
                 "allowed is each trace once."
             )
         settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)
         if case.problem.coloured:
-            # Of one gripper for all cells the error is common to them, and no part of the noise.
+            # All cells share one gripper: its calibration error is common to them, not noise.
             assumed = replace(case.problem, uncertainty={})
             problem = settings.fit(assumed, recorded.time_s, rotation_rad, 0).problem
         return _Posed(trace, problem, settings)
@@ -233,7 +233,7 @@ class _Traces:
 def _identify(
     posed: _Posed, progress: Callable[[int, float], None]
 ) -> Callable[[Problem], Identification]:
-    """Find global optima as `identify_trace` does for the trace."""
+    """Return a function that finds global optima with the seeds and budget of `identify_trace`."""
     settings = posed.settings
 
     def found(problem: Problem) -> Identification:
@@ -341,9 +341,9 @@ def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
 
 
 def _left_out_in_words(rows: list[dict[str, Any]]) -> list[str]:
-    """Name the cells of which a group's median says nothing, where it says something of others."""
+    """Name the cells that do not determine a quantity, and so are left out of its median."""
     words = [
-        f"{row['quantity']} in {row['group']} is of the cells that determine it, without "
+        f"{row['group']}: the median of {row['quantity']} is without undetermined cells: "
         f"{', '.join(row['not_determined'])}."
         for row in rows
         if row["not_determined"] and "median" in row

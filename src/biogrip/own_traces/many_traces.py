@@ -1,4 +1,4 @@
-"""Recorded traces one after the other: those that can be used, and why the others cannot."""
+"""Identification of several recorded traces, each by itself."""
 
 import sys
 from collections.abc import Iterable, Mapping
@@ -22,14 +22,14 @@ _OF_QUANTITY = ("verdict", "value", "low", "high")
 
 @dataclass(frozen=True)
 class Told:
-    """What came of several traces.
+    """Results of several traces.
 
     Parameters
     ----------
     found
-        What is said of each that could be used, see `identify_trace`.
+        Result of each usable trace, as data of `identify_trace`.
     refused
-        Why the others could not, by file.
+        Error message of each other trace, by file.
     """
 
     found: list[dict[str, Any]]
@@ -37,16 +37,16 @@ class Told:
 
 
 def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | None") -> Told:
-    """Identify traces, each by itself.
+    """Identify traces one after the other, and collect the errors of those that cannot be used.
 
     Parameters
     ----------
     wanted
-        How, for all of them; its own trace does not count.
+        Options for all traces; its own trace is ignored.
     outputs
-        Where what is said of each is written, JSON, by CSV file.
+        JSON file to write for each CSV file.
     page
-        Is given every trace that could be used.
+        Page that every identified trace is added to, if any.
     """
     found, refused = [], {}
     for number, (trace, output) in enumerate(outputs.items(), start=1):
@@ -64,7 +64,7 @@ def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | 
 
 
 def write_table(told: Told, table: Path) -> None:
-    """Write a row a trace, CSV."""
+    """Write one row per trace as CSV."""
     quantities = labels_of(told.found)
     columns = ["trace", "problem", "model", "samples", "noise_rad", "misfit_rad"]
     columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]

@@ -1,4 +1,4 @@
-"""Other sample models fitted to a trace: whether the chosen one is what it asks for."""
+"""Model selection for one trace: fits of other sample models, ranked by AIC and BIC."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -28,9 +28,9 @@ class ModelsTried:
     Parameters
     ----------
     tried, answers
-        How they compare, and the fits themselves, in the same order.
+        Rank and fit of each model, in the same order.
     chosen
-        Candidate that the trace was identified with.
+        Sample model that the trace was identified with.
     """
 
     chosen: str
@@ -39,12 +39,12 @@ class ModelsTried:
 
     @property
     def own(self) -> Identification | None:
-        """Best fit of the model that the trace was identified with."""
+        """Best fit of the chosen model, if it is among those tried."""
         pairs = zip(self.tried, self.answers, strict=True)
         return next((answer for each, answer in pairs if each.candidate == self.chosen), None)
 
     def data(self) -> dict[str, Any]:
-        """Return a row per model, and a sentence, as plain data."""
+        """Return one row per model, and a sentence of advice, as plain data."""
         if not self.tried:
             return {"models": [], "advice": None}
         rows = [
@@ -64,7 +64,7 @@ class ModelsTried:
 
 
 def vanished(candidate: str, answer: Identification) -> list[str]:
-    """Name the elements without which a model fits best."""
+    """Name the elements that vanish in the best fit: parameters that are zero or infinite."""
     elements = CANDIDATES[candidate].model.parameters
     gone = (answer.parameters == 0) | np.isinf(answer.parameters)
     return [
@@ -83,28 +83,28 @@ def models_tried(
     *,
     named: bool,
 ) -> ModelsTried:
-    """Fit sample models in the noise of a trace.
+    """Fit several sample models to a trace with the same noise model.
 
-    With parameters that are known, or where a fit takes minutes, none are tried, nor where there
-    is no other model.
+    None are fitted with fixed parameters, with the nonlinear model, which takes minutes, or if
+    there is only one model.
 
     Parameters
     ----------
     study, case
-        Which models, and with which budget.
+        The models to fit, and the budget of each fit.
     fit
-        The trace.
+        Fit of the trace with the chosen model.
     told
-        What it tells; its best fit is one of the points that fits start from.
+        Diagnosis of that fit; its best fit is one of the starts.
     done
-        Is called after every model.
+        Function to call after every model.
     named
-        Whether somebody has named the models of the study; else power laws are tried as well.
+        True if the config names the models; if not, power laws are tried as well.
     """
     posed, chosen = case.problem, case.sample.candidate
     if posed.nonlinear or posed.fixed:
         return ModelsTried(chosen)
-    # Beside so many samples the modes of a springpot, which has dozens, would take gigabytes.
+    # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
     power_laws = _power_laws(posed.torque.end_s) if few and not named else []
     candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
@@ -127,23 +127,23 @@ def models_tried(
 def judged_again(
     fit: TraceFit, told: Diagnosis, models: ModelsTried, confidence: float, noise_rad: float | None
 ) -> tuple[Diagnosis, list[str]]:
-    """Judge a trace again if the fits of several models led deeper; doubt what lies out of reach.
+    """Diagnose a trace again if fits of other models found a lower chi^2 within the search range.
 
     Parameters
     ----------
     fit, told
-        The trace, and what it tells.
+        Fit and diagnosis so far.
     models
-        All fits.
+        Fits of all models.
     confidence, noise_rad
-        As of `diagnose`.
+        Arguments of `diagnose`.
 
     Returns
     -------
     told
-        What the trace tells then.
+        The new diagnosis, or the one so far.
     notes
-        In sentences.
+        Sentences; one if the lower chi^2 is outside the search range.
     """
     own = models.own
     if own is None or (rise := told.likelihood.rise(own.misfit_rad)) > -MISSED:
@@ -154,11 +154,11 @@ def judged_again(
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     return told, [
-        f"Beyond the search range{where}, the model fits better: χ² is lower by {-rise:.3g}. The "
-        "limits are those of samples within the range."
+        f"Outside the search range{where}, the model fits better: χ² is lower by {-rise:.3g}. The "
+        "limits hold for samples within the range."
     ]
 
 
 def _power_laws(duration_s: float) -> list[str]:
-    """Power laws, which cells creep by, where an experiment is no longer than they hold for."""
+    """Return power-law models, if the experiment is not longer than their range of validity."""
     return [name for name, model in MODELS.items() if model.power_law and duration_s <= LONGEST_S]

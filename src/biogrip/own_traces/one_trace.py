@@ -1,4 +1,4 @@
-"""One recorded trace from file to verdicts, without a workflow."""
+"""Identification of one recorded trace from a CSV file to verdicts, without Snakemake."""
 
 import json
 import re
@@ -37,7 +37,7 @@ from biogrip.study.trace_file import trace_file_problem
 
 @dataclass(frozen=True)
 class Wanted:
-    """What to identify.
+    """A recorded trace, and the options to identify it with.
 
     Parameters
     ----------
@@ -46,11 +46,11 @@ class Wanted:
     model
         Name of the sample model.
     read_as
-        Where in the file it stands, and what the instrument added.
+        Columns of the file, and offset, drift and noise of the instrument.
     config
         YAML file laid over the default study: gripper, protocol, search range.
     posterior
-        Whether the posterior is sampled even if the config does not say so.
+        If true, sample the posterior even if the config does not say so.
     """
 
     trace: Path
@@ -62,18 +62,18 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Identified:
-    """A trace that was identified.
+    """Results of one trace.
 
     Parameters
     ----------
     data
-        What is said of it, see `identify_trace`; numbers of a diagnosis with all their digits.
+        Content of the JSON file; numbers of the diagnosis are not rounded.
     problem
-        What was assumed.
+        Assumptions of the fit.
     recorded
         The trace.
     samples : (n, n_parameters)
-        Of its posterior, SI units, if it was sampled.
+        Posterior samples, SI units, if the posterior was sampled.
     """
 
     data: dict[str, Any]
@@ -83,14 +83,14 @@ class Identified:
 
 
 def identify_trace(wanted: Wanted, output: Path) -> Identified:
-    """Identify the sample in a recorded trace by least squares, and judge what is identified.
+    """Identify the sample in a recorded trace by least squares, and compute confidence limits.
 
     Parameters
     ----------
     wanted
-        What to identify.
+        The trace and the options.
     output
-        Is written with what is said of it, JSON; samples of its posterior beside it, Parquet.
+        JSON file to write; posterior samples are written beside it as Parquet.
 
     Raises
     ------
@@ -156,30 +156,30 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
 
 
 def _written(data: dict[str, Any]) -> dict[str, Any]:
-    """Round what was found; what was assumed is to be repeated, and a posterior is rounded."""
+    """Round results; keep assumptions, which must be repeatable, and the posterior as they are."""
     kept = {name: data[name] for name in ("assumed", "posterior") if name in data}
     return {**rounded_numbers(data), **kept}
 
 
 def check_trace_file(trace: Path) -> None:
-    """Refuse a path that leads to no file.
+    """Refuse a path at which there is no file.
 
     Raises
     ------
     BiogripError
-        With the file beside it that has the nearest name.
+        With the nearest name among the files beside it.
     """
     if problem := trace_file_problem(trace):
         raise BiogripError(f"TRACE: {problem}")
 
 
 def study_of(wanted: Wanted) -> Study:
-    """Return the study of which the trace is the only case.
+    """Return a study that has the trace as its only case.
 
     Raises
     ------
     BiogripError
-        With the option, or with file, line and key, of what no trace could be identified with.
+        With option, or file, line and key, if options or config cannot be used for any trace.
     """
     check_trace_file(wanted.trace)
     wanted.read_as.check()
@@ -192,7 +192,7 @@ def study_of(wanted: Wanted) -> Study:
     name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     measurement = {**wanted.read_as.block, "file": str(wanted.trace)}
-    # A config may name cases of its own, for the workflow.
+    # Cases of the config are meant for the workflow.
     merged.pop("only", None)
     if wanted.posterior:
         merged.setdefault("posterior", {})
@@ -206,7 +206,7 @@ def study_of(wanted: Wanted) -> Study:
 
 
 def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -> dict[str, Any]:
-    """Offset and drift that the best fit leaves to the instrument."""
+    """Return offset and drift of the instrument in the best fit, as far as they were fitted."""
     if not (posed.offset or posed.drift):
         return {}
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]

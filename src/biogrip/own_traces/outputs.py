@@ -1,4 +1,4 @@
-"""Files that are written beside a person's own, and never over them."""
+"""Checks of output files, so that files of others are not overwritten."""
 
 import json
 import os
@@ -10,29 +10,29 @@ from biogrip.products.files.parquet import column_names
 from biogrip.terminal import visible
 
 WRITTEN_BY = "written_by_biogrip"
-"""Tells our files from others, which are not replaced."""
+"""Mark in every file that biogrip writes; files without it are not replaced."""
 
 SAMPLES = ".parquet"
-"""Ending of a file with samples of a posterior, in the place of ``.json``."""
+"""Suffix of a file with posterior samples, in place of ``.json``."""
 
 _HEAD_BYTES = 500
 _LONGEST = 100_000
 
 
 def check_output(output: Path, *, force: bool) -> None:
-    """Make sure that a file can be written, and is none of somebody else's.
+    """Refuse an output that cannot be written, or that biogrip did not write.
 
     Parameters
     ----------
     output
         The file.
     force
-        Whether to replace what this program did not write.
+        If true, replace even a file that biogrip did not write.
 
     Raises
     ------
     BiogripError
-        If it cannot be written or must not be replaced.
+        If the file cannot be written or must not be replaced.
     """
     folder = output.parent
     if os.path.isdir(output) or not os.path.isdir(folder) or not os.access(folder, os.W_OK):
@@ -67,7 +67,7 @@ def _is_ours(output: Path) -> bool:
         if output.suffix == SAMPLES:
             return WRITTEN_BY in column_names(output)
         with output.open("rb") as stream:
-            # The header of a table, however many quantities it has; the first lines of a page.
+            # The mark is in the header of a table, however long, and in the first lines of a page.
             head = (
                 stream.readline(_LONGEST) if output.suffix == ".csv" else stream.read(_HEAD_BYTES)
             )

@@ -1,4 +1,4 @@
-"""What traces tell on one page that needs nothing else."""
+"""An HTML page of identified traces, self-contained."""
 
 import io
 from collections.abc import Mapping
@@ -31,13 +31,13 @@ from biogrip.terminal import visible, visible_lines
 
 
 class Page:
-    """The page, as far as traces have been added."""
+    """A page that traces are added to one by one."""
 
     def __init__(self) -> None:
         self._traces: list[dict[str, Any]] = []
 
     def add(self, identified: Identified) -> None:
-        """Draw what is said of a trace."""
+        """Add the figures and numbers of a trace."""
         data = identified.data
         compared = data["posterior"]["evidence"] if "posterior" in data else []
         with styled():
@@ -55,7 +55,7 @@ class Page:
         )
 
     def write(self, refused: Mapping[str, str], page: Path) -> None:
-        """Write the page, HTML."""
+        """Write the page as HTML, with the error messages of refused traces."""
         template = Path(__file__).with_name("traces.html.j2").read_text(encoding="utf-8")
         environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
         text = environment.from_string(template).render(
@@ -73,19 +73,19 @@ def _figures(identified: Identified) -> dict[str, Figure]:
     values = {name: found[name] for name in problem.searched.names}
     fit = fit_of(problem, {**problem.fixed, **values}, identified.recorded, 0)
     figures = {
-        "The trace, its best fit, and what that leaves": draw_fit(fit, "best fit", ""),
-        "What the fit leaves: over time, its correlation, its distribution": draw_residuals(fit),
+        "Trace, best fit and residuals": draw_fit(fit, "best fit", ""),
+        "Residuals: over time, autocorrelation, distribution": draw_residuals(fit),
         "Profile likelihoods": draw_profiles(ProfileSettings("", {}), data),
     }
     if identified.samples is not None:
-        figures["The posterior: every parameter alone, and against each other"] = draw_corner(
+        figures["Posterior: marginals and pairs of parameters"] = draw_corner(
             problem.searched.parameters, identified.samples, data["posterior"], {}, ""
         )
     return figures
 
 
 def embedded(drawn: Figure) -> str:
-    """Return a figure as the source of an image on a page."""
+    """Return a figure as a data URL for an image on a page."""
     content = io.BytesIO()
     save_png(drawn, content)
     return png_address(content.getvalue())

@@ -1,4 +1,4 @@
-"""How the file of a recorded trace is to be read."""
+"""Command-line options for reading the file of a recorded trace."""
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -17,20 +17,20 @@ _OPTIONS = {"noise_rad": "noise"}
 
 @dataclass(frozen=True)
 class ReadAs:
-    """Keys of the config's ``measurement`` block that concern a trace, as options give them.
+    """Command-line counterparts of those keys of ``measurement`` that concern a recorded trace.
 
     Parameters
     ----------
     time, rotation
         Names of the columns.
     time_unit, rotation_unit
-        Where the columns' names have none.
+        Units of the columns, where their names have none.
     noise_rad
         Standard deviation of the noise, if it is known.
     offset, drift
-        Whether the instrument may have added a constant, and a drift linear in time.
+        If true, fit a constant or a linear drift of the instrument along.
     noise_model
-        What noise is taken for; ``white`` or ``coloured``.
+        Noise model, ``white`` or ``coloured``.
     """
 
     time: str = "time_s"
@@ -44,24 +44,24 @@ class ReadAs:
 
     @property
     def block(self) -> dict[str, str | float | bool]:
-        """The keys that are given."""
+        """Keys of the ``measurement`` block that are given."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
     @property
     def columns(self) -> Columns:
-        """Where in its file a trace stands."""
+        """Names and units of the file's columns."""
         units = self.time_unit, self.rotation_unit
         return Columns(self.time, self.rotation, *units, by_options=True)
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
-        """Read a trace, and refuse what its gripper and protocol cannot have given.
+        """Read a trace, and refuse one that is impossible with its gripper and protocol.
 
         Parameters
         ----------
         file
             CSV file.
         gripper, problem
-            With what and under what it was recorded.
+            Gripper and protocol it was recorded with.
 
         Raises
         ------
@@ -71,12 +71,12 @@ class ReadAs:
         return recording.read_checked(recording.Settings(gripper, problem, self.columns), file)
 
     def check(self) -> None:
-        """Refuse what the config would refuse.
+        """Refuse option values that the config would refuse.
 
         Raises
         ------
         BiogripError
-            With the option.
+            With the option's name.
         """
         if self.noise_model == COLOURED and self.noise_rad is not None:
             raise BiogripError(

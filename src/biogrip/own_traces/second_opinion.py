@@ -1,4 +1,4 @@
-"""Whether the instrument may have added an offset or a drift that nobody declared."""
+"""Test for an offset or drift of the instrument that the user did not declare."""
 
 from dataclasses import replace
 
@@ -19,25 +19,25 @@ from biogrip.study.study import Case, Study
 def second_opinion(
     study: Study, case: Case, recorded: Measurements, told: Diagnosis, progress: Progress
 ) -> list[str]:
-    """Fit an offset and a drift along, and say so if they explain the trace far better.
+    """Fit an offset and a drift along, and return a warning if they lower chi^2 significantly.
 
-    By the likelihood ratio: where neither is in the trace, chi^2 falls as chi-squared with
-    as many degrees of freedom as are added is distributed (Wilks 1938). What it would do in
-    less than the share `FALSE_ALARM` of traces is said.
+    The test is a likelihood ratio: if neither is in the trace, the decrease of chi^2 follows a
+    chi-squared distribution with as many degrees of freedom as terms are added (Wilks 1938). A
+    warning is due at a p-value below `FALSE_ALARM`.
 
     Parameters
     ----------
     study, case, recorded
-        The trace and how it is identified.
+        The trace and the case it is identified as.
     told
-        What it tells as it was declared.
+        Diagnosis without the added terms.
     progress
-        Is told of the fit.
+        Callback for progress.
 
     Returns
     -------
     list of str
-        A sentence or none; none either where both are declared, or a fit takes minutes.
+        At most one sentence. Empty if both terms are declared already, or the model is nonlinear.
     """
     posed = case.problem
     added = 2 - posed.offset - posed.drift
@@ -48,7 +48,7 @@ def second_opinion(
     rng = stream(study.study_seed, case.name, 0, "instrument")
     found = best_fit(problem, case.method("least_squares"), rng, progress)
     likelihood = told.likelihood
-    # Without offset and drift it is a fit as well: with them, none may be worse.
+    # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
     from_there = found.at(fit_from([problem], likelihood.best))
     found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))
     fall = fall_of(
@@ -79,16 +79,16 @@ def second_opinion(
 def fall_of(
     samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
 ) -> float:
-    """Return by how much twice the log-likelihood rises with a better fit.
+    """Return the decrease of chi^2, i.e. twice the increase of the log-likelihood.
 
     Parameters
     ----------
     samples
-        How many there are.
+        Number of samples.
     before_rad, after_rad
-        Misfit of both fits.
+        RMS residuals of the worse and of the better fit.
     noise_rad
-        Standard deviation of the noise if it is known; else it is what each fit leaves.
+        Standard deviation of the noise, if known; otherwise each fit's misfit estimates it.
     """
     if noise_rad is not None:
         return samples * (before_rad**2 - after_rad**2) / noise_rad**2
@@ -96,7 +96,7 @@ def fall_of(
 
 
 def _differ(before: Finding, after: Finding) -> bool:
-    """Whether one verdict is another, or an estimate outside the other interval."""
+    """Return whether verdicts differ, or the estimate moved out of the earlier interval."""
     if before.verdict != after.verdict:
         return True
     low, high = before.low or 0.0, before.high or np.inf

@@ -1,4 +1,4 @@
-"""What was identified, as text for a terminal."""
+"""Results of identification as plain text for a terminal."""
 
 import os
 import sys
@@ -19,13 +19,13 @@ from biogrip.identifiability.verdicts import (
 from biogrip.terminal import visible, visible_lines
 
 STRONG = 3.0
-"""Natural logarithm of a ratio of evidences from which on it is strong (Kass and Raftery 1995)."""
+"""Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
 
 _COLOURS = {DETERMINED: 32, BOUNDED_ABOVE: 33, BOUNDED_BELOW: 33, NOT_DETERMINED: 31}
 
 
 def in_words(found: Mapping[str, Any]) -> str:
-    """Return what is said of one trace, see `identify_trace`, as text to read."""
+    """Return the result of `identify_trace` for one trace as plain text."""
     width = max(len(item["quantity"]) for item in found["quantities"])
     lines = [
         f"{visible(found['trace'])}: {found['samples']} samples, "
@@ -52,7 +52,7 @@ def in_words(found: Mapping[str, Any]) -> str:
 
 
 def _posterior(told: Mapping[str, Any]) -> list[str]:
-    """Say what samples of a posterior say."""
+    """Return sentences and a table about the posterior samples."""
     width = max(len(item["quantity"]) for item in told["quantities"])
     prior = (
         f"prior: {', '.join(told['prior'])} as given, else log-uniform over the search range"
@@ -69,7 +69,7 @@ def _posterior(told: Mapping[str, Any]) -> list[str]:
 
 
 def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Say in a sentence which models the evidence is for, if it was asked for."""
+    """Return a sentence on the models with the highest evidence; nothing if none was computed."""
     if not rows:
         return []
     best = min(rows, key=lambda row: row["delta_log_evidence"])
@@ -82,7 +82,7 @@ def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:
-    """Return what is said of several traces as a table, a row a trace, and the refused ones."""
+    """Return several traces as a table with one row per trace, followed by refused traces."""
     lines = []
     if found:
         labels = labels_of(found)
@@ -92,7 +92,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
-        lines += [f"Sums are told provided {words}." for words in provided]
+        lines += [f"Sums hold provided {words}." for words in provided]
         lines += [
             f"{visible(each['trace'])}: {visible(note)}" for each in found for note in each["notes"]
         ]
@@ -104,12 +104,12 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
 
 
 def labels_of(found: Iterable[Mapping[str, Any]]) -> list[str]:
-    """Return what is said of any of several traces, each quantity once."""
+    """Return the labels of all quantities of several traces, each once."""
     return list(dict.fromkeys(q["quantity"] for each in found for q in each["quantities"]))
 
 
 def taken_for_granted(found: Mapping[str, Any]) -> str:
-    """Say of which of gripper and protocol the default study's are assumed."""
+    """Return a sentence naming defaults (gripper, protocol) that the user did not replace."""
     phases = ", ".join(_phase(phase) for phase in found["assumed"]["protocol"]["phases"])
     said = {
         "gripper": "the default study's gripper",
@@ -136,7 +136,7 @@ def _cells(found: Mapping[str, Any], labels: Sequence[str]) -> list[str]:
 
 
 def limits_in_short(quantity: Mapping[str, Any]) -> str:
-    """Say in few letters what a trace tells of a quantity."""
+    """Return value and limits of a quantity in a few characters."""
     low, high = quantity["low"], quantity["high"]
     if low is not None and high is not None:
         return f"{quantity['value']:.3g} ({low:.3g} to {high:.3g})"
@@ -150,7 +150,7 @@ def _doubts(found: Mapping[str, Any]) -> str:
 
 
 def _coloured(text: str, verdict: str) -> str:
-    """Colour a verdict where that can be seen (https://no-color.org)."""
+    """Colour a verdict if standard output is a terminal (https://no-color.org)."""
     if not sys.stdout.isatty() or os.environ.get("NO_COLOR"):
         return text
     return f"\x1b[{_COLOURS[verdict]}m{text}\x1b[0m"

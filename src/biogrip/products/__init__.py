@@ -1,1 +1,1 @@
-"""What the study makes: stages, tables, figures and pages, each beside its declaration."""
+"""Products of a study (intermediate files, tables, figures, pages), each declared by its module."""

@@ -1,4 +1,4 @@
-"""Which seeds go into which job."""
+"""Division of the seeds of a case into batches, one per job."""
 
 import re
 from collections.abc import Iterable
@@ -10,41 +10,41 @@ from biogrip.study.config import LARGEST_BATCH, SMALLEST_BATCH, USUAL_BATCHES
 
 
 class Batch(NamedTuple):
-    """Seeds from first to last, both included."""
+    """A range of seeds from first to last, both included."""
 
     first: int
     last: int
 
     @property
     def name(self) -> str:
-        """Name in files, e.g. ``seeds_0-24``."""
+        """Name used in files, e.g. ``seeds_0-24``."""
         return f"seeds_{self.first}-{self.last}"
 
     @property
     def seeds(self) -> list[int]:
-        """Return every seed of the batch."""
+        """All seeds of the batch."""
         return list(range(self.first, self.last + 1))
 
 
 def parse_batch(name: str) -> Batch | None:
-    """Return the batch of a name, or None if it is no batch's name."""
+    """Return the batch that a name stands for, or None if the name has another form."""
     match = re.fullmatch(r"seeds_(\d+)-(\d+)", name)
     return Batch(int(match[1]), int(match[2])) if match else None
 
 
 def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) -> list[Batch]:
-    """Cover seeds 0 to ``seeds - 1`` with batches, keeping those that exist.
+    """Divide seeds 0 to ``seeds - 1`` into batches, keeping existing ones.
 
-    Seeds without a batch are cut at the multiples of the batch size. Because
-    what exists is kept whole, raising the number of seeds never redoes one, and
-    a half-finished run is continued with the batches it was started with.
+    Seeds without a batch are cut at multiples of the batch size. Existing batches are kept
+    whole, so raising the number of seeds recomputes none of them, and an interrupted run continues
+    with the batches it started with.
 
     Parameters
     ----------
     seeds, batch_size
-        What to cover, in pieces of at most what size.
+        Number of seeds, and most seeds of a batch.
     existing
-        Batches with results; where two overlap, the one that starts first counts.
+        Batches that have results; of two that overlap, the one that starts first is kept.
     """
     plan: list[Batch] = []
     covered = 0
@@ -59,21 +59,21 @@ def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) ->
 
 
 def seeds_a_batch(seeds: int) -> int:
-    """Size of the batches of a case where the study does not say.
+    """Return the default number of seeds per batch.
 
-    Enough that starting a job is little beside its work and that there are not
-    too many jobs to plan, and no more than fit into little memory.
+    It is large enough that start-up is a small part of a job and that jobs are not too many, and
+    small enough for little memory.
     """
     return min(max(SMALLEST_BATCH, -(-seeds // USUAL_BATCHES)), LARGEST_BATCH)
 
 
 def existing_batches(folder: Path) -> list[Batch]:
-    """Batches with a result file in a folder."""
+    """Return the batches that have a result file in a folder."""
     found = (parse_batch(file.stem) for file in folder.glob("seeds_*.csv"))
     return [batch for batch in found if batch]
 
 
 def _cut(start: int, stop: int, size: int) -> list[Batch]:
-    """Cut seeds start to stop - 1 at the multiples of size."""
+    """Cut seeds start to stop - 1 at multiples of size."""
     edges = [start, *range((start // size + 1) * size, stop, size), stop]
     return [Batch(a, b - 1) for a, b in pairwise(edges) if a < b]

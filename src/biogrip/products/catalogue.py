@@ -1,4 +1,4 @@
-"""All products there are: every module below this package is asked what it declares."""
+"""Registry of all products, collected from the modules of this package."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -24,19 +24,19 @@ def products() -> dict[str, Product]:
 
 
 def chosen(names: Iterable[str]) -> list[Product]:
-    """Return some products, loading as few of the others as may be.
+    """Return products by name, importing as few other modules as possible.
 
     Raises
     ------
     BiogripError
-        If there is no such product.
+        If there is no product of that name.
     """
     return [_product(name) for name in names]
 
 
 def _product(name: str) -> Product:
     called_so = [module for module in _modules() if module.endswith(f".{name}")]
-    # Where none is, the declaration itself says the name.
+    # Without a module of that name, search the sources for the declaration.
     for module in (*called_so, *_modules()):
         if module in called_so or f'"{name}"' in _source(module):
             for product in _declared(import_module(module)):

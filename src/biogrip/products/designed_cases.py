@@ -1,4 +1,4 @@
-"""Cases whose experiment was designed: what is simulated, beside the study's own experiment."""
+"""Cases with a designed experiment, compared with the experiment of the study."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,28 +14,28 @@ from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Study
 
 WELL = 0.1
-"""A parameter that is known to this share of itself counts as determined."""
+"""Relative bound below which a parameter counts as determined."""
 
-# Samples whose sensitivities are formed at once.
+# Number of samples whose sensitivities are computed at once.
 _AT_ONCE = 20
 
 
 @dataclass(frozen=True)
 class CaseSettings:
-    """A case's experiment, and the study's.
+    """A case with its own experiment and that of the study.
 
     Parameters
     ----------
     gripper, model
-        What is simulated, with inertia; the model without what is known.
+        Simulated gripper and sample model, with inertia; the model is without fixed parameters.
     parameters
         True values by name, SI units.
     noise_rad
-        Of the sensor.
+        Standard deviation of the sensor's noise.
     before, after
-        Protocol and sampling of the study, and of the case.
+        Protocol and sampling of the study (before) and of the case (after).
     title
-        In print.
+        Title.
     """
 
     gripper: Gripper
@@ -48,7 +48,7 @@ class CaseSettings:
 
 
 def settings(study: Study) -> dict[str, CaseSettings]:
-    """Choose the experiments of cases that ask for a design."""
+    """Return the experiments of the simulated cases that have a `design` block and bursts."""
     shared = study.config
     before = (
         shared.protocol.torques(shared.actuator),
@@ -72,7 +72,7 @@ def settings(study: Study) -> dict[str, CaseSettings]:
 
 
 def designed_cases(study: Study) -> list[str]:
-    """Name the simulated cases that ask for a design, and are sampled as one has it, in bursts."""
+    """Return names of simulated cases that have a `design` block and are sampled in bursts."""
     return [
         name
         for name in study.simulated
@@ -81,16 +81,16 @@ def designed_cases(study: Study) -> list[str]:
 
 
 def bounds(case: CaseSettings, experiment: Experiment, parameters: Array) -> Array:
-    """Return relative bounds of samples' parameters in an experiment, none taken as known.
+    """Return relative Cramér-Rao bounds of parameters in an experiment, with all of them unknown.
 
     Parameters
     ----------
     case
         Gripper, model and noise.
     experiment
-        Which one.
+        Protocol and sampling.
     parameters : (n, n_parameters)
-        Samples, SI units.
+        Parameters of n samples, SI units.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""A short fingerprint of settings, by which the workflow knows that they have changed."""
+"""Hash of a product's settings, by which Snakemake notices changes."""
 
 import hashlib
 import json
@@ -9,25 +9,25 @@ from typing import Any
 import numpy as np
 
 _LETTERS = 12
-# What follows from the config by arithmetic may differ in its last bits between processors.
+# Values derived from the config may differ in the last bits between processors.
 _DIGITS = 12
 
 
 def digest(settings: object) -> str:
-    """Return letters that change with anything that settings hold.
+    """Return a hash of settings that is the same on all processors.
 
     Parameters
     ----------
     settings
-        Frozen dataclasses, mappings, sequences, arrays, text, numbers, None. What
-        can be called is passed over: a model's function is known by the model's name.
+        Frozen dataclasses, mappings, sequences, arrays, text, numbers, None. Functions are ignored:
+        a model is identified by its name.
     """
     text = json.dumps(_plain(settings))
     return hashlib.sha256(text.encode()).hexdigest()[:_LETTERS]
 
 
 def _plain(value: object) -> Any:
-    # What there is most of comes first.
+    # The most frequent types come first.
     if isinstance(value, str | int) or value is None:
         return value
     if isinstance(value, float | complex):

@@ -1,4 +1,4 @@
-"""What the table and the heat maps of a sweep are made of."""
+"""Settings and inputs shared by the table and the heat maps of a sweep."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,16 +16,16 @@ from biogrip.study.sweeps import Axis, Sweep
 
 @dataclass(frozen=True)
 class ShownAxis:
-    """An axis in print.
+    """An axis of a sweep as it is shown.
 
     Parameters
     ----------
     label
-        Its name, with the unit.
+        Title, with the unit.
     values
-        As shown, by what files have.
+        Values as shown, by their text in files.
     reconstructed
-        Whether the paper does not give its values.
+        True if the paper does not give the values.
     """
 
     label: str
@@ -34,28 +34,28 @@ class ShownAxis:
 
     @property
     def title(self) -> str:
-        """Its name, marked where the paper does not give its values."""
+        """Title, marked if the paper does not give the values."""
         return f"{self.label}, reconstructed" if self.reconstructed else self.label
 
 
 @dataclass(frozen=True)
 class HeatMaps:
-    """A sweep in print.
+    """Titles, axes and tolerances of a sweep's table and heat maps.
 
     Parameters
     ----------
     title
-        Its name.
+        Title of the sweep.
     cases
-        Names in print by name.
+        Titles of the cases, by name.
     methods
-        Identifiers.
+        Names of the methods.
     rows, columns
-        What changes.
+        Axes of the grid.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to count as near it.
+        Share by which a misfit may exceed the noise to count as near it.
     reconstructed
-        Keys of the gripper whose values the paper does not give.
+        Keys of the gripper that the paper does not give.
     """
 
     title: str
@@ -68,7 +68,7 @@ class HeatMaps:
 
 
 def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
-    """Choose what the table and the heat maps of a sweep depend on."""
+    """Return the settings that the table and the heat maps of a sweep depend on."""
     titles = {name: study.cases[name].title for name in sweep.cases}
     return HeatMaps(
         sweep.title,
@@ -91,7 +91,7 @@ def _shown(study: Study, axis: Axis) -> ShownAxis:
 
 
 def points_of_cases() -> Reads:
-    """Read the judged points of every case that the job's sweep is laid over."""
+    """Return the input files with judged points, one per case of the job's sweep."""
     return Reads(
         lambda plan, job: [
             POINTS.path.format(sweep=job["sweep"], case=case)
@@ -106,7 +106,7 @@ def read_points(paths: list[Path], case: str) -> pd.DataFrame:
     Raises
     ------
     BiogripError
-        If there are none among the files, or they are damaged.
+        If no file is the case's, or it is damaged.
     """
     for path in paths:
         if path.stem == case:

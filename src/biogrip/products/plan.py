@@ -1,4 +1,4 @@
-"""The jobs of a study: its cases, and their seeds in batches."""
+"""Plan of a study's jobs: cases, and batches of seeds."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ from biogrip.products.batches import (
 from biogrip.study.study import Study
 
 Wildcards = Mapping[str, str]
-"""Which job: ``case``, ``method``, ``batch``, ``sweep``, ``seed``, as far as there are such."""
+"""Wildcards of a job, any of ``case``, ``method``, ``batch``, ``sweep`` and ``seed``."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Plan:
     Parameters
     ----------
     study
-        What to do.
+        The study.
     results
-        Folder of the results; what it already holds decides the batches.
+        Folder of the results; batches that have results there are kept.
     """
 
     study: Study
@@ -35,17 +35,17 @@ class Plan:
     _planned: dict[tuple[str, ...], list[Batch]] = field(default_factory=dict, init=False)
 
     def batches(self, stage: str, case: str, method: str = "") -> list[Batch]:
-        """Batches of a stage's seeds of a case; those that have results are kept.
+        """Return the batches of a case's seeds in a stage, keeping those that have results.
 
         Parameters
         ----------
         stage
             Folder of the results: ``identifications``, ``coverage`` or ``selection``.
         case, method
-            Of what; identifications are by method.
+            Name of the case; for identifications also the method.
         """
         folder = (stage, case, method) if method else (stage, case)
-        # Listed once: a plan does not change while it is carried out.
+        # Cached: existing files are listed once per plan.
         if folder not in self._planned:
             whose = self.study.case(case)
             seeds = whose.coverage_seeds if stage == "coverage" else whose.seeds
@@ -55,10 +55,10 @@ class Plan:
         return self._planned[folder]
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
-        """Fill ``{case}``, ``{method}`` and ``{batch}`` of a path for every batch of a case.
+        """Return a path pattern filled in for every batch of a case.
 
-        A path without a method and of no stage of its own goes by the batches of the
-        method that is shown.
+        A pattern without a method, and of no stage with batches of its own, uses the batches of
+        the shown method.
         """
         stage = Path(pattern).parts[1]
         if stage in ("coverage", "selection"):
@@ -72,14 +72,14 @@ class Plan:
         ]
 
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
-        """Fill ``{case}`` and ``{batch}`` of a path for the batch that holds a seed."""
+        """Return a path pattern filled in with the batch that holds a seed."""
         batches = self.batches("identifications", case, self.study.shown)
         found = [batch for batch in batches if batch.first <= seed <= batch.last]
         batch = found[0] if found else Batch(seed, seed)
         return pattern.format(case=case, batch=batch.name)
 
     def batch_jobs(self, stage: str, cases: Iterable[str]) -> list[Wildcards]:
-        """Jobs of a stage whose batches have no method."""
+        """Return the wildcards of every batch of a stage without methods."""
         return [
             {"case": case, "batch": batch.name}
             for case in cases
@@ -87,7 +87,7 @@ class Plan:
         ]
 
     def method_jobs(self, cases: Iterable[str]) -> list[Wildcards]:
-        """Jobs of the identification, a batch and method each."""
+        """Return the wildcards of every batch and method of the identification."""
         return [
             {"case": case, "method": method, "batch": batch.name}
             for case in cases
@@ -97,12 +97,12 @@ class Plan:
 
     @staticmethod
     def seeds_of(batch: str) -> list[int]:
-        """Seeds of a batch by its name.
+        """Return the seeds of a batch, given its name.
 
         Raises
         ------
         BiogripError
-            If it is no batch's name.
+            If the name has another form.
         """
         found = parse_batch(batch)
         if found is None or found.last < found.first:

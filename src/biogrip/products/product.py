@@ -1,4 +1,4 @@
-"""What the study makes: each thing declared beside the function that makes it."""
+"""Declaration of products: what a Snakemake rule is generated from."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ from biogrip.products.plan import Plan, Wildcards
 from biogrip.study.study import Study
 
 PUBLISHED_TABLE_KINDS = (".csv", ".md", ".tex")
-"""HTML is for the report alone."""
+"""Formats of published tables; HTML is for the report only."""
 
 TABLE_KINDS = (*PUBLISHED_TABLE_KINDS, ".html")
 FIGURE_KINDS = (".png", ".pdf")
@@ -17,16 +17,16 @@ FIGURE_KINDS = (".png", ".pdf")
 
 @dataclass(frozen=True)
 class Weight:
-    """How heavy a job is, for a cluster.
+    """Resources of a job on a cluster.
 
     Parameters
     ----------
     minutes, megabytes
-        What it takes at most; more of both at every retry.
+        Upper limits; every retry raises both.
     group
-        Jobs of a group that follow one another are submitted as one.
+        Successive jobs of a group are submitted as one.
     local
-        Whether it is less work than submitting it.
+        True if the job is too short to be worth submitting.
     """
 
     minutes: int = 5
@@ -42,14 +42,14 @@ JUDGEMENT = Weight(60, 1000, group="verdicts")
 
 @dataclass(frozen=True)
 class Reads:
-    """Files that a product is made from.
+    """Input files of a product.
 
     Parameters
     ----------
     files
-        Names them, given the plan and the wildcards of a job.
+        Function of plan and wildcards that names the files.
     one
-        Whether it is always a single file.
+        True if it is always a single file.
     """
 
     files: Callable[[Plan, Wildcards], list[str]]
@@ -57,51 +57,51 @@ class Reads:
 
 
 def the(pattern: str) -> Reads:
-    """One file, named by the wildcards of the job itself."""
+    """Return the input that is a single file with the job's own wildcards."""
     return Reads(lambda _, job: [pattern.format(**job)], one=True)
 
 
 def of_cases(pattern: str, cases: Callable[[Study], Iterable[str]]) -> Reads:
-    """A file of each of some cases."""
+    """Return the input that has one file per case."""
     return Reads(lambda plan, _: [pattern.format(case=name) for name in cases(plan.study)])
 
 
 def of_batches(pattern: str) -> Reads:
-    """All batches of the job's case, of every method if the pattern has one."""
+    """Return the input with all batches of the job's case, and of all methods if asked."""
     return Reads(lambda plan, job: plan.batch_files(pattern, job["case"]))
 
 
 @dataclass(frozen=True)
 class Product:
-    """Something that the study makes.
+    """A product of the study, made by one or more jobs of a Snakemake rule.
 
     Parameters
     ----------
     name
-        Names it in commands, logs and the report.
+        Name in commands, logs and the report.
     writes
-        Files by name, as patterns with the wildcards of a job in braces.
+        Output files by name, as patterns with the job's wildcards in braces.
     make
-        Is called with the settings, then by keyword the files of `reads` and `writes`,
-        a list where there may be several, and ``seeds`` or ``seed`` if it has any.
+        Function that makes the outputs, called with the settings, and by keyword with the files of
+        `reads` and `writes` (lists if there may be several), and ``seeds`` or ``seed`` if any.
     settings
-        All of the config that it uses, from the study and the wildcards.
+        Function of study and wildcards that returns all of the config that the product uses.
     jobs
-        Which jobs a study has of it; wildcards of each.
+        Function that returns the wildcards of every job in a plan.
     message
-        What a job says that it does, with wildcards in braces.
+        Message of a job in the log, with wildcards in braces.
     reads
-        Files that it is made from, by name.
+        Input files by name.
     weight
-        How heavy a job is.
+        Resources of a job.
     sheet
-        Products of the same sheet are made by one job: starting one takes longer than most.
+        Products of a sheet are made by one job, as start-up takes longer than most of them.
     category, item, caption
-        Where in the report its page stands, and what is said of it; none without a category.
+        Place and caption in the report; a product without category is not in it.
     modules
-        Modules it is made by beside its own, given the wildcards.
+        Function of the wildcards that names further modules whose code the product depends on.
     asked
-        Whether a run makes it without being asked.
+        True if a run makes it by default.
     """
 
     name: str
@@ -121,19 +121,19 @@ class Product:
 
     @property
     def module(self) -> str:
-        """Name of the module that declares it, and holds what makes it."""
+        """Name of the module that declares the product and holds its code."""
         return self.make.__module__
 
     def inputs(self, plan: Plan, job: Wildcards) -> dict[str, list[str]]:
-        """Files that a job reads, by name."""
+        """Return the input files of a job by name."""
         return {name: reads.files(plan, job) for name, reads in self.reads.items()}
 
     def outputs(self, job: Wildcards) -> dict[str, str]:
-        """Files that a job writes, by name."""
+        """Return the output files of a job by name."""
         return {name: pattern.format(**job) for name, pattern in self.writes.items()}
 
     def run(self, plan: Plan, job: Wildcards) -> None:
-        """Do one job."""
+        """Run one job."""
         given: dict[str, Any] = {
             name: [Path(file) for file in files] for name, files in self.inputs(plan, job).items()
         }
@@ -149,22 +149,22 @@ class Product:
 
 
 def wildcards_of(names: Iterable[str]) -> list[Wildcards]:
-    """Jobs that are one a case."""
+    """Return the wildcards of jobs that are one per case."""
     return [{"case": name} for name in names]
 
 
 @dataclass(frozen=True)
 class Scope:
-    """Of what there is a table or figure: of the study, of each of some cases, or of each sweep.
+    """Scope of a table or figure: one for the study, one per case, or one per sweep.
 
     Parameters
     ----------
     cases
-        Which cases; None where it is not of cases.
+        Function that names the cases; None if the scope is not cases.
     sweeps
-        Whether it is of sweeps.
+        True for one per sweep.
     when
-        Whether a study has it.
+        Condition for a study to have it.
     """
 
     cases: Callable[[Study], Iterable[str]] | None
@@ -173,11 +173,11 @@ class Scope:
 
     @property
     def whose(self) -> str:
-        """The wildcard in braces; nothing of the study's."""
+        """Wildcard of the scope in braces; empty for one per study."""
         return "{case}" if self.cases else "{sweep}" if self.sweeps else ""
 
     def jobs(self, plan: Plan) -> list[Wildcards]:
-        """Jobs that a study has of it."""
+        """Return the wildcards of its jobs in a plan."""
         if not self.when(plan.study):
             return []
         if self.sweeps:
@@ -185,7 +185,7 @@ class Scope:
         return wildcards_of(self.cases(plan.study)) if self.cases else [{}]
 
     def settings(self, choose: Callable[..., object], study: Study, job: Wildcards) -> object:
-        """Call a function that chooses settings with the study, and the case or sweep."""
+        """Return `choose` of the study, or of the study and the job's case or sweep."""
         if self.sweeps:
             return choose(study, study.sweeps[job["sweep"]])
         return choose(study, study.case(job["case"])) if self.cases else choose(study)

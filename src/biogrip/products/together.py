@@ -1,4 +1,4 @@
-"""Which products one job makes together, and what the rule of such jobs is called."""
+"""Grouping of products into jobs, and names of the resulting Snakemake rules."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -10,16 +10,16 @@ from biogrip.products.product import Product
 
 @dataclass(frozen=True)
 class Together:
-    """Products that one job makes.
+    """Products that one rule makes, with its jobs.
 
     Parameters
     ----------
     rule
-        Name of the rule.
+        Name of the Snakemake rule.
     products
-        What is made.
+        Products of each job.
     jobs
-        All jobs that make these products; wildcards of each.
+        Wildcards of each job.
     """
 
     rule: str
@@ -28,10 +28,10 @@ class Together:
 
 
 def together(products: Iterable[Product], plan: Plan) -> list[Together]:
-    """Put products together that are made by one job.
+    """Group products by sheet into rules.
 
-    All outputs of a rule are made, and not every case has every figure: of a sheet
-    there is a rule for each set of products that cases have in common.
+    A rule always makes all its outputs, but not every case has every figure. So a sheet has
+    one rule for each set of products that cases have in common.
     """
     sheets: dict[str, list[Product]] = defaultdict(list)
     for product in products:
@@ -47,7 +47,7 @@ def together(products: Iterable[Product], plan: Plan) -> list[Together]:
 
 
 def _in_common(members: list[Product], plan: Plan) -> dict[tuple[int, ...], list[Wildcards]]:
-    """Jobs by the indices of the products that they have."""
+    """Return the wildcards of jobs by indices of the products they make."""
     makes: dict[tuple[tuple[str, str], ...], list[int]] = defaultdict(list)
     for index, product in enumerate(members):
         for job in product.jobs(plan):

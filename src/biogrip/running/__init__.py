@@ -1,1 +1,1 @@
-"""Running a study: what the workflow needs, and no physicist has to read."""
+"""Running a study with Snakemake: records of files, locks, signals, export."""

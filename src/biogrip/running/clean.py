@@ -1,4 +1,4 @@
-"""Removes what a study wrote, and nothing else."""
+"""The command ``biogrip clean``."""
 
 from pathlib import Path
 
@@ -10,22 +10,22 @@ from biogrip.running.manifest import Manifest
 
 
 def clean(results: Path) -> str:
-    """Remove what a study wrote, and nothing else; folders that are then empty go, too.
+    """Remove the files that a study wrote, and folders that are then empty.
 
     Parameters
     ----------
     results
-        The results folder, in the folder that Snakemake ran in.
+        Results folder, below the folder that Snakemake ran in.
 
     Returns
     -------
     str
-        What was done, and what was left.
+        Summary of what was removed and kept.
 
     Raises
     ------
     BiogripError
-        If a run is going on, or the record cannot be trusted. Nothing is removed then.
+        If a run is active, or the record is invalid. Nothing is removed then.
     """
     if results.is_symlink():
         raise BiogripError(f"{results}: is a link, and nothing is removed through links.")
@@ -51,5 +51,5 @@ def clean(results: Path) -> str:
     for folder in sorted({*folders, results / JOURNALS}, key=lambda f: -len(f.parts)):
         if folder.is_dir() and not any(folder.iterdir()):
             folder.rmdir()
-    kept = f" Kept, for they were edited: {', '.join(map(str, left))}." if left else ""
+    kept = f" Kept, as they were edited: {', '.join(map(str, left))}." if left else ""
     return f"{counted(len(written), 'file')} of {results} removed.{kept}"

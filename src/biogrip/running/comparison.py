@@ -1,4 +1,4 @@
-"""Compares regenerated tables with published ones, cell by cell."""
+"""The command ``biogrip compare``: regenerated against published tables, cell by cell."""
 
 from pathlib import Path
 
@@ -17,18 +17,18 @@ def compare(published: Path, now: Path) -> str:
     Parameters
     ----------
     published, now
-        Folders of tables.
+        Folders of published and of regenerated tables.
 
     Returns
     -------
     str
-        How many tables agree.
+        Number of tables that agree.
 
     Raises
     ------
     BiogripError
-        If a table is missing on either side or any cell differs; the message
-        shows case, parameter, column and both values.
+        If a table is missing on either side or any cell differs; the message names row, column
+        and both values.
     """
     names = _tables(published)
     if not names:
@@ -51,7 +51,7 @@ def compare(published: Path, now: Path) -> str:
 
 
 def _tables(folder: Path) -> set[str]:
-    """Names of the tables to compare."""
+    """Return names of the tables in a folder."""
     return {path.name for path in folder.glob("*.*") if path.suffix in PUBLISHED_TABLE_KINDS}
 
 

@@ -1,7 +1,7 @@
-"""A finished study as a Workflow Run RO-Crate: what was run on what, when, and what came out.
+"""The command ``biogrip crate``: a finished study as a Workflow Run RO-Crate.
 
-The profile is https://w3id.org/ro/wfrun/workflow/0.5. What the record knows of a file, its
-size and hash, goes with it.
+The profile is https://w3id.org/ro/wfrun/workflow/0.5. Recorded sizes and hashes of files are
+included.
 """
 
 import platform
@@ -32,7 +32,7 @@ _PROFILES = {
     "https://w3id.org/workflowhub/workflow-ro-crate/1.0": ("Workflow RO-Crate", "1.0"),
 }
 _TERMS = {"sha256": "https://w3id.org/ro/terms/workflow-run#sha256"}
-"""Terms of the profile that the context of RO-Crate 1.1 lacks."""
+"""Term of the profile that the context of RO-Crate 1.1 lacks."""
 
 _FORMATS = {
     ".csv": "text/csv",
@@ -49,24 +49,24 @@ _FORMATS = {
 
 
 def write_crate(results: Path, output: Path) -> str:
-    """Pack a finished study.
+    """Pack a finished study as an RO-Crate.
 
     Parameters
     ----------
     results
-        Its results folder.
+        Results folder of the study.
     output
-        The crate, a ZIP file.
+        ZIP file to write.
 
     Returns
     -------
     str
-        What was done.
+        Summary of what was packed.
 
     Raises
     ------
     BiogripError
-        If the study is not finished, or a result is not what was written or not of the study.
+        If the study is not finished, or a result was edited or belongs to another study.
     """
     from rocrate.rocrate import ROCrate
 
@@ -84,7 +84,7 @@ def write_crate(results: Path, output: Path) -> str:
         "How well a MEMS microgripper identifies the viscoelastic parameters of a cell: "
         "the workflow, the study that it was run on, and what came out."
     )
-    # Of the workflow; whose the traces of a study are, only its owner knows.
+    # License of the workflow; that of the user's traces is unknown.
     crate.license = "https://spdx.org/licenses/MIT"
     crate.datePublished = ended
     workflow = _workflow(crate)
@@ -121,12 +121,12 @@ def write_crate(results: Path, output: Path) -> str:
 
 
 def _time(record: Record) -> str:
-    """When a file was recorded, ISO 8601."""
+    """Return the time at which a file was recorded, ISO 8601."""
     return datetime.fromtimestamp(record.recorded_ns / 1e9, UTC).isoformat(timespec="seconds")
 
 
 def _workflow(crate: "ROCrate") -> "Entity":
-    """Add the Snakefile, what it includes and reads, and what runs it."""
+    """Add the Snakefile, its parts, and the software that runs it."""
     top = snakefile().parent
     workflow = crate.add_workflow(
         snakefile(),
@@ -149,7 +149,7 @@ def _workflow(crate: "ROCrate") -> "Entity":
 
 
 def _software() -> Iterator[tuple[str, str, str]]:
-    """Identifier, name and version of what the study runs on, in this environment."""
+    """Yield identifier, name and version of required software in this environment."""
     yield "https://www.python.org/", "Python", platform.python_version()
     yield f"pkg:pypi/biogrip@{__version__}", "biogrip", __version__
     for needed in metadata.requires("biogrip") or []:
@@ -160,7 +160,7 @@ def _software() -> Iterator[tuple[str, str, str]]:
 
 
 def _added(crate: "ROCrate", file: Path, name: str, record: Record | None = None) -> "Entity":
-    """Add a file, with what is on record of it."""
+    """Add a file, with size and hash from its record if there is one."""
     described: dict[str, Any] = {"name": name}
     if file.suffix in _FORMATS:
         described["encodingFormat"] = _FORMATS[file.suffix]

@@ -1,8 +1,7 @@
-"""What one process writes into the results, noted before it is in its place.
+"""Journal of the files that one process writes into the results.
 
-Each process has a file of its own, a line a file, so that writing it needs no
-lock on any file system, and that whatever is killed, no file of the study is
-without its record.
+A file is recorded before it is moved into place, so that after a kill no file lacks its record.
+Each process has its own journal with a line per file, so that no file system needs locks.
 """
 
 import hashlib
@@ -17,7 +16,7 @@ from biogrip.files import watched
 from biogrip.running.records import Record
 
 JOURNALS = ".manifest"
-"""Folder of the journals, among the results."""
+"""Folder of the journals, inside the results folder."""
 
 _NAME = re.compile(r"(?P<host>.+)--(?P<process>\d+)--\d+\.jsonl")
 _DAY_S = 86_400.0
@@ -25,14 +24,14 @@ _PROCESSES = 2**31
 
 
 class Journal:
-    """What one process writes into a results folder.
+    """Journal of the files that one process writes into a results folder.
 
     Parameters
     ----------
     results
         The results folder.
     settings, inputs
-        What its files are made for and of, see `biogrip.running.records.Record`.
+        Digests for all its files, see `biogrip.running.records.Record`.
     """
 
     def __init__(self, results: Path, settings: str = "", inputs: str = "") -> None:
@@ -42,15 +41,15 @@ class Journal:
         self._made = settings, inputs
 
     def note(self, path: Path, content: Path) -> None:
-        """Write down that `path` is about to be what `content` is now.
+        """Record that `path` is about to have the present content of `content`.
 
-        A path outside the results folder is nobody's to record.
+        Paths outside the results folder are not recorded.
         """
         if path.absolute().is_relative_to(self._results):
             self._append(self.record(path, content))
 
     def record(self, path: Path, content: Path) -> Record:
-        """Describe `path`, among the results, with what `content` is now."""
+        """Return a record of `path`, among the results, with the present content of `content`."""
         stat = content.stat()
         return Record(
             path.absolute().relative_to(self._results).as_posix(),
@@ -62,7 +61,7 @@ class Journal:
         )
 
     def note_begun(self, paths: Iterable[Path]) -> None:
-        """Write down that logs or scratch files are about to be written."""
+        """Record that logs or scratch files are about to be written."""
         for path in paths:
             whole = path.absolute()
             if whole.is_relative_to(self._results):
@@ -77,19 +76,19 @@ class Journal:
 
 @contextmanager
 def recorded_in(results: Path, settings: str = "", inputs: str = "") -> Iterator[None]:
-    """Record every file that is written whole below a results folder meanwhile."""
+    """Record every file written atomically below a results folder within a context."""
     journal = Journal(results, settings, inputs)
     with watched(journal.note, lambda scratch: journal.note_begun([scratch])):
         yield
 
 
 def journals_in(results: Path) -> list[Path]:
-    """Journals of a results folder; files with other names are somebody else's."""
+    """Return the journals of a results folder; files with other names are ignored."""
     return sorted(file for file in (results / JOURNALS).glob("*") if _NAME.fullmatch(file.name))
 
 
 def is_running(journal: Path) -> bool:
-    """Whether its process, on this computer and not this one, may write more."""
+    """Return whether the journal's process is another one on this computer and still runs."""
     import psutil
 
     host, process = _writer(journal)
@@ -98,25 +97,25 @@ def is_running(journal: Path) -> bool:
 
 
 def is_closed(journal: Path) -> bool:
-    """Whether its process is gone: known here, taken for granted elsewhere after a day."""
+    """Return whether the journal's process has ended; on other computers assumed after a day."""
     if _writer(journal)[0] == os.uname().nodename:
         return not is_running(journal)
     return time.time() - journal.stat().st_mtime > _DAY_S
 
 
 def _writer(journal: Path) -> tuple[str, int]:
-    """Host and process."""
+    """Return host and process id of a journal."""
     name = _NAME.fullmatch(journal.name)
     assert name is not None
     return name["host"], int(name["process"])
 
 
 def sha256_of(path: Path) -> str:
-    """Hash of a file, in hexadecimal."""
+    """Return the SHA-256 hash of a file, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def digest_of_files(contents: Iterable[str]) -> str:
-    """Letters that change with the contents of some files, given their hashes."""
+    """Return a digest of several files, given their hashes."""
     return hashlib.sha256("\n".join(contents).encode()).hexdigest()[:16]

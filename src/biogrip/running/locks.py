@@ -1,9 +1,8 @@
-"""Lets a run that was killed be continued with the same command.
+"""Removal of locks that a killed Snakemake left behind, so that a run can be continued.
 
-Snakemake locks its folder, and a killed Snakemake leaves the lock behind. Here
-every run writes down, once it holds its lock, who it is and which lock files are
-its own. Those of a run that is provably gone are taken away; a lock of another
-machine, of a run that lives, or that nobody signed is left alone.
+Snakemake locks its folder, and a kill leaves the lock behind. Each run therefore notes its
+process and its lock files once it holds the lock. Locks of a run that has provably ended are
+removed; those of another computer, of a living run or of unknown origin are kept.
 """
 
 import json
@@ -17,7 +16,7 @@ from biogrip.files import write_text
 
 
 def sign_locks(snakemake_folder: Path) -> None:
-    """Write down that the locks in a ``.snakemake`` folder are this run's."""
+    """Note that the locks in a ``.snakemake`` folder belong to this process."""
     process = psutil.Process()
     run = {
         "host": socket.gethostname(),
@@ -29,12 +28,12 @@ def sign_locks(snakemake_folder: Path) -> None:
 
 
 def is_locked(snakemake_folder: Path) -> bool:
-    """Whether a run holds locks in a ``.snakemake`` folder."""
+    """Return whether there are locks in a ``.snakemake`` folder."""
     return any((snakemake_folder / "locks").glob("*"))
 
 
 def release_dead_locks(snakemake_folder: Path) -> None:
-    """Remove the locks that a dead run has signed in a ``.snakemake`` folder."""
+    """Remove locks in a ``.snakemake`` folder that belong to a run that has ended."""
     try:
         run = json.loads((snakemake_folder / "run.json").read_text())
         dead = _is_dead(run)
@@ -48,7 +47,7 @@ def release_dead_locks(snakemake_folder: Path) -> None:
 
 
 def _locks(snakemake_folder: Path) -> dict[str, int]:
-    """When each lock file was made: a later run's lock has the same name, but not the same time."""
+    """Return modification times of lock files, which distinguish locks of the same name."""
     files = (snakemake_folder / "locks").glob("*")
     return {file.name: file.stat().st_mtime_ns for file in files}
 

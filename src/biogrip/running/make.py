@@ -1,4 +1,4 @@
-"""One job of the study that was last run here."""
+"""The command ``biogrip make``: one job of the study whose results are in this folder."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -15,18 +15,18 @@ from biogrip.running.sheet import Sheet, inputs_of, sheets_of
 def make(
     names: Sequence[str], job: Mapping[str, str], results: Path, made_for: str | None = None
 ) -> None:
-    """Make some products, and put them on record.
+    """Make products of one job, and record their files.
 
     Parameters
     ----------
     names
-        Which.
+        Names of the products.
     job
-        Of which case, method, batch, sweep, seed.
+        Wildcards of the job: case, method, batch, sweep, seed, as far as needed.
     results
-        Where the study stands that was last run.
+        Results folder of the study.
     made_for
-        Digest of the settings and the code, as the rule of the job has it.
+        Digest of settings and code, as Snakemake passes it to the job.
 
     Raises
     ------
@@ -48,7 +48,7 @@ def make(
 
 def _make(sheet: Sheet, asked: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
     files = [Path(file) for file in inputs_of(sheet, job)]
-    # What is missing is named by who reads it.
+    # If an input is missing, the product that reads it reports that.
     there = all(file.is_file() for file in files)
     inputs = digest_of_files(map(sha256_of, files)) if there else ""
     with recorded_in(sheet.plan.results, made_for, inputs):
@@ -57,14 +57,14 @@ def _make(sheet: Sheet, asked: Iterable[Product], job: Mapping[str, str], made_f
 
 
 def _planned(sheets: Iterable[Sheet], product: Product, job: Mapping[str, str]) -> Sheet:
-    """Return the sheet of the rule that makes a product, or one of its own if none is planned."""
+    """Return the rule that makes a product, or one of its own if none is planned."""
     found = [sheet for sheet in sheets if product.name in {p.name for p in sheet.products}]
     with_job = [sheet for sheet in found if job in sheet.jobs or not sheet.jobs]
     return (with_job or [Sheet(product.name, (product,), found[0].plan)])[0]
 
 
 def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
-    """See that a job is named in full, and is of this study."""
+    """Refuse a job whose wildcards are incomplete, superfluous or not of this study."""
     for name in sheet.wildcards:
         if name not in job:
             raise BiogripError(f"{sheet.name}: is made with --{name}, which is missing.")
@@ -89,7 +89,7 @@ def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
 
 
 def _check_batch(sheet: Sheet, job: Mapping[str, str]) -> None:
-    """See that a batch has what it is made of, planned or not: it may be of another plan."""
+    """Refuse a batch whose inputs do not exist; it need not be a batch of the present plan."""
     for file in (Path(file) for files in sheet.inputs(dict(job)).values() for file in files):
         if file.stem == job["batch"] and not file.exists():
             there = sorted(path.stem for path in file.parent.glob(f"*{file.suffix}"))

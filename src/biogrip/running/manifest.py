@@ -1,7 +1,7 @@
-"""The record of every file that a study wrote: what is whole, and what is the study's own.
+"""Manifest of all files that a study wrote, with sizes and hashes.
 
-A run merges what its jobs noted in their journals into ``manifest.jsonl``, of
-which a second copy lies beside the journals.
+A run merges the journals of its jobs into ``manifest.jsonl``; a second copy is in the folder of
+the journals.
 """
 
 import os
@@ -22,17 +22,17 @@ from biogrip.running.records import (
 )
 
 NAME = "manifest.jsonl"
-"""Name of the manifest, in the results and beside the journals."""
+"""Name of the manifest, in the results folder and in the folder of the journals."""
 
 OF_NO_RULE = "study.json", "crate.zip"
-"""Results that no rule makes: what the study is, and all of it packed."""
+"""Results that no rule makes: the resolved study, and its RO-Crate."""
 
-# A file may be found as it was before a write that was killed in its last instant.
+# Records kept per file: a kill can leave a file in its state before the last write.
 _KEPT = 2
 
 
 class Manifest:
-    """The records of a results folder.
+    """Records of all files in a results folder.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class Manifest:
     Raises
     ------
     BiogripError
-        If a file that is none of ours is in the place of a record, or a record names a file
-        outside the folder or behind a link.
+        If a foreign file is in the place of a record, or a record names a file outside the
+        folder or behind a link.
     """
 
     def __init__(self, results: Path) -> None:
@@ -51,7 +51,7 @@ class Manifest:
         self._records: dict[str, list[Record]] = {}
         refuse_other_than_folder(results / JOURNALS)
         journals = journals_in(results)
-        # Before they are read: what is added to one later must not go with it.
+        # Find closed journals before reading them: one that closes later may have unread lines.
         self._closed = [journal for journal in journals if is_closed(journal)]
         self._copies = results / NAME, results / JOURNALS / NAME
         readings = [read_manifest(copy) for copy in self._copies]
@@ -86,47 +86,47 @@ class Manifest:
 
     @property
     def paths(self) -> list[str]:
-        """Everything that is recorded, sorted, as in `Record`."""
+        """Paths of all recorded files, sorted, see `Record`."""
         return sorted(self._records)
 
     @property
     def files(self) -> list[str]:
-        """What is recorded but for the logs."""
+        """Paths of all recorded files except logs."""
         return [path for path in self.paths if not self.last(path).is_log]
 
     def others(self, names: Iterable[str]) -> list[str]:
-        """What is recorded but for the logs and some names."""
+        """Return recorded files except logs and given names."""
         return sorted({*self.files}.difference(names))
 
     def knows(self, path: str) -> bool:
-        """Whether the study wrote a file of this path."""
+        """Return whether the study wrote a file of this path."""
         return path in self._records
 
     def last(self, path: str) -> Record:
-        """Return how a file of this path, one of `paths`, was written last."""
+        """Return the last record of a file in `paths`."""
         return self._records[path][-1]
 
     def is_whole(self, path: str, *, thoroughly: bool = False) -> bool:
-        """Whether a file is what was written last.
+        """Return whether a file has the content that was last written.
 
         Parameters
         ----------
         path
-            One of `paths`, which is there.
+            An existing file of `paths`.
         thoroughly
-            Whether to read it even if size and time are the recorded ones.
+            If true, check the hash even if size and time agree.
         """
         return self._is(path, self.last(path), thoroughly=thoroughly)
 
     def note_times(self, paths: Iterable[str]) -> None:
-        """Take over the times that Snakemake has given to files after their jobs."""
+        """Update recorded times of files, since Snakemake touches them after their jobs."""
         for path in paths:
             if self.knows(path) and (self._results / path).is_file() and self.is_whole(path):
                 modified_ns = (self._results / path).stat().st_mtime_ns
                 self._records[path][-1] = replace(self.last(path), modified_ns=modified_ns)
 
     def restore_time(self, path: str) -> None:
-        """Give a file the time at which it was written: Snakemake goes by the order of times."""
+        """Restore the recorded time of a file, since Snakemake compares times."""
         file, modified_ns = self._results / path, self.last(path).modified_ns
         stat = file.stat()
         if stat.st_mtime_ns != modified_ns:
@@ -134,7 +134,7 @@ class Manifest:
                 os.utime(file, ns=(stat.st_atime_ns, modified_ns))
 
     def was_written(self, path: str) -> bool:
-        """Whether a file is what was written last or before."""
+        """Return whether a file has the content of its last write or of the one before."""
         return any(self._is(path, record, thoroughly=True) for record in self._records[path])
 
     def _is(self, path: str, record: Record, *, thoroughly: bool) -> bool:
@@ -144,29 +144,29 @@ class Manifest:
         stat = file.stat()
         if stat.st_size != record.size:
             return False
-        # Of a log whose job was killed, nobody knows more than that it was empty at first.
+        # The record of a log whose job was killed has size 0 and no hash.
         if stat.st_size == 0 or (stat.st_mtime_ns == record.modified_ns and not thoroughly):
             return True
         return sha256_of(file) == record.sha256
 
     def forget(self, paths: Iterable[str]) -> None:
-        """Leave out what is not there any more."""
+        """Remove files from the records."""
         for path in paths:
             del self._records[path]
 
     def note(self, logs: Iterable[Path]) -> None:
-        """Add logs as they are, now that their jobs have ended."""
+        """Record logs after their jobs have ended."""
         journal = Journal(self._results)
         self._add(journal.record(log, log) for log in logs if log.is_file())
 
     def discard_leftovers(self) -> None:
-        """Remove files that a job was writing when it was killed."""
+        """Remove scratch files of jobs that were killed."""
         for file in self._leftovers:
             if file.is_file() and not file.is_symlink():
                 file.unlink()
 
     def save(self) -> None:
-        """Write both copies, and remove the journals that nobody adds to any more."""
+        """Write both copies, and remove journals whose processes have ended."""
         self.discard_leftovers()
         for copy in self._damaged:
             set_aside(copy)
@@ -181,7 +181,7 @@ class Manifest:
         self._discard_journals()
 
     def discard(self) -> None:
-        """Remove the record itself, but for what of it is damaged or still written."""
+        """Remove the manifest and closed journals, except damaged copies."""
         self.discard_leftovers()
         for copy in self._copies:
             if copy not in self._damaged:
@@ -194,12 +194,12 @@ class Manifest:
 
 
 def refuse_other_than_folder(place: Path) -> None:
-    """Refuse what is in the place of a folder of ours.
+    """Refuse a link or file in the place of a folder.
 
     Raises
     ------
     BiogripError
-        If it is a link, or anything but a folder.
+        If there is a link, or anything but a folder.
     """
     found = "a link" if place.is_symlink() else "a file"
     if os.path.lexists(place) and (place.is_symlink() or not place.is_dir()):
@@ -210,7 +210,7 @@ def refuse_other_than_folder(place: Path) -> None:
 
 
 def set_aside(path: Path) -> Path:
-    """Rename a file to ``NAME.edited``, or ``NAME.edited.2`` and so on, and return where it is."""
+    """Rename a file to ``NAME.edited``, ``NAME.edited.2`` and so on, and return the new path."""
     count = 1
     while True:
         beside = path.with_name(f"{path.name}.edited" + (f".{count}" if count > 1 else ""))

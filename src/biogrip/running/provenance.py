@@ -1,4 +1,4 @@
-"""Whether results are of the study that stands beside them, as far as their record knows."""
+"""Detection of results that are out of date: other settings, code or inputs than the study's."""
 
 from collections.abc import Iterable
 from fnmatch import fnmatch
@@ -17,14 +17,14 @@ _RESULTS = "results"
 
 
 class Provenance:
-    """What the results of a folder were made for and of.
+    """Digests of settings and inputs that the files of a results folder were made with.
 
     Parameters
     ----------
     results
-        The folder.
+        The results folder.
     manifest
-        Its record.
+        Manifest of the folder.
     """
 
     def __init__(self, results: Path, manifest: Manifest) -> None:
@@ -33,17 +33,17 @@ class Provenance:
         self._hashes: dict[str, str | None] = {}
 
     def made_otherwise(self, sheets: Iterable[Sheet]) -> list[str]:
-        """List results that were made for other settings, by other code, or of other files.
+        """Return results that were made with other settings, other code, or from other files.
 
         Parameters
         ----------
         sheets
-            What the study makes.
+            All products and jobs of the study.
 
         Returns
         -------
         list of str
-            Files that are there and on record, from the results folder on.
+            Existing recorded files, relative to the results folder.
         """
         return [name for sheet in sheets for job in sheet.jobs for name in self._of_job(sheet, job)]
 
@@ -64,7 +64,7 @@ class Provenance:
         return self._manifest.knows(name) and (self._results / name).exists()
 
     def _digest_of_inputs(self, sheet: Sheet, job: Wildcards) -> str | None:
-        """Digest of what a job reads, as it is on record; None where something is not known."""
+        """Return a digest of a job's recorded inputs, or None if an input is unknown."""
         hashes = [self._hash_of(file) for file in inputs_of(sheet, job)]
         return None if None in hashes else digest_of_files(hash_ for hash_ in hashes if hash_)
 
@@ -80,35 +80,35 @@ class Provenance:
 
 
 def is_result(file: str) -> bool:
-    """Whether a file that a rule names is among the results."""
+    """Return whether a file that a rule names is in the results folder."""
     return PurePosixPath(file).parts[0] == _RESULTS
 
 
 def name_of(file: str) -> str:
-    """Path of a result, as a rule names it, from the results folder on."""
+    """Return a result's path relative to the results folder."""
     return PurePosixPath(file).relative_to(_RESULTS).as_posix()
 
 
 def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
-    """What a study has made, but for batches, which are put together.
+    """Return all results of a finished study, except batches.
 
     Parameters
     ----------
     results, manifest
-        The folder, and its record.
+        The results folder, and its manifest.
     only
-        Which of it, as a pattern of names without ending.
+        Pattern for file names without suffix.
 
     Returns
     -------
     list of str
-        Files from the results folder on: all there, whole, and made for the study that stands
-        beside them.
+        Files relative to the results folder. They exist, are unchanged, and were made for the
+        study recorded beside them.
 
     Raises
     ------
     BiogripError
-        Names the first that is not.
+        Names the first file for which this does not hold.
     """
     sheets = sheets_of(products().values(), Plan(read_study(results), results))
     found = [

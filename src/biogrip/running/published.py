@@ -1,4 +1,4 @@
-"""The results that are committed: renewed from a fresh run, and nothing else in their folder."""
+"""The command ``biogrip publish``: committed tables and figures, renewed from a finished run."""
 
 import os
 import shutil
@@ -16,7 +16,7 @@ from biogrip.running.provenance import finished
 from biogrip.running.records import read_sums, refuse_links
 
 SUMS = "SHA256SUMS"
-"""Names of what was published and its hashes; ``sha256sum --check`` reads it."""
+"""File with names and hashes of all published files, in the format of ``sha256sum --check``."""
 
 FOLDERS = {"tables": PUBLISHED_TABLE_KINDS, "figures": FIGURE_KINDS}
 
@@ -24,28 +24,28 @@ FOLDERS = {"tables": PUBLISHED_TABLE_KINDS, "figures": FIGURE_KINDS}
 def publish(results: Path, published: Path, only: str = "*") -> str:
     """Replace published tables and figures by those of a finished study.
 
-    Only what was published before, and is still as it was, is replaced or removed. All files
-    are copied beside their places before the first is put into its own.
+    Only unchanged published files are replaced or removed. All new files are copied beside their
+    places before the first is moved into place.
 
     Parameters
     ----------
     results
-        Results of the study.
+        Results folder of the study.
     published
         Folder to publish in.
     only
-        Which of them, as a pattern of their names without ending.
+        Pattern for file names without suffix.
 
     Returns
     -------
     str
-        What was done.
+        Summary of what was published.
 
     Raises
     ------
     BiogripError
-        If the study is not finished, a file in the way was not published, or a link would be
-        followed. Nothing is changed then.
+        If the study is not finished, an unpublished file is in the way, or a path has a link.
+        Nothing is changed then.
     """
     manifest = Manifest(results)
     new = {
@@ -58,7 +58,7 @@ def publish(results: Path, published: Path, only: str = "*") -> str:
     old = read_sums(published / SUMS)
     _check_places(published, [*new, *old], old)
     _copy(results, published, [*new])
-    # With the old and the new hashes on record, publishing again makes a kill good.
+    # Old and new hashes are recorded together, so that after a kill publishing can be repeated.
     both = [(name, digest) for name, digests in old.items() for digest in digests]
     _write_sums(published, [*both, *(item for item in new.items() if item not in both)])
     for name, digests in old.items():
@@ -70,12 +70,12 @@ def publish(results: Path, published: Path, only: str = "*") -> str:
 
 
 def _check_places(published: Path, names: list[str], old: Container[str]) -> None:
-    """Refuse places where something would be replaced that was not published, or behind a link.
+    """Refuse paths through links, and paths of existing files that were not published.
 
     Raises
     ------
     BiogripError
-        Names the first.
+        Names the first such path.
     """
     refuse_other_than_folder(published)
     refuse_links(published, names)
@@ -91,7 +91,7 @@ def _check_places(published: Path, names: list[str], old: Container[str]) -> Non
 
 
 def _copy(results: Path, published: Path, names: list[str]) -> None:
-    """Copy files beside the places that they are to take, all of them or none."""
+    """Copy files beside their final places, all or none."""
     copies = [_beside(published / name) for name in names]
     try:
         for name, copy in zip(names, copies, strict=True):
@@ -106,7 +106,7 @@ def _copy(results: Path, published: Path, names: list[str]) -> None:
 
 
 def _clear(file: Path, digests: list[str], *, replaced: bool) -> None:
-    """Set aside what was edited since it was published; remove what is not to be replaced."""
+    """Set aside a file edited since it was published; remove one that is not to be replaced."""
     if os.path.lexists(file):
         if file.is_symlink() or sha256_of(file) not in digests:
             set_aside(file)

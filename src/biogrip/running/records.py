@@ -1,7 +1,7 @@
-"""Reads every record of what biogrip wrote, as something that anybody may have written.
+"""Records of written files, validated like untrusted input.
 
-A record is followed when files are replaced, removed or published. Its paths are therefore
-relative, stay inside the folder that the record is of, and pass through no link.
+Files are replaced, removed or published according to records. Paths in them must therefore be
+relative, stay inside the folder of the record, and pass through no link.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from pathlib import Path, PurePosixPath
 from biogrip.errors import BiogripError
 
 LOGS = "logs"
-"""Folder of the logs, among the results."""
+"""Folder of the logs, inside the results folder."""
 
 SUM_OF_LINES = "sha256_of_the_lines_above"
 
@@ -27,22 +27,22 @@ _MOST = 2**63
 
 @dataclass(frozen=True)
 class Record:
-    """A file as it was written.
+    """Record of a file at the time it was written.
 
     Parameters
     ----------
     path
-        Where it is, from the results folder on, with forward slashes.
+        Path relative to the results folder, with forward slashes.
     size, sha256
-        Number of bytes, and their hash; an empty hash while a log or a scratch file is written.
+        Number of bytes, and hash; the hash is empty while a log or a scratch file is written.
     modified_ns
-        When its contents were written, in the file system's time.
+        Modification time of the file.
     recorded_ns
-        When this was written down.
+        Time of this record.
     settings
-        Digest of the settings and the code that made it; empty if no job of a study did.
+        Digest of settings and code that made it; empty if it was not made by a job.
     inputs
-        Digest of the files that it was made from.
+        Digest of its input files.
     """
 
     path: str
@@ -54,7 +54,7 @@ class Record:
     inputs: str = ""
 
     def __post_init__(self) -> None:
-        """Refuse what biogrip does not write."""
+        """Refuse values that biogrip does not write."""
         for field in fields(self):
             value = getattr(self, field.name)
             if type(value) is not field.type or (field.type is int and not 0 <= value < _MOST):
@@ -70,22 +70,22 @@ class Record:
 
     @property
     def is_log(self) -> bool:
-        """Whether it is of a log."""
+        """True for a log."""
         return self.path.startswith(f"{LOGS}/")
 
     @property
     def is_scratch(self) -> bool:
-        """Whether it is of a file that is moved into its place when it is whole."""
+        """True for a scratch file, which is moved into its place when complete."""
         return _SCRATCH.fullmatch(PurePosixPath(self.path).name) is not None
 
 
 def refuse_outside(path: str) -> None:
-    """Refuse a path that is absolute or might leave the folder that it is relative to.
+    """Refuse a path that is absolute or leaves its folder.
 
     Raises
     ------
     ValueError
-        Says what was found and what is allowed.
+        Names the path and what is allowed.
     """
     path.encode()
     parts = PurePosixPath(path).parts
@@ -95,7 +95,7 @@ def refuse_outside(path: str) -> None:
 
 
 def refuse_links(folder: Path, paths: Iterable[str]) -> None:
-    """Refuse paths, from a folder on, that pass through a link.
+    """Refuse paths relative to a folder that pass through a link.
 
     Raises
     ------
@@ -112,12 +112,12 @@ def refuse_links(folder: Path, paths: Iterable[str]) -> None:
 
 
 def read_journal(file: Path) -> list[Record]:
-    """Read the records of one process; a kill may have cut the last line.
+    """Read the records of one process, ignoring a last line cut off by a kill.
 
     Raises
     ------
     BiogripError
-        Names file and line of what biogrip did not write.
+        Names file and line that biogrip did not write.
     """
     found = []
     lines = _bytes(file).split(b"\n")
@@ -131,12 +131,12 @@ def read_journal(file: Path) -> list[Record]:
 
 
 def read_manifest(file: Path) -> list[Record] | None:
-    """Read a manifest: nothing if there is none, None if it is damaged.
+    """Return the records of a manifest, [] if there is none, or None if it is damaged.
 
     Raises
     ------
     BiogripError
-        Names file and line of a record that biogrip did not write.
+        Names file and line that biogrip did not write.
     """
     if not os.path.lexists(file):
         return []
@@ -153,23 +153,23 @@ def read_manifest(file: Path) -> list[Record] | None:
 
 
 def _divided(text: bytes) -> tuple[bytes, bytes]:
-    """Divide off the last line."""
+    """Split off the last line."""
     start = text.rstrip(b"\n").rfind(b"\n") + 1
     return text[:start], text[start:]
 
 
 def sum_of_lines(text: bytes) -> str:
-    """Return the last line of a manifest, with the hash of all others."""
+    """Return the last line of a manifest, which has the hash of all others."""
     return json.dumps({SUM_OF_LINES: hashlib.sha256(text).hexdigest()}) + "\n"
 
 
 def read_sums(file: Path) -> dict[str, list[str]]:
-    """Read hashes by name that ``sha256sum`` can check, from a file that need not exist.
+    """Return hashes by name from a file in the format of ``sha256sum``, {} if there is none.
 
     Raises
     ------
     BiogripError
-        Names file and line of what is no name and hash.
+        Names file and line that are not in the format.
     """
     if not os.path.lexists(file):
         return {}
@@ -187,12 +187,12 @@ def read_sums(file: Path) -> dict[str, list[str]]:
 
 
 def _record(line: bytes) -> Record:
-    """Read a line of JSON.
+    """Return the record in a line of JSON.
 
     Raises
     ------
     ValueError
-        If it is no record.
+        If the line is no record.
     """
     try:
         return Record(**json.loads(line))
@@ -201,12 +201,12 @@ def _record(line: bytes) -> Record:
 
 
 def _bytes(file: Path) -> bytes:
-    """Read a file of records, which is no link.
+    """Return the content of a file of records, refusing links.
 
     Raises
     ------
     BiogripError
-        If it is.
+        If it is a link or not a file.
     """
     if file.is_symlink() or not file.is_file():
         raise BiogripError(

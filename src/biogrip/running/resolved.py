@@ -1,4 +1,4 @@
-"""The study as it is run: what its configs come to, in a file that jobs find their settings in."""
+"""The resolved study in ``study.json``: all configs merged, read by the jobs."""
 
 import json
 import os
@@ -17,7 +17,7 @@ NAME = "study.json"
 
 
 def write_study(study: Study, results: Path) -> None:
-    """Write a study down among its results, unless it stands there already.
+    """Write a study to its results folder, unless it is there already.
 
     Raises
     ------
@@ -41,22 +41,22 @@ def write_study(study: Study, results: Path) -> None:
 
 
 def read_study(results: Path) -> Study:
-    """Read the study whose results a folder holds.
+    """Read the study whose results are in a folder.
 
     Raises
     ------
     BiogripError
-        If none has been run there.
+        If no study was run there, or its file is damaged.
     """
     file = results / NAME
     try:
         study = Study(built(StudyConfig, json.loads(file.read_text(encoding="utf-8"))))
-        # What of it is wrong would come to light in the middle of something else.
+        # Access all derived properties, so that a damaged file is reported here.
         _ = study.cases, study.points, study.sweeps, study.shown, study.study_seed
         return study
     except FileNotFoundError as error:
         raise BiogripError(
-            f"{file}: there is none, for no study was run here; allowed is what a run has begun."
+            f"{file}: there is none, as no study was run here; allowed is what a run has begun."
         ) from error
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise BiogripError(f"{file}: cannot be read as a study: {error!r}.") from error

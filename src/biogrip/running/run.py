@@ -1,4 +1,4 @@
-"""A study run by one command: its configs checked first, and its end said in a line."""
+"""The command ``biogrip run``: checks the configs, runs Snakemake, and handles signals."""
 
 import argparse
 import os
@@ -16,30 +16,30 @@ from biogrip.errors import BiogripError
 from biogrip.stopping import end_at_once
 from biogrip.terminal import visible_lines
 
-# What is large is imported by who uses it: until then no signal would be answered.
+# Large imports are inside functions: until a handler is installed, signals are lost.
 _STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _SHOWN = 6
 _LONGEST = 200
 
 
 def run(arguments: Sequence[str]) -> int:
-    """Check a study's configs, run it by Snakemake, and say what to open.
+    """Check a study's configs, run it by Snakemake, and name the page to open.
 
     Parameters
     ----------
     arguments
-        Config files (``*.yaml``, ``*.yml``, ``*.json``), laid one over the other; then
-        anything that Snakemake takes.
+        Config files (``*.yaml``, ``*.yml``, ``*.json``), merged in order; then options of
+        Snakemake.
 
     Returns
     -------
     int
-        Snakemake's exit status; 128 and the signal's number if one ended it.
+        Snakemake's exit status, or 128 plus the number of the signal that ended it.
 
     Raises
     ------
     BiogripError
-        If a config cannot be used. Nothing has been started then.
+        If a config cannot be used. Nothing is started then.
     """
     signals = _Signals(shlex.join(["biogrip", "run", *arguments]))
     with signals.handled():
@@ -58,14 +58,14 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
     _check_folder(folder)
     configs = [Path(name).absolute() for name in overlays]
     _check([default_config(), *configs], folder)
-    # After the options come, if they are set off, files and rules to make.
+    # Targets after "--" must stay behind the options added here.
     cut = rest.index("--") if "--" in rest else len(rest)
     command = [sys.executable, "-m", "biogrip.running.snakemake_process"]
     command += ["--snakefile", str(snakefile()), *rest[:cut]]
     if not known.cores and not known.profile:
         command += ["--cores", "all"]
     if not known.dry_run and known.quiet is None:
-        # A reason lists every file that is missing; the log has them.
+        # By default hide reasons, which list every missing file; the log has them.
         command += ["--quiet", "host", "reason"]
     if configs:
         command += ["--configfile", *map(str, configs)]
@@ -76,7 +76,7 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
 
 
 def _check_folder(folder: Path) -> None:
-    """Refuse a place that Snakemake could not run in; it would make one that is not there."""
+    """Refuse a working directory that Snakemake could not use; a missing one is created."""
     from biogrip.running.manifest import refuse_other_than_folder
 
     try:
@@ -88,28 +88,28 @@ def _check_folder(folder: Path) -> None:
     if found:
         shown = str(folder)[:_LONGEST]
         raise BiogripError(f"--directory: {shown}: {found}, allowed is a folder.")
-    # Snakemake would write through a link, and end in a traceback where there is a file.
+    # Snakemake would follow a link, and fail with a traceback on a file.
     refuse_other_than_folder(folder / ".snakemake")
 
 
 def _check(configs: list[Path], folder: Path) -> None:
-    """Check the study as Snakemake will see it, from the folder that it will run in."""
+    """Check configs and recorded traces from the directory that Snakemake will run in."""
     from biogrip.products.stages.recording import check_traces
     from biogrip.study.load import load_study, read_configs
 
     merged = read_configs(configs)
-    # Traces are named from there; before the first run it need not exist.
+    # Paths of traces are relative to it; before the first run it need not exist.
     with chdir(folder if folder.is_dir() else "."):
         check_traces(load_study(merged, configs))
 
 
 def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Divide the arguments into config files and Snakemake's."""
+    """Split the arguments into config files and options of Snakemake."""
     names = list(arguments)
     count = 0
     while count < len(names) and names[count].endswith((".yaml", ".yml", ".json")):
         count += 1
-    # As Snakemake has it, too; what it says of one that cannot be used ends in a traceback.
+    # Same option names as Snakemake's, whose errors would end in a traceback.
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False)
     parser.add_argument("--configfile", "--configfiles", nargs="+", action="extend", default=[])
     try:
@@ -120,7 +120,7 @@ def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _known(rest: list[str]) -> argparse.Namespace:
-    """Read those of Snakemake's options that matter here."""
+    """Parse those options of Snakemake that affect this command."""
     parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     parser.add_argument("-n", "--dry-run", "--dryrun", action="store_true", dest="dry_run")
     parser.add_argument("-d", "--directory")
@@ -132,7 +132,7 @@ def _known(rest: list[str]) -> argparse.Namespace:
 
 
 class _Signals:
-    """The signals that stop a run, handed to Snakemake once it is there."""
+    """Handler of stop signals that forwards them to Snakemake once it has started."""
 
     def __init__(self, again: str) -> None:
         self._to_go_on = f"Nothing that is done is lost; to go on: {again}"
@@ -142,7 +142,7 @@ class _Signals:
 
     @contextmanager
     def handled(self) -> Iterator[None]:
-        """Take the signals meanwhile, but for those that are ignored, as with ``nohup``."""
+        """Handle stop signals within a context, except those ignored, as with ``nohup``."""
         taken = [number for number in _STOPS if signal.getsignal(number) != signal.SIG_IGN]
         before = {number: signal.signal(number, self._got) for number in taken}
         try:
@@ -152,12 +152,12 @@ class _Signals:
                 signal.signal(number, old)
 
     def supervise(self, command: list[str]) -> int:
-        """Run a command in a process group of its own, and return its exit status.
+        """Run a command in its own process group, and return its exit status.
 
-        So that it gets each signal once, and its jobs none from the terminal.
+        In its own group it gets each signal once, and its jobs get none from the terminal.
         """
         self._starting = True
-        # It lets SIGINT through when it is ready to end by it.
+        # The child unblocks SIGINT when its handler is installed.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._child = subprocess.Popen(command, start_new_session=True)
@@ -181,27 +181,27 @@ class _Signals:
             self.end(self.first)
 
     def end(self, number: signal.Signals) -> None:
-        """End this process, and say what goes on."""
+        """End this process with a message on how to continue."""
         if self._child is not None:
-            # It may have ended in the middle of a line.
+            # Output may have stopped in the middle of a line.
             with suppress(OSError):
                 os.write(sys.stderr.fileno(), b"\n")
         end_at_once(number, f"stopped by {number.name}. {self._to_go_on}")
 
     def _pass_on(self, child: "subprocess.Popen[bytes]") -> None:
-        # It may have ended just now.
+        # The process may have ended just now.
         with suppress(ProcessLookupError):
-            # On SIGTERM it would first wait for its jobs, which on SIGINT it ends.
+            # On SIGTERM Snakemake waits for running jobs, on SIGINT it ends them.
             os.kill(child.pid, signal.SIGINT)
 
 
 def _to_open(folder: Path, arguments: list[str]) -> str:
-    """Name what a reader should look at first: the files that were asked for, else the pages."""
+    """Return a message naming the files to open: requested ones, or else the report pages."""
     from biogrip.running.resolved import read_study
 
     results = folder / "results"
     pages: list[Path] = []
-    # What Snakemake was called for need not be a run.
+    # Snakemake may have been called for something other than a run.
     with suppress(BiogripError):
         pages = [results / "summaries" / f"{case}.html" for case in read_study(results).cases]
     asked = [folder / word for word in arguments]

@@ -1,4 +1,4 @@
-"""Jobs as the workflow sees them: products that are made by one command."""
+"""Snakemake rules: products that one job makes, with wildcards, inputs, outputs and resources."""
 
 import re
 import shlex
@@ -22,18 +22,18 @@ _CONSTRAINTS = {
 
 @dataclass(frozen=True)
 class Sheet:
-    """Products that one job makes: a sheet of figures, or a single thing.
+    """A Snakemake rule: products that one job makes.
 
     Parameters
     ----------
     name
         Name of the rule.
     products
-        What is made.
+        Products of each job.
     plan
-        The study's jobs.
+        Plan of the study's jobs.
     jobs
-        Those that make these products, all of them; wildcards of each.
+        Wildcards of all its jobs.
     """
 
     name: str
@@ -43,13 +43,13 @@ class Sheet:
 
     @property
     def wildcards(self) -> list[str]:
-        """Names of the wildcards of its jobs."""
+        """Names of the wildcards of the rule."""
         patterns = "".join(self.products[0].writes.values())
         return sorted(set(re.findall(r"{(\w+)}", patterns)))
 
     @property
     def constraints(self) -> dict[str, str]:
-        """What its wildcards may be: those of the study's own jobs, if it has any."""
+        """Wildcard constraints as regular expressions: values in the study's jobs, if any."""
         found = {}
         for name in self.wildcards:
             values = {job[name] for job in self.jobs} if name in ("case", "sweep") else set()
@@ -58,7 +58,7 @@ class Sheet:
 
     @property
     def outputs(self) -> dict[str, str]:
-        """Patterns of the files, by product and kind."""
+        """Patterns of output files, by product and kind."""
         return {
             f"{product.name}_{kind}": pattern
             for product in self.products
@@ -66,7 +66,7 @@ class Sheet:
         }
 
     def inputs(self, job: Wildcards) -> dict[str, list[str]]:
-        """Files that a job needs and no other product of the sheet makes."""
+        """Return the input files of a job that are not made by the rule itself."""
         made = {file for product in self.products for file in product.outputs(job).values()}
         needed: dict[str, list[str]] = {}
         for product in self.products:
@@ -76,7 +76,7 @@ class Sheet:
         return needed
 
     def digest(self, job: Wildcards) -> str:
-        """Letters that change with the settings that a job uses, and with its code."""
+        """Return a digest of the settings and the code that a job uses."""
         settings = [product.settings(self.plan.study, job) for product in self.products]
         modules = {
             module
@@ -86,20 +86,20 @@ class Sheet:
         return f"{digest(settings)}-{fingerprint(*sorted(modules))}"
 
     def command(self, job: Wildcards) -> str:
-        """Return what is to be made, as `biogrip make` reads it."""
+        """Return the arguments of `biogrip make` for a job."""
         names = [product.name for product in self.products]
         options = [f"--{name} {shlex.quote(str(job[name]))}" for name in self.wildcards]
         return " ".join([*names, *options])
 
     @property
     def log(self) -> str:
-        """Pattern of the log."""
+        """Pattern of the log file."""
         inner = "".join(f"/{{{name}}}" for name in self.wildcards)
         return f"results/logs/{self.name}{inner}.log"
 
     @property
     def message(self) -> str:
-        """What a job says that it does."""
+        """Message of the rule, with Snakemake's wildcards."""
         if len(self.products) == 1:
             return re.sub(r"{(\w+)}", r"{wildcards.\1}", self.products[0].message)
         whose = "".join(f" of {{wildcards.{name}}}" for name in self.wildcards)
@@ -107,7 +107,7 @@ class Sheet:
 
     @property
     def weight(self) -> Weight:
-        """How heavy a job is: as the heaviest of its products."""
+        """Resources of a job: the maximum over its products."""
         weights = [product.weight for product in self.products]
         return Weight(
             max(weight.minutes for weight in weights),
@@ -117,33 +117,33 @@ class Sheet:
         )
 
     def runtime(self, job: Wildcards, attempt: int) -> int:
-        """Minutes that a job takes at most, more at every retry."""
+        """Return the upper limit of a job's minutes, which increases at every retry."""
         return self.weight.minutes * attempt
 
     def megabytes(self, job: Wildcards, attempt: int) -> int:
-        """Memory that a job takes at most, more at every retry."""
+        """Return the upper limit of a job's megabytes, which increases at every retry."""
         return self.weight.megabytes * attempt
 
     @property
     def caption(self) -> str:
-        """What the report says."""
+        """Caption in the report."""
         if len(self.products) == 1:
             return self.products[0].caption
         return "\n\n".join(f"{p.item}: {p.caption}" for p in self.products if p.caption)
 
 
 def inputs_of(sheet: Sheet, job: Wildcards) -> list[str]:
-    """Files that a job reads, in one order."""
+    """Return all input files of a job, sorted."""
     return sorted({file for files in sheet.inputs(job).values() for file in files})
 
 
 def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
-    """Put products together that are made by one job."""
+    """Return the rules of a plan, grouping products that one job makes."""
     return [Sheet(each.rule, each.products, plan, each.jobs) for each in together(products, plan)]
 
 
 def files_of(sheets: Iterable[Sheet]) -> list[str]:
-    """Every file that a study makes: what is lost is made again, so each is asked for."""
+    """Return every output file of a study; all are targets, so that lost ones are made again."""
     return [
         file
         for sheet in sheets

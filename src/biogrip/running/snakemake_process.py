@@ -1,6 +1,6 @@
-"""Snakemake as `biogrip run` starts it: it can always be stopped, and without a stack.
+"""Process in which `biogrip run` runs Snakemake, stoppable at any time without a traceback.
 
-An interruption while it loads or plans would show where in its code it was, or be swallowed there.
+Snakemake shows a traceback, or ignores the signal, if it is interrupted while it loads or plans.
 """
 
 import atexit
@@ -15,16 +15,16 @@ from types import FrameType
 from biogrip.running.locks import is_locked
 
 _AGAIN_S = 0.05
-# Wherever it is by then, as in a version that waits in another way.
+# Interrupt anyway after this, in case a version of Snakemake waits in another function.
 _PATIENCE_S = 10.0
 _asked_s: list[float] = []
 
 
 def main() -> None:
     """Run Snakemake with the arguments of this process."""
-    # As of a job, see `biogrip.__main__`: looking for cycles at the end takes time.
+    # Skip garbage collection at exit, see `biogrip.__main__`.
     atexit.register(gc.freeze)
-    # What is started by a script in the background would ignore it.
+    # Background scripts start children with SIGINT ignored.
     for number in (signal.SIGINT, signal.SIGALRM):
         signal.signal(number, _stop)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
@@ -35,30 +35,30 @@ def main() -> None:
 
 
 def _stop(_: int, frame: FrameType | None) -> None:
-    """End at once where no job can run, else as Snakemake does where it waits for its jobs."""
+    """Exit if no job can be running; otherwise interrupt Snakemake while it waits for jobs."""
     if not is_locked(Path(".snakemake")):
         os._exit(128 + signal.SIGINT)
-    # It may have to come that far, and a job may have begun just now.
+    # Try again later: planning may not have reached the wait, or a job may have just begun.
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
     _asked_s.append(time.monotonic())
     waits = _waits_for_jobs(frame) or _asked_s[-1] - _asked_s[0] > _PATIENCE_S
-    # Once: again, it would interrupt the cancelling of jobs.
+    # Interrupt only once: a second time would interrupt the cancelling of jobs.
     interrupts = waits and signal.getsignal(signal.SIGTERM) is not _cancelling
     if interrupts:
         signal.signal(signal.SIGTERM, _cancelling)
     if signal.getsignal(signal.SIGTERM) is _cancelling:
-        # Unlike SIGINT, this shows no stack of a Python that is just starting.
+        # Unlike SIGINT, SIGTERM shows no traceback of a Python that is just starting.
         os.killpg(0, signal.SIGTERM)
     if interrupts:
         raise KeyboardInterrupt
 
 
 def _cancelling(_: int, __: FrameType | None) -> None:
-    """Take the signal that is meant for the jobs."""
+    """Ignore the signal, which is meant for the jobs only."""
 
 
 def _waits_for_jobs(frame: FrameType | None) -> bool:
-    """Whether Snakemake's scheduler was interrupted in its wait for a job to end."""
+    """Return whether the frame is Snakemake's scheduler waiting for a job to end."""
     names: list[str] = []
     while frame is not None and len(names) < 3:
         names.append(frame.f_code.co_name)

@@ -1,8 +1,7 @@
-"""Which source files a stage is made of, so that the workflow can track them.
+"""Source files that a product's code depends on, so that Snakemake notices changed code.
 
-Snakemake does not follow imports. Here every ``import`` statement inside the
-package is followed, without running anything; but not to what only says what there
-is to do, for that is in the digest of the settings.
+Snakemake does not follow imports. Here every ``import`` statement inside the package is followed
+statically, except for declarations (`_SAYING`), whose effect is in the digest of the settings.
 """
 
 import ast
@@ -23,12 +22,12 @@ _SAYING = (
 
 @cache
 def fingerprint(*modules: str) -> str:
-    """Hash of what `source_files` names: one value where a list of files would be long.
+    """Return a hash of the source files of modules and of all their imports.
 
     Parameters
     ----------
     modules
-        For example ``"biogrip.products.stages.target"``.
+        Names, e.g. ``"biogrip.products.stages.target"``.
     """
     digest = hashlib.sha256()
     for file in source_files(*modules):
@@ -37,12 +36,12 @@ def fingerprint(*modules: str) -> str:
 
 
 def source_files(*modules: str) -> list[str]:
-    """Files of modules and of all package modules that they import, sorted.
+    """Return the files of modules and of all package modules they import, sorted.
 
     Parameters
     ----------
     modules
-        For example ``"biogrip.products.stages.target"``.
+        Names, e.g. ``"biogrip.products.stages.target"``.
     """
     seen: set[str] = set()
     waiting = list(modules)
@@ -77,7 +76,7 @@ def _imports(module: str) -> list[str]:
 
 
 def _executed(tree: ast.Module) -> Iterator[ast.stmt]:
-    """Walk over all statements, for in no other place is an import, but for a type checker's."""
+    """Yield all statements that can be or hold an import, except those for type checkers."""
     waiting: list[ast.stmt] = [*tree.body]
     while waiting:
         statement = waiting.pop()
@@ -91,7 +90,7 @@ def _executed(tree: ast.Module) -> Iterator[ast.stmt]:
 
 
 def _of_branches(statement: ast.stmt) -> list[ast.ExceptHandler] | list[ast.match_case]:
-    """What holds statements of a ``try`` or a ``match`` without being one."""
+    """Return the parts of a ``try`` or ``match`` that hold statements."""
     if isinstance(statement, ast.Try | ast.TryStar):
         return statement.handlers
     return statement.cases if isinstance(statement, ast.Match) else []

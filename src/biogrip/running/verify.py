@@ -1,4 +1,4 @@
-"""Reads every result again, and holds it against its record and the study beside it."""
+"""The command ``biogrip verify``: results against their record and the study beside them."""
 
 import os
 from pathlib import Path
@@ -15,19 +15,19 @@ from biogrip.running.sheet import files_of, sheets_of
 
 
 def verify(results: Path) -> str:
-    """Read every recorded file of a results folder, and hold it against its record.
+    """Compare every recorded file of a results folder with its record.
 
-    Where the study stands beside them, results have to be made for it.
+    If the study is there too, results must have been made for it.
 
     Returns
     -------
     str
-        How many there are.
+        Summary with the number of files.
 
     Raises
     ------
     BiogripError
-        Names every file that is missing, is not what was written, or was not made for the study.
+        Names every file that is missing, changed, or not made for the study.
     """
     manifest = Manifest(results)
     if not manifest.files:

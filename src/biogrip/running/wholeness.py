@@ -1,4 +1,4 @@
-"""What a run does before its jobs and after: touch nothing but what is the study's own."""
+"""Checks before and after the jobs of a run, so that only the study's own files are touched."""
 
 import functools
 import os
@@ -26,22 +26,22 @@ def hold_against_record(
     made_otherwise: Callable[[Manifest], Iterable[str]],
     begin: Callable[[], None],
 ) -> None:
-    """Have Snakemake check the results once it is to run a study, and before it plans the jobs.
+    """Wrap Snakemake's workflow, so that results are checked before jobs are planned.
 
-    Of all commands only a run changes anything; a dry run says what a run would do.
+    Only a run changes anything; a dry run prints what a run would do.
 
     Parameters
     ----------
     workflow
-        Snakemake's.
+        Snakemake's workflow object.
     results
         The results folder.
     asked
-        Tells which files a run makes if nothing else is asked for.
+        Function that returns the files a run makes by default.
     made_otherwise
-        Tells which of them, from the results folder on, were made for other settings.
+        Function that returns outdated results, relative to the results folder.
     begin
-        What a run does then, before its jobs are planned.
+        Function to call at the start of a run, before its jobs are planned.
     """
     execute, build = workflow.execute, workflow._build_dag
 
@@ -63,9 +63,9 @@ def hold_against_record(
         return ended
 
     def forced() -> Any:
-        """Plan the jobs: those of results that were made for other settings run again.
+        """Plan the jobs, forcing those whose results are outdated.
 
-        Snakemake knows of settings what it has noted itself, beside the results.
+        Snakemake's own record of settings is outside the results, so it may be missing.
         """
         with _said_and_ended():
             stale = made_otherwise(Manifest(results))
@@ -77,7 +77,7 @@ def hold_against_record(
 
 @contextmanager
 def _said_and_ended() -> Iterator[None]:
-    """End with the message of an error alone: this keeps Snakemake's stack out of it."""
+    """Exit with an error's message only, without a traceback from Snakemake."""
     try:
         yield
     except BiogripError as error:
@@ -85,7 +85,7 @@ def _said_and_ended() -> Iterator[None]:
 
 
 def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
-    """Say how many results are of other studies."""
+    """Print how many results belong to other studies."""
     own = [_name(results, Path(file)) for file in asked]
     others = Manifest(results).others([*own, *OF_NO_RULE])
     if others:
@@ -99,28 +99,27 @@ def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
 def check_results(
     results: Path, asked: Iterable[str], may_make: Callable[[str], bool], *, changing: bool
 ) -> None:
-    """Hold the results against their record, so that what is not whole is made again.
+    """Compare the results with their record, and remove files that must be made again.
 
-    A recorded file with other contents is kept beside as ``NAME.edited``, for
-    nobody can tell damage from an edit; an empty one is removed. What this study
-    would not make again stays as it is.
+    A changed file is renamed to ``NAME.edited``, since damage and edits look the same; an empty
+    one is removed. Files that this study does not make are kept.
 
     Parameters
     ----------
     results
         The results folder.
     asked
-        Files that a run makes if nothing else is asked for.
+        Files that a run makes by default.
     may_make
-        Whether a rule of the study makes a file.
+        Function that returns True if a rule of the study makes a file.
     changing
-        Whether to do it, or only say what would be done.
+        If false, only print what would be done.
 
     Raises
     ------
     BiogripError
-        If a file is in the way that the study did not write, or is a link; or if
-        the folder cannot be written to.
+        If a file is in the way that the study did not write, a path has a link, or the folder is
+        not writable.
     """
     wanted = [Path(file) for file in asked]
     refuse_links(results, wanted)
@@ -149,7 +148,7 @@ def check_results(
 
 
 class Claim:
-    """What the jobs of a run write.
+    """Outputs and logs of the jobs in a run.
 
     Parameters
     ----------
@@ -163,12 +162,12 @@ class Claim:
         self._logs: list[Path] = []
 
     def begin(self, files: Iterable[Path], logs: Iterable[Path]) -> None:
-        """Make sure, before jobs run, that what they write is the study's or not there.
+        """Check, before jobs run, that their outputs are the study's own or do not exist.
 
         Parameters
         ----------
         files, logs
-            What the jobs will write. A log with other contents than a job's is kept beside.
+            Files the jobs will write. A log with foreign content is renamed.
 
         Raises
         ------
@@ -186,7 +185,7 @@ class Claim:
         Journal(results).note_begun(self._logs)
 
     def end(self) -> None:
-        """Put on record what the jobs have written, logs included."""
+        """Record what the jobs have written, including logs."""
         manifest = Manifest(self._results)
         manifest.note(self._logs)
         manifest.note_times(_name(self._results, file) for file in self._files)
@@ -194,7 +193,7 @@ class Claim:
 
 
 def refuse_others(manifest: Manifest, results: Path, files: Iterable[Path]) -> None:
-    """Refuse to go on where files are that are to be written, and that the study did not write.
+    """Refuse existing files that are to be written but were not written by the study.
 
     Raises
     ------
@@ -216,7 +215,7 @@ def refuse_others(manifest: Manifest, results: Path, files: Iterable[Path]) -> N
 
 
 def refuse_links(results: Path, files: Iterable[Path]) -> None:
-    """Refuse to go on where writing files would follow a link, from the results folder on.
+    """Refuse paths that pass through a link, at or below the results folder.
 
     Raises
     ------
@@ -235,12 +234,12 @@ def refuse_links(results: Path, files: Iterable[Path]) -> None:
 
 
 def refuse_files_as_folders(results: Path, files: Iterable[Path]) -> None:
-    """Refuse to go on where a file is in the place of a folder that files are written to.
+    """Refuse a file in the place of a folder that files are written to.
 
     Raises
     ------
     BiogripError
-        Names the first.
+        Names the first such file.
     """
     folders = {parent for file in files for parent in file.parents}
     for folder in sorted(f for f in folders if f == results or results in f.parents):
@@ -248,7 +247,7 @@ def refuse_files_as_folders(results: Path, files: Iterable[Path]) -> None:
 
 
 def _check_writable(results: Path) -> None:
-    """Make the results folder, and see that it and what is in it can be written to."""
+    """Create the results folder, and check that it and its subfolders are writable."""
     folders = [results]
     try:
         results.mkdir(parents=True, exist_ok=True)
@@ -257,9 +256,9 @@ def _check_writable(results: Path) -> None:
         pass
     for place in folders:
         try:
-            # Jobs of a cluster try this at once: a name of its own for each, or none.
+            # Jobs of a cluster may do this concurrently, so use unique temporary names.
             with TemporaryFile(dir=place) as probe:
-                # Room for Snakemake's own notes too: it fails half-way through writing its locks.
+                # Reserve room for Snakemake's notes too: a full disk would leave broken locks.
                 probe.write(bytes(_ROOM_BYTES if place == results else 0))
         except OSError as error:
             raise BiogripError(
@@ -269,16 +268,16 @@ def _check_writable(results: Path) -> None:
 
 
 def make_room(manifest: Manifest, results: Path, path: str, *, changing: bool) -> None:
-    """Clear the place of a recorded file that is not what was written, and say how.
+    """Remove or rename a recorded file that has changed, and print what was done.
 
     Parameters
     ----------
     manifest, results
-        The record, and where the files are.
+        The manifest, and the results folder.
     path
-        The file, from the results folder on.
+        Path relative to the results folder.
     changing
-        Whether to do it, or only say what would be done.
+        If false, only print what would be done.
     """
     file = results / path
     if file.stat().st_size == 0 or manifest.was_written(path):

@@ -1,1 +1,1 @@
-"""The study: what the config says, checked and typed."""
+"""The study's config, checked and turned into typed objects."""

@@ -1,4 +1,4 @@
-"""What a case's config asks of a design."""
+"""Inputs of an experimental design, from the `design` block of a case."""
 
 from typing import Any
 
@@ -16,19 +16,19 @@ from biogrip.study.study import Case
 
 
 def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
-    """Put together what is to be designed for a case.
+    """Return the inputs of an experimental design for a case.
 
     Parameters
     ----------
     case
-        With a block `design`.
+        A case that has a block `design`.
     earlier
-        What earlier traces told; their samples then are the plausible ones.
+        Results of earlier traces; their posterior samples then replace the plausible parameters.
 
     Raises
     ------
     BiogripError
-        If one of its parameters is zero, so that its logarithm cannot be asked for.
+        If a parameter is zero, since design works with logarithms of parameters.
     """
     asked = case.block.design
     assert asked is not None
@@ -57,12 +57,12 @@ def wanted_of(case: Case, earlier: Earlier | None = None) -> Wanted:
 
 
 def plausible(case: Case, asked: DesignSettings) -> Array:
-    """Parameters of plausible samples, (n, n_parameters): the case's, or drawn from ranges.
+    """Return plausible parameters, (n, n_parameters): the case's own, or drawn from ranges.
 
     Raises
     ------
     BiogripError
-        If one of them is zero.
+        If a parameter is zero.
     """
     names = case.problem.searched.names
     ranges: dict[str, Any] = {name: (v, v) for name, v in case.parameters.items()}
@@ -71,12 +71,12 @@ def plausible(case: Case, asked: DesignSettings) -> Array:
         if ranges[name][0] == 0:
             raise BiogripError(
                 f"design: {case.name}: found {name} = 0, allowed is a range of it in "
-                "design.ranges, or to have it under `fixed`."
+                "design.ranges, or its value under `fixed`."
             )
     low, high = np.log([ranges[name] for name in names]).T
     if not asked.ranges:
         return np.exp(low)[None]
-    # Not needed by any other command, and slow to start.
+    # Imported lazily: no other command needs it, and it is slow to import.
     from scipy.stats import qmc
 
     spread = qmc.Halton(len(names), scramble=False).random(asked.drawn + 1)[1:]
@@ -85,9 +85,9 @@ def plausible(case: Case, asked: DesignSettings) -> Array:
 
 
 def plausible_ends(case: Case) -> tuple[Array, Array]:
-    """Logarithms between which parameters lie, (n_parameters,) each, if traces tell nothing.
+    """Return log bounds of the parameters, (n_parameters,) each: the prior of a design.
 
-    The ranges that are asked for, and the search range of those without one.
+    Ranges of the `design` block, or the search range of parameters without one.
     """
     asked, searched, ranges = case.block.design, case.problem.searched, case.ranges
     assert asked is not None

@@ -1,4 +1,4 @@
-"""The blocks of a case, and of the study for all cases."""
+"""Config blocks of a case, and those that a study sets for all cases."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -33,7 +33,7 @@ _MOST_SAMPLES = 10_000_000
 
 @dataclass(frozen=True)
 class SearchRange:
-    """Values that the genes may take (Table 3); Table 4 follows from it."""
+    """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
 
     k: Annotated[GeneRange, Key()]
     k_p: Annotated[GeneRange, Key()]
@@ -42,7 +42,7 @@ class SearchRange:
     alpha: Annotated[GeneRange, Key()]
 
     def problems(self) -> Iterator[Problem]:
-        """Find exponents of springpots that are none."""
+        """Refuse a range that has exponents of springpots above 1."""
         highest = self.alpha.exponent[1]
         if highest > 0:
             text = f"found {highest}, which makes exponents of springpots above 1; allowed is at "
@@ -51,7 +51,7 @@ class SearchRange:
 
 @dataclass(frozen=True)
 class Equations:
-    """Which equations are solved, for the targets and in the identification."""
+    """Equations solved to simulate targets and to identify samples."""
 
     target: Annotated[
         str,
@@ -60,19 +60,19 @@ class Equations:
             choices=EQUATIONS,
         ),
     ]
-    identification: Annotated[str, Key("The same for the model that is fitted.", choices=EQUATIONS)]
+    identification: Annotated[str, Key("The same for the model to fit.", choices=EQUATIONS)]
 
 
 @dataclass(frozen=True)
 class Identifiability:
-    """How it is judged what a trace determines."""
+    """Settings of the identifiability analysis."""
 
-    confidence: Annotated[float, Key("Confidence of all intervals.", low=0.5, high=0.99)]
+    confidence: Annotated[float, Key("Confidence level of all intervals.", low=0.5, high=0.99)]
     coverage_seeds: Annotated[
         int,
         Key(
-            "Over how many seeds intervals and spread are held against truth and bound, if there "
-            "is noise; 0 leaves that out.",
+            "Number of seeds for which intervals are compared with the true values, and the spread "
+            "with the Cramér-Rao bound, if there is noise; 0 leaves that out.",
             low=0,
             high=1_000_000,
         ),
@@ -81,7 +81,7 @@ class Identifiability:
 
 @dataclass(frozen=True, kw_only=True)
 class Shared:
-    """Blocks that hold for all cases, and that a case may change for itself."""
+    """Blocks that a study sets for all cases, and that a case may change for itself."""
 
     gripper: Annotated[GripperBlock, Key()]
     protocol: Annotated[ProtocolBlock, Key()]
@@ -101,15 +101,15 @@ class Shared:
     posterior: Annotated[
         PosteriorSettings | None,
         Key(
-            "The posterior of the first trace, sampled if this block is there, even an empty one, "
-            "`{}`."
+            "Settings of posterior sampling for the first trace; it is sampled if this block is "
+            "there, even an empty one, `{}`."
         ),
     ] = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class CaseBlock(Shared):
-    """One sample."""
+    """A sample, with all that its experiment and identification need."""
 
     title: Annotated[
         str | None,
@@ -120,39 +120,39 @@ class CaseBlock(Shared):
     ] = None
     sample: Annotated[SampleBlock, Key()]
     published: Annotated[
-        Published | None, Key("What the paper reports of this sample; data to compare with.")
+        Published | None, Key("Results that the paper reports for this sample, to compare with.")
     ] = None
     fixed: Annotated[
         Mapping[str, Annotated[float, Key(low=0, high=LARGEST_PARAMETER)]] | None,
-        Key("Parameters that are known and not identified, by name, with their values."),
+        Key("Known values of parameters, by name; these are not identified."),
     ] = None
     contact: Annotated[
         str | None,
         Key(
-            "`bilateral`: the jaws hold the sample even where they have to pull it (it sticks), as "
-            "the paper's equations have it; `unilateral`: where the force reaches zero they leave "
-            "it, it recovers by itself and may be met again. Of the target alone, whose model is "
-            "linear; identification always takes contact for bilateral. By default bilateral.",
+            "`bilateral`: the jaws can pull the sample (adhesion), as in the paper's equations; "
+            "`unilateral`: contact is lost where the force reaches zero, the free sample recovers, "
+            "and contact may return. It holds for the target only, whose model must be linear; "
+            "identification always assumes bilateral contact. By default bilateral.",
             choices=("bilateral", "unilateral"),
         ),
     ] = None
     assumed_gripper: Annotated[
         Mapping[str, Any] | str | None,
         Key(
-            "The gripper that the identification believes in, where it differs from the true one: "
-            "keys of a gripper block (its angle being the one at contact), or `calibrated` for "
-            "what a no-load test of the true one finds."
+            "Gripper that the identification assumes, if it differs from the true one: keys of a "
+            "gripper block (with the angle at contact), or `calibrated` for the result of a "
+            "no-load test."
         ),
     ] = None
 
     @property
     def recorded(self) -> bool:
-        """Whether its trace was recorded, not simulated."""
+        """True if the trace was recorded, not simulated."""
         return self.measurement.file is not None
 
     @property
     def known(self) -> Mapping[str, float]:
-        """Parameters that are not identified."""
+        """Parameters with known values, which are not identified."""
         return self.fixed or {}
 
     @property
@@ -164,7 +164,7 @@ class CaseBlock(Shared):
         return sum(getattr(self.search_range, p.range_name).digits + 1 for p in self._searched)
 
     def problems(self) -> Iterator[Problem]:
-        """Find blocks that do not go together."""
+        """Find blocks that are in conflict."""
         if self.recorded:
             for name in self.sample.parameters:
                 text = "is what a recorded trace is to tell; leave it out."
@@ -190,7 +190,7 @@ class CaseBlock(Shared):
                 yield ("assumed_gripper",), f"{text}gripper block."
 
     def contact_problems(self, comb: CombDrive) -> Iterator[Problem]:
-        """Find a sample that the jaws cannot be closed onto."""
+        """Find a sample that does not fit between the jaws."""
         if self.sample.size_m is not None:
             try:
                 self.gripper.contact(comb, self.sample.size_m)
@@ -246,7 +246,7 @@ class CaseBlock(Shared):
             yield ("fixed",), "leaves nothing to identify; allowed are fewer parameters."
 
     def _unreachable_problems(self) -> Iterator[Problem]:
-        """Find true values in decades that no identification looks into."""
+        """Find true values outside the decades that are searched."""
         for parameter in self._searched:
             value = self.sample.parameters.get(parameter.name)
             genes: GeneRange = getattr(self.search_range, parameter.range_name)
@@ -260,7 +260,7 @@ class CaseBlock(Shared):
             yield ("sample", parameter.name), f"{text}, or another search_range."
 
     def _band_problems(self) -> Iterator[Problem]:
-        """Find times at which a springpot is none."""
+        """Find times outside the validity of power laws."""
         if self.protocol.end_s > LONGEST_S:
             text = f"found a protocol of {self.protocol.end_s:g} s, allowed are at most"
             yield ("sample", "model"), f"{text} {LONGEST_S:g} s with {self.sample.model}."
@@ -313,7 +313,7 @@ class CaseBlock(Shared):
             last = ends
 
     def _calibration_problems(self) -> Iterator[Problem]:
-        """A free arm must be seen ringing: sampled fast enough, for long enough."""
+        """Refuse a calibration test that samples a free arm's ringing too slowly or too briefly."""
         test = self.calibration
         arms = self.gripper.left, self.gripper.right
         frequency = max(arm.natural_frequency_Hz for arm in arms)
@@ -330,4 +330,4 @@ OVERRIDABLE = (
     *(field.name for field in fields(Shared) if field.name != "of_methods"),
     *dict.fromkeys(name for method in METHODS.values() for name in method.blocks),
 )
-"""Blocks that hold for all cases, and that a case may change for itself."""
+"""Blocks that a study sets for all cases, and that a case may change for itself."""

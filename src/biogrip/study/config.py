@@ -1,4 +1,4 @@
-"""The study's keys: those of all cases, and the cases and sweeps themselves."""
+"""Top-level keys of a study's config."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,11 +17,11 @@ from biogrip.study.sweeps import SweepBlock
 from biogrip.study.typed import parts
 
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
-"""Seeds a job takes at least and at most, and between these in how many, if a study is silent."""
+"""Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
 
 _MOST_BATCHES = 10_000
 _MOST_CASES = 2000
-# Of the names in a message.
+# Most names listed in a message.
 _SHOWN = 6
 _CASE_NAME = Key(
     pattern="[A-Za-z][A-Za-z0-9_-]{0,63}",
@@ -34,13 +34,13 @@ _SWEEP_NAME = Key(
 
 @dataclass(frozen=True)
 class ModelSelection:
-    """The choice of the simplest adequate sample model by AIC and BIC."""
+    """Selection of the simplest adequate sample model by AIC and BIC."""
 
     models: Annotated[
         tuple[Annotated[str, Key(choices=tuple(CANDIDATES))], ...],
         Key(
-            "Sample models that every trace is fitted with, beside that of its case; an empty list "
-            "leaves that out. A number counts Maxwell branches.",
+            "Sample models fitted to every trace, beside that of its case; with an empty list "
+            "none are. A number counts Maxwell branches.",
             most=100,
             unique=True,
         ),
@@ -49,13 +49,13 @@ class ModelSelection:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """How results are judged."""
+    """Criteria by which identifications count as successful."""
 
     optimum_tolerance: Annotated[
         float,
         Key(
             "A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by "
-            "at most this. One is what moving a parameter by its standard deviation costs.",
+            "at most this. A change of one parameter by its standard deviation raises χ² by one.",
             above=0,
             high=100,
         ),
@@ -64,8 +64,8 @@ class Evaluation:
         float,
         Key(
             "A seed counts as near the noise if its misfit exceeds the RMS of the noise in its "
-            "trace by at most this share. Of thousands of samples that is much in χ², so it need "
-            "be no optimum.",
+            "trace by at most this share. With thousands of samples that is a large increase of "
+            "χ², so the fit need not be an optimum.",
             low=0,
             high=1,
         ),
@@ -74,7 +74,7 @@ class Evaluation:
 
 @dataclass(frozen=True, kw_only=True)
 class StudyConfig(Shared):
-    """What a study may say."""
+    """All keys of a study's config."""
 
     study_seed: Annotated[
         int,
@@ -88,8 +88,8 @@ class StudyConfig(Shared):
     seeds: Annotated[
         int,
         Key(
-            "How many noisy traces of each case are made and identified. Raising it keeps what "
-            "is there.",
+            "Number of noisy traces of each case that are made and identified. Raising it keeps "
+            "the results there are.",
             low=1,
             high=1_000_000,
         ),
@@ -97,7 +97,7 @@ class StudyConfig(Shared):
     batch_size: Annotated[
         int | None,
         Key(
-            f"How many seeds one job takes. If it is not given, {SMALLEST_BATCH}; for more than "
+            f"Number of seeds per job. By default {SMALLEST_BATCH}; for more than "
             f"{USUAL_BATCHES * SMALLEST_BATCH} seeds, 1/{USUAL_BATCHES} of them, for more than "
             f"{USUAL_BATCHES * LARGEST_BATCH}, {LARGEST_BATCH}. Changes no result, only how much "
             "of a job is start-up.",
@@ -109,7 +109,7 @@ class StudyConfig(Shared):
     methods: Annotated[
         tuple[Annotated[str, Key(choices=tuple(METHODS))], ...],
         Key(
-            "Identifiers that every trace is given to. Tables 5-7 and the figures of single fits "
+            "Identification methods applied to every trace. Tables 5-7 and figures of single fits "
             "show the first.",
             fewest=1,
             most=100,
@@ -138,8 +138,7 @@ class StudyConfig(Shared):
     only: Annotated[
         tuple[str, ...],
         Key(
-            "Names of the cases that the study has, the others being left out. If it is not "
-            "given, all that stand under `cases`.",
+            "Names of the cases to run; the others are left out. By default all under `cases`.",
             fewest=1,
             most=_MOST_CASES,
             unique=True,
@@ -149,7 +148,7 @@ class StudyConfig(Shared):
         Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
         Key(
             f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points together. "
-            "Every point is a case like another, but for the two values; it is identified, and "
+            "Every point is a case that differs in two values; it is identified like others, and "
             "shown in heat maps and their table only."
         ),
     ] = field(default_factory=dict)
@@ -163,7 +162,7 @@ class StudyConfig(Shared):
     ] = field(default_factory=dict)
 
     def problems(self) -> Iterator[Problem]:
-        """Find too many jobs, samples that do not fit, and keys that are marked and not there."""
+        """Find too many jobs, samples that do not fit, and unknown keys marked as reconstructed."""
         if self.batch_size is not None:
             tests = (case.identifiability.coverage_seeds for case in self.cases.values())
             seeds = max(self.seeds, *tests)
@@ -183,7 +182,7 @@ class StudyConfig(Shared):
                 yield ("only", index), text + nearest(name, self.cases)
 
     def _band_problems(self) -> Iterator[Problem]:
-        """Find sample models that are none for as long as a protocol lasts."""
+        """Find power-law models in a study whose protocols exceed their range of validity."""
         longest = max(case.protocol.end_s for case in self.cases.values())
         for index, name in enumerate(self.model_selection.models):
             if not CANDIDATES[name].model.power_law:
@@ -194,7 +193,7 @@ class StudyConfig(Shared):
 
     @property
     def chosen(self) -> "StudyConfig":
-        """The study without the cases that are left out."""
+        """The study with only the cases that `only` names."""
         return replace(self, cases={name: self.cases[name] for name in self.only or self.cases})
 
 

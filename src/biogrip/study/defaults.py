@@ -1,8 +1,8 @@
-"""The default study's config and its Snakefile, wherever the package is installed."""
+"""Paths of the default config and of the Snakefile, installed or in the repository."""
 
 from pathlib import Path
 
-# An installed package carries a copy of what stands at the top of the repository.
+# The wheel contains a copy of these files of the repository.
 _PACKAGED = Path(__file__).parents[1] / "workflow"
 _TOP = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[3]
 

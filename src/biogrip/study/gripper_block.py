@@ -1,4 +1,4 @@
-"""The gripper, as the config says it."""
+"""Config block of the gripper."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from biogrip.instrument.contact import Contact, contact
 from biogrip.instrument.gripper import Gripper
 from biogrip.keys import Key, Problem
 
-# Of an arm's property; more would be no small change of its response.
+# Share of an arm's property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
 
 _Uncertainties = Annotated[
@@ -20,7 +20,7 @@ _Uncertainties = Annotated[
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard uncertainties of a calibrated gripper, arm by arm; a part of all intervals."""
+    """Standard uncertainties of a calibrated gripper, arm by arm; all intervals include them."""
 
     left: Annotated[_Uncertainties | None, Key("Uncertainties of the left arm's keys.")] = None
     right: Annotated[_Uncertainties | None, Key("Uncertainties of the right arm's keys.")] = None
@@ -28,7 +28,7 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class GripperBlock(Gripper):
-    """The two arms (Table 1)."""
+    """The gripper's two arms and jaw gap (Table 1)."""
 
     jaw_gap_m: Annotated[
         float,
@@ -44,7 +44,7 @@ class GripperBlock(Gripper):
         return {name: known for name, known in vars(self.uncertainty).items() if known}
 
     def problems(self) -> Iterator[Problem]:
-        """Find arms of which next to nothing is known."""
+        """Refuse uncertainties of half an arm's property or more."""
         for name, known in self.uncertainties.items():
             for key, uncertainty in known.items():
                 value = getattr(getattr(self, name), key)
@@ -58,5 +58,5 @@ class GripperBlock(Gripper):
         return Gripper(self.arm_length_m, self.reference_angle_deg, self.left, self.right)
 
     def contact(self, comb: CombDrive, size_m: float) -> Contact:
-        """Close it onto a sample."""
+        """Return the gripper's state when it is closed onto a sample."""
         return contact(self.neutral, self.jaw_gap_m, comb, size_m)

@@ -1,4 +1,4 @@
-"""From config files to a checked study."""
+"""Loading of config files into a checked study."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -12,12 +12,12 @@ from biogrip.study.validation import STUDY, checked
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
-    """Read config files and lay each over the ones before.
+    """Read config files and merge them, the later over the earlier.
 
     Raises
     ------
     BiogripError
-        With file and line, if one cannot be used whatever its keys mean.
+        With file and line, if a file is no valid config at all, see `read_config`.
     """
     merged: dict[str, Any] = {}
     for file in files:
@@ -37,13 +37,13 @@ def load_study(
     Parameters
     ----------
     config
-        The config in force: all files, the later laid over the earlier.
+        The merged config.
     files
-        The files it came from, to name lines in messages.
+        The files it came from, for line numbers in messages.
     command_line
         Top-level keys that were set on the command line.
     for_workflow
-        Whether it is to be run by the workflow, which names of files must suit.
+        If true, refuse paths of traces that Snakemake would read as wildcards.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def load_study(
 
 
 def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
-    """Give every case the study's blocks under its own; drop cases set to nothing."""
+    """Merge the study's blocks into every case; drop cases set to nothing."""
     cases = config.get("cases")
     if not isinstance(cases, dict):
         return config

@@ -1,4 +1,4 @@
-"""How a trace is recorded, as the config says it."""
+"""Config block of the measurement: sampling, noise, and the file of a recorded trace."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ NOISE_MODELS = ("white", COLOURED)
 
 @dataclass(frozen=True, kw_only=True)
 class MeasurementBlock:
-    """How the left arm's rotation is recorded."""
+    """Sampling and noise of the left arm's rotation, or the file of a recorded trace."""
 
     rate_Hz: Annotated[
         float, Key("Sampling rate; the first sample is at t = 0.", "Hz", low=1e-9, high=1e9)
@@ -24,8 +24,8 @@ class MeasurementBlock:
     times_s: Annotated[
         tuple[Annotated[float, Key(low=0, high=1e9)], ...],
         Key(
-            "Sampling times, ascending, instead of a uniform rate; for more of them there is "
-            "rate_Hz.",
+            "Sampling times, ascending, instead of a uniform rate; more of them need rate_Hz "
+            "or bursts.",
             "s",
             fewest=2,
             most=5000,
@@ -34,8 +34,8 @@ class MeasurementBlock:
     bursts: Annotated[
         tuple[Burst, ...],
         Key(
-            "Samples in bursts that follow one another, instead of a uniform rate: a camera that "
-            "is fast after every step. See docs/design.md.",
+            "Successive bursts of samples instead of a uniform rate, as of a camera that is fast "
+            "after every step. See docs/design.md.",
             fewest=1,
             most=20_000,
         ),
@@ -78,8 +78,8 @@ class MeasurementBlock:
     noise_rad: Annotated[
         float | None,
         Key(
-            "Standard deviation of the recorded noise, if it is known; by default that of the "
-            "residual.",
+            "Standard deviation of the recorded noise, if it is known; by default it is estimated "
+            "from the residuals.",
             "rad",
             low=1e-15,
             high=10,
@@ -87,25 +87,19 @@ class MeasurementBlock:
     ] = None
     offset: Annotated[
         bool,
-        Key(
-            "Whether the instrument may have added a constant; it is then fitted along. By "
-            "default no."
-        ),
+        Key("If true, fit a constant offset of the instrument along. By default false."),
     ] = False
     drift: Annotated[
         bool,
-        Key(
-            "Whether the instrument may have added a drift linear in time; it is then fitted "
-            "along. By default no."
-        ),
+        Key("If true, fit a linear drift of the instrument along. By default false."),
     ] = False
     noise_model: Annotated[
         str | None,
         Key(
-            "What noise is taken for where a trace is judged. `white`: samples are independent; "
-            "`coloured`: it may remember and have a spectrum 1/f, and samples that stand out are "
-            "left out, so that intervals are wider and stay honest; every identification, judged "
-            "or not, then fits an offset and a drift along. By default white.",
+            "Model of the noise when a trace is judged. `white`: samples are independent; "
+            "`coloured`: noise may be autocorrelated (AR(1), 1/f), and outliers are left out, so "
+            "that intervals are wider and keep their coverage; every identification, judged or "
+            "not, then fits an offset and a drift along. By default white.",
             choices=NOISE_MODELS,
         ),
     ] = None
@@ -113,16 +107,16 @@ class MeasurementBlock:
 
     @property
     def coloured(self) -> bool:
-        """Whether noise may be other than white."""
+        """True if the noise model is more than white noise."""
         return self.noise_model == COLOURED
 
     @property
     def sampling(self) -> Sampling:
-        """When the rotation is sampled."""
+        """Sampling of the rotation."""
         return Sampling(self.rate_Hz, self.times_s, self.bursts)
 
     def problems(self) -> Iterator[Problem]:
-        """A recorded trace needs a file that is there, and the names of its columns."""
+        """Find keys that are in conflict, and what a recorded trace lacks."""
         if self.coloured and self.noise_rad is not None:
             text = "is that of white noise; leave it out where noise_model is coloured."
             yield ("noise_rad",), text

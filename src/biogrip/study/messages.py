@@ -1,4 +1,4 @@
-"""What is wrong with a plain value, in words: what was found, and what is allowed."""
+"""Error messages about plain config values: what was found, and what is allowed."""
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, nearest_unit
 
 MOST_EXPLAINED = 1000
 
-# Keys that configs of earlier versions have, by their last two names.
+# Keys of earlier versions of the config, by their last two names.
 _RETIRED: dict[tuple[int | str, ...], str] = {
     ("models", "inertia"): "no longer needed: traces that show the arms ringing are fitted with "
     "their inertia. Leave it out.",
@@ -26,21 +26,21 @@ _KEY = "[key]"
 
 
 def value_problems(shape: Shape, value: Any) -> Iterator[Problem]:
-    """Find what a value cannot be.
+    """Yield an error message for every part of a value that is not allowed.
 
     Parameters
     ----------
     shape
-        What it should look like.
+        Schema of the value.
     value
-        What it is.
+        Plain value from a config file.
 
     Yields
     ------
     tuple
-        The path of a key in it, and what was found and what is allowed.
+        Path of a key in the value, and a message: what was found and what is allowed.
     """
-    # No comparison with a bound tells that a NaN is beyond it.
+    # A NaN passes every comparison with a bound, so refuse it first.
     odd = list(_not_finite((), value))
     if odd:
         yield from odd
@@ -52,7 +52,7 @@ def value_problems(shape: Shape, value: Any) -> Iterator[Problem]:
 
 
 def shape_at(shape: Shape, path: Sequence[str]) -> Shape:
-    """Return what the value of a key may look like, blocks by name."""
+    """Return the schema of a key's value, blocks by name."""
     for name in path:
         assert shape.block is not None
         shape = keys(shape.block)[name].shape
@@ -60,14 +60,14 @@ def shape_at(shape: Shape, path: Sequence[str]) -> Shape:
 
 
 def bound(limit: float) -> str:
-    """Return a limit as people write it, whole numbers in full."""
+    """Return a bound as text, whole numbers in full."""
     return f"{limit:g}" if isinstance(limit, float) else str(limit)
 
 
 def _found_at(
     shape: Shape, loc: tuple[int | str, ...]
 ) -> tuple[tuple[int | str, ...], Shape, Shape]:
-    """Path of what pydantic found, what it should look like, and what it stands in."""
+    """Return where pydantic found an error: path, schema there, and schema of the block around."""
     path: list[int | str] = []
     above = shape
     for part in loc:
@@ -105,7 +105,7 @@ def _explained(
         case "missing":
             return path, "is missing and has no default."
         case "literal_error":
-            # Of a key that is none of those allowed, the block is said that has it.
+            # An unknown key of a mapping is reported for the block that contains it.
             place = path[:-1] if above.names is leaf else path
             known = nearest_unit if key.choices in _UNITS else nearest
             hint = known(found, key.choices)

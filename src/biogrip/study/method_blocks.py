@@ -1,4 +1,4 @@
-"""The settings of the methods, as far as somebody asks for them."""
+"""Config blocks of the identification methods, loaded lazily."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,34 +11,34 @@ from biogrip.study.typed import built
 
 @dataclass(frozen=True)
 class MethodBlocks:
-    """Settings of the methods, each made when it is asked for: to load a method takes its time.
+    """Settings of the methods, constructed on access, so that unused methods are not imported.
 
     Parameters
     ----------
     plain
-        What the config has of them, by block.
+        Plain config of each block.
     """
 
     plain: Mapping[str, Mapping[str, Any]]
 
     @staticmethod
     def classes() -> dict[str, type]:
-        """Load what has the keys of each block."""
+        """Return the settings class of each block, importing all methods."""
         names = [name for method in METHODS.values() for name in method.blocks]
         return {name: block_class(name) for name in names}
 
     def block(self, name: str) -> object:
-        """Return the settings of a block."""
+        """Return the settings object of a block."""
         return built(block_class(name), self.plain.get(name, {}))
 
     def of(self, method: str) -> object:
-        """Return the settings of a method."""
+        """Return the settings object of a method."""
         found = [self.block(name) for name in METHODS[method].blocks]
         together = METHODS[method].settings
         return METHODS[method].named(together)(*found) if together else found[0]
 
     def problems_of(self, genes: int) -> Iterator[Problem]:
-        """Find what does not go with a chromosome of some length."""
+        """Find settings that conflict with the length of a chromosome."""
         for name in self.classes():
             settings = self.block(name)
             if hasattr(settings, "problems_of"):

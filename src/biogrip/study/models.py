@@ -1,4 +1,4 @@
-"""Pydantic's view of the classes whose fields are the config's keys: checks, and a JSON Schema."""
+"""Pydantic models and a JSON Schema, derived from the dataclasses that define config keys."""
 
 import re
 from collections.abc import Mapping
@@ -21,23 +21,23 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from biogrip.study.typed import Shape, keys, spread
 
 FORM, TWICE = "form", "twice"
-"""Errors of our own: text of another form than allowed, and a list with something twice."""
+"""Names of custom pydantic errors: text that does not match its pattern, and a repeated item."""
 
 
 def errors_in(shape: Shape, value: Any) -> list[ErrorDetails]:
-    """Check a plain value.
+    """Validate a plain value with pydantic.
 
     Parameters
     ----------
     shape
-        What it should look like.
+        Schema of the value.
     value
-        What it is.
+        Plain value from a config file.
 
     Returns
     -------
     list
-        Pydantic's errors, one a defect.
+        Pydantic's errors; empty if the value is valid.
     """
     try:
         _adapter(shape).validate_python(value)
@@ -47,12 +47,12 @@ def errors_in(shape: Shape, value: Any) -> list[ErrorDetails]:
 
 
 def json_schema(block: type) -> dict[str, Any]:
-    """Return the JSON Schema of a class whose fields are keys."""
+    """Return the JSON Schema of a config dataclass."""
     return _model(block).model_json_schema()
 
 
 def word(shape: Shape) -> str:
-    """Name a kind of value."""
+    """Return the kind of value a schema allows, in words."""
     if shape.options:
         return " or ".join(word(option) for option in shape.options)
     if shape.scalar:
@@ -62,7 +62,7 @@ def word(shape: Shape) -> str:
 
 
 def kind_of(value: Any) -> str | None:
-    """Name the kind of a value that may be one of several."""
+    """Return the kind of a plain value in words, to choose among alternatives."""
     if isinstance(value, Mapping):
         return "a block of keys"
     if isinstance(value, list):
@@ -82,7 +82,7 @@ _CONFIG = ConfigDict(strict=True, extra="forbid", protected_namespaces=())
 
 @cache
 def _model(block: type) -> type[BaseModel]:
-    """Make the model of a class."""
+    """Return the pydantic model of a config dataclass."""
     named = keys(block)
     space: dict[str, Any] = {
         "__module__": block.__module__,
@@ -90,7 +90,7 @@ def _model(block: type) -> type[BaseModel]:
         "__annotations__": {name: _annotation(entry.shape) for name, entry in named.items()},
         "model_config": _CONFIG,
     }
-    # What may be left out is not checked then.
+    # Optional keys default to None, which pydantic does not check.
     space |= {name: None for name, entry in named.items() if not entry.needed}
     rest = spread(block)
     if rest and rest.shape.values:
@@ -100,7 +100,7 @@ def _model(block: type) -> type[BaseModel]:
 
 
 def _annotation(shape: Shape) -> Any:
-    """Return a type with everything that pydantic checks about it."""
+    """Return a type annotated with all constraints that pydantic checks."""
     key = shape.key
     limits: dict[str, Any] = {"ge": key.low, "gt": key.above, "le": key.high}
     limits |= {"min_length": key.fewest, "max_length": key.most}
@@ -108,7 +108,7 @@ def _annotation(shape: Shape) -> Any:
     if key.unique:
         extra["uniqueItems"] = True
     if key.pattern:
-        # To the expressions of a JSON Schema, letters are those of ASCII.
+        # \w of a JSON Schema matches ASCII letters only.
         extra["pattern"] = f"^{key.pattern}$".replace(r"\w", r"\w\u00aa-\uffff")
     said: list[Any] = [
         Field(

@@ -1,4 +1,4 @@
-"""Numbers that YAML reads as text: it takes 1e-3 for text, for want of a dot."""
+"""Conversion of text like ``1e-3`` to numbers, since YAML 1.1 takes it for text without a dot."""
 
 import re
 from collections.abc import Mapping
@@ -13,14 +13,14 @@ _NUMERIC = (int, float, object)
 
 
 def with_numbers(shape: Shape, value: Any) -> Any:
-    """Return a copy of a plain value in which text like ``1e-3`` is a number where one may stand.
+    """Return a copy of a plain value with text like ``1e-3`` converted where a number is allowed.
 
     Parameters
     ----------
     shape
-        What the value should look like; where it does not, it stays as it is.
+        Schema of the value; parts that do not match it are kept as they are.
     value
-        As YAML has it.
+        Plain value as YAML loads it.
     """
     shapes = (shape, *shape.options)
     if isinstance(value, Mapping):
@@ -51,6 +51,6 @@ def _number(text: str) -> float | str:
     if len(text) > LONGEST_NUMBER or not _NUMBER.fullmatch(text.strip()):
         return text
     number = float(text)
-    # Beyond, a float does not hold every whole number, nor would anybody count them.
+    # Beyond 2^53 a float does not hold every integer.
     whole = number.is_integer() and abs(number) < _MOST_COUNTED
     return int(number) if whole else number

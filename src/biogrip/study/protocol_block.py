@@ -1,4 +1,4 @@
-"""What the comb drives do, as the config says it."""
+"""Config block of the protocol: torques or voltages of the comb drives over time."""
 
 import math
 from collections.abc import Iterator
@@ -15,12 +15,12 @@ _MOST_PERIODS = 10_000
 
 @dataclass(frozen=True)
 class PhaseBlock:
-    """A hold, a ramp or a sinusoid, in torque or in voltage."""
+    """A phase of the protocol: a hold, a ramp or a sinusoid, in torque or in voltage."""
 
     duration_s: Annotated[
         float,
         Key(
-            "How long the phase lasts; all together at most 1e9 s.", "s", low=1e-6, high=_LONGEST_S
+            "Duration of the phase; of all together at most 1e9 s.", "s", low=1e-6, high=_LONGEST_S
         ),
     ]
     torque_Nm: Annotated[
@@ -51,9 +51,9 @@ class PhaseBlock:
     voltage_V: Annotated[
         float | None,
         Key(
-            "Voltage on both comb drives, instead of torque_Nm. As in the paper it is turned into "
-            "grip torque by eq. (9) and counted from contact; what closes the jaws onto a sample "
-            "comes on top.",
+            "Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts "
+            "it to grip torque, counted from contact; the voltage that closes the jaws onto a "
+            "sample comes on top.",
             "V",
             low=0,
             high=1e4,
@@ -87,12 +87,12 @@ class PhaseBlock:
 
     @property
     def drives(self) -> bool:
-        """Whether anything moves."""
+        """True if any torque or voltage of the phase is above zero."""
         torques = self.torque_Nm, self.to_torque_Nm, self.torque_right_Nm
         return any((*torques, self.voltage_V, self.to_voltage_V, self.voltage_right_V))
 
     def phase(self, per_square_volt: float) -> Phase:
-        """Return its torques; a voltage's are `per_square_volt` times its square (eq. 9)."""
+        """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
         if self.voltage_V is not None:
             left = self._load(self.voltage_V, self.to_voltage_V, self.amplitude_V)
             loads = left, _at(left, self.voltage_right_V)
@@ -105,7 +105,7 @@ class PhaseBlock:
         return load(self.duration_s, value, to, amplitude, self.frequency_Hz)
 
     def problems(self) -> Iterator[Problem]:
-        """Find keys that do not go together."""
+        """Find keys that are in conflict."""
         given = {name: value for name, value in vars(self).items() if value is not None}
         bases = [key for key in ("torque_Nm", "voltage_V") if key in given]
         if len(bases) != 1:
@@ -134,7 +134,7 @@ class PhaseBlock:
 
 @dataclass(frozen=True)
 class ProtocolBlock:
-    """What the comb drives do (Figure 3)."""
+    """Torques or voltages of the comb drives over time (Figure 3)."""
 
     phases: Annotated[
         tuple[PhaseBlock, ...],
@@ -147,16 +147,16 @@ class ProtocolBlock:
 
     @property
     def end_s(self) -> float:
-        """When the experiment ends."""
+        """Duration of the protocol."""
         return sum(phase.duration_s for phase in self.phases)
 
     def torques(self, comb: CombDrive) -> tuple[Phase, ...]:
-        """Return the torques of all phases, voltages turned into torques (eq. 9)."""
+        """Return all phases in torques, converting voltages (eq. 9)."""
         per_square_volt = 0.5 * capacitance_slope(comb)
         return tuple(phase.phase(per_square_volt) for phase in self.phases)
 
     def problems(self) -> Iterator[Problem]:
-        """Find a protocol that is too long, and one in which nothing moves."""
+        """Refuse a protocol that is too long, or in which all torques are zero."""
         if self.end_s > _LONGEST_S:
             text = f"found {self.end_s:g} s in all phases together, allowed is at most "
             yield ("phases",), f"{text}{_LONGEST_S:g} s."
@@ -170,7 +170,7 @@ def _at(load: Load, value: float | None) -> Load:
 
 
 def _squared(volts: Load, per_square_volt: float) -> Load:
-    """Torque of a voltage V + r t, or V + A sin(omega t), by tau = kappa V^2.
+    """Return the torque of a voltage V + r t or V + A sin(omega t): tau = kappa V^2.
 
     The squared sinusoid is V^2 + A^2/2 + 2 V A sin(omega t) - A^2/2 cos(2 omega t).
     """

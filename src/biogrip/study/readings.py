@@ -1,4 +1,4 @@
-"""Readings: other ways to understand what the paper says, each tried on all simulated cases."""
+"""Readings: alternative interpretations of the paper, each tried on all simulated cases."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -12,13 +12,13 @@ from biogrip.study.typed import plain
 
 @dataclass(frozen=True)
 class ReadingBlock:
-    """What a reading takes to be different."""
+    """An alternative interpretation of the paper: changes to every simulated case."""
 
     title: Annotated[str, printed("Name in print.")]
     changes: Annotated[
         Mapping[str, Any],
         Key(
-            "Laid over each case, in the form of a case, e.g. `genetic_algorithm: {patience: 60}`."
+            "Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."
         ),
     ]
 
@@ -26,17 +26,17 @@ class ReadingBlock:
 def read_blocks(
     readings: Mapping[str, ReadingBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Blocks of the simulated cases under each reading, as a file would have them.
+    """Yield the config block of every simulated case under every reading, as plain data.
 
     Parameters
     ----------
     readings, cases
-        Of a study.
+        Blocks of a study's config.
 
     Yields
     ------
     tuple
-        Names of the reading and of the case, and the block.
+        Name of the reading, name of the case, and the block.
     """
     for reading, block in readings.items():
         for name, case in cases.items():

@@ -1,4 +1,4 @@
-"""The description of every config key, as Markdown, and the JSON Schema of config files."""
+"""Reference of all config keys in Markdown, and the JSON Schema of config files."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -23,7 +23,7 @@ _Row = tuple[str, str, str, str, str]
 
 
 def reference(config: Path) -> str:
-    """Return tables of all keys: meaning, unit, default, allowed values.
+    """Return Markdown tables of all keys: meaning, unit, default, allowed values.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ def reference(config: Path) -> str:
 
 
 def file_schema() -> str:
-    """Return the JSON Schema of a config file, which may leave out what another one has."""
+    """Return the JSON Schema of a config file, with all keys optional, as files are merged."""
     schema = _partial(json_schema(StudyConfig))
     cases = schema["properties"]["cases"]
     ((name, case),) = cases["patternProperties"].items()
-    # A case that is set to nothing is left out.
+    # A case set to null is dropped.
     cases["patternProperties"] = {name: {"anyOf": [case, {"type": "null"}]}}
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
 
@@ -68,7 +68,7 @@ def _partial(node: Any, name: str = "") -> Any:
         return {key: _partial(inner, key) for key, inner in node.items() if key not in left}
     if isinstance(node, list):
         return [_partial(item) for item in node]
-    # Versions of pydantic differ in how they write a whole number.
+    # Pydantic versions differ in writing integral numbers as int or float.
     return int(node) if isinstance(node, float) and node.is_integer() else node
 
 

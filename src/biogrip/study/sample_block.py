@@ -1,4 +1,4 @@
-"""The sample, as the config says it."""
+"""Config block of the sample: constitutive model and true parameters."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ _LEAST_PARAMETER = 1e-18
 
 @dataclass(frozen=True)
 class SampleBlock:
-    """The sample's constitutive model and its true parameters."""
+    """Constitutive model of the sample and its true parameters."""
 
     model: Annotated[
         str,
@@ -40,7 +40,7 @@ class SampleBlock:
     size_m: Annotated[
         float | None,
         Key(
-            "Diameter of the sample. Decides where the jaws touch it.",
+            "Diameter of the sample. It decides at which angle the jaws touch the sample.",
             "m",
             low=SMALLEST_M,
             high=LARGEST_M,
@@ -49,11 +49,11 @@ class SampleBlock:
 
     @property
     def sample(self) -> Sample:
-        """Which model it has."""
+        """Constitutive model, with its number of branches."""
         return Sample(self.model, self.branches)
 
     def problems(self) -> Iterator[Problem]:
-        """Find parameters that its model does not have, or not with such values."""
+        """Find parameters that the model does not have, or whose values it does not allow."""
         if self.branches != 1 and self.model != "generalized_maxwell":
             yield ("branches",), "only generalized_maxwell has a number of branches."
             return
@@ -65,7 +65,7 @@ class SampleBlock:
         yield from parameter_problems(model, self.parameters)
 
     def missing(self) -> Iterator[Problem]:
-        """Find parameters whose true values are not there."""
+        """Find parameters of the model without a true value."""
         model = self.sample.model
         for name in model.names:
             if name not in self.parameters:
@@ -73,7 +73,7 @@ class SampleBlock:
 
 
 def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
-    """Find parameters that are too small, but for those that may vanish, or too large."""
+    """Find values that are too small or too large; 0 is allowed for parameters that may vanish."""
     there: list[Parameter] = [p for p in model.parameters if p.name in values]
     for parameter in there:
         value = values[parameter.name]

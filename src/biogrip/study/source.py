@@ -1,4 +1,4 @@
-"""What a config file holds, and where in which file a key stands."""
+"""Keys of config files with their line numbers, for error messages."""
 
 from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
@@ -18,23 +18,23 @@ _LONGEST_NAME = 80
 
 @dataclass(frozen=True)
 class ConfigFiles:
-    """The YAML files of a study, the last laid over the ones before.
+    """Config files of a study with line numbers, the later merged over the earlier.
 
     Parameters
     ----------
     lines
-        By file, the line (from 1) of every key and list item in it.
+        Line (from 1) of every key and list item, by file.
     command_line
-        Top-level keys that the command line sets over all files.
+        Top-level keys set on the command line, which override all files.
     """
 
     lines: tuple[tuple[str, dict[KeyPath, int]], ...]
     command_line: frozenset[Hashable] = frozenset()
 
     def place(self, path: KeyPath) -> str:
-        """Say where the value in force was set, e.g. ``"config/my.yaml, line 7"``.
+        """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.
 
-        A key that is missing is placed at the block that lacks it.
+        For a missing key it is the block that lacks it.
         """
         if path and path[0] in self.command_line:
             return "command line, --config"
@@ -47,19 +47,19 @@ class ConfigFiles:
 
 
 def read_places(files: Sequence[str | Path], command_line: Iterable[Hashable] = ()) -> ConfigFiles:
-    """Read the places of all keys.
+    """Read the line numbers of all keys.
 
     Parameters
     ----------
     files
-        YAML files, the last laid over the ones before.
+        YAML files, the later merged over the earlier.
     command_line
-        Top-level keys that the command line sets over all files.
+        Top-level keys set on the command line, which override all files.
 
     Raises
     ------
     BiogripError
-        With file and line, if a file cannot be used whatever its keys mean: see `read_config`.
+        With file and line, if a file is no valid config at all, see `read_config`.
     """
     lines = tuple((shown_path(Path(file)), _read(Path(file))[0]) for file in files)
     return ConfigFiles(lines, frozenset(command_line))
@@ -71,14 +71,14 @@ def read_config(file: Path) -> dict[str, Any]:
     Raises
     ------
     BiogripError
-        With file and line, if it is missing, is no YAML of keys within the bounds of `compose`,
-        gives a key twice, or has values that YAML 1.1 reads otherwise than people do.
+        With file and line, if the file is missing or is not a YAML mapping within the bounds of
+        `compose`, has a duplicate key, or a value that YAML 1.1 misreads, see `scalar_problem`.
     """
     return _read(file)[1]
 
 
 def overlaid(base: Any, over: Any) -> Any:
-    """Lay a config block over another: blocks key by key, everything else whole, not copied."""
+    """Merge a config block over another: mappings recursively, all else replaced, not copied."""
     if isinstance(base, dict) and isinstance(over, dict):
         merged = dict(base)
         for key, value in over.items():
@@ -88,7 +88,7 @@ def overlaid(base: Any, over: Any) -> Any:
 
 
 def _read(file: Path) -> tuple[dict[KeyPath, int], dict[str, Any]]:
-    """Return the line of every key, and what the keys hold."""
+    """Return the line number of every key, and the content of the file."""
     root = compose(file)
     lines: dict[KeyPath, int] = {}
     if root is None:

@@ -1,4 +1,4 @@
-"""The study as its config describes it: cases, and what each of them assumes."""
+"""Typed access to a checked config: the study and its cases."""
 
 import math
 from collections.abc import Mapping
@@ -28,18 +28,18 @@ from biogrip.traces.recordings import Columns
 
 @dataclass(frozen=True)
 class Case:
-    """One sample of the study.
+    """A case of the study: one sample with its experiment and identification.
 
     Parameters
     ----------
     name
-        Name in files.
+        Name used in files.
     block
-        Its config, with the study's blocks filled in.
+        Config block, with the study's blocks merged in.
     actuator
-        The study's comb drive.
+        Comb drive of the study.
     study_seeds
-        How many seeds a simulated case of the study has.
+        Number of seeds of each simulated case.
     """
 
     name: str
@@ -49,17 +49,17 @@ class Case:
 
     @property
     def title(self) -> str:
-        """Name in print."""
+        """Title in tables and figures."""
         return self.name if self.block.title is None else self.block.title
 
     @property
     def recorded(self) -> bool:
-        """Whether its trace was recorded, not simulated."""
+        """True if the trace was recorded, not simulated."""
         return self.block.recorded
 
     @property
     def seeds(self) -> int:
-        """Number of traces; of a recorded one there is one."""
+        """Number of traces; 1 for a recorded trace."""
         return 1 if self.recorded else self.study_seeds
 
     @cached_property
@@ -69,7 +69,7 @@ class Case:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """True values by name, SI units, branches as they relax; none of a recorded trace."""
+        """True parameters by name, SI units, branches by relaxation time; none if recorded."""
         given = self.block.sample.parameters
         known = {name: float(given[name]) for name in self.sample.model.names if name in given}
         searched = with_fixed(self.sample.model, self.fixed)
@@ -88,22 +88,22 @@ class Case:
 
     @property
     def published(self) -> Published:
-        """What the paper reports of it."""
+        """Results that the paper reports for the sample."""
         return self.block.published or Published()
 
     @property
     def truth(self) -> Truth:
-        """What is known of it."""
+        """True values of the sample, with the paper's results."""
         return Truth(self.title, self.sample, self.parameters, self.published)
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
-        """The protocol."""
+        """Phases of the protocol, in torques."""
         return self.block.protocol.torques(self.actuator)
 
     @cached_property
     def gripper(self) -> Gripper:
-        """The true gripper where its jaws touch the sample."""
+        """True gripper, at the angle at which the jaws touch the sample."""
         neutral = self.block.gripper.neutral
         if self.size_m is None:
             return neutral
@@ -112,7 +112,7 @@ class Case:
 
     @property
     def stroke_rad(self) -> float:
-        """What the comb drive's stroke leaves for gripping, after closing onto the sample."""
+        """Rotation left for gripping: the comb drive's stroke minus closing onto the sample."""
         stroke = math.radians(self.actuator.stroke_deg)
         if self.size_m is None:
             return stroke
@@ -120,38 +120,38 @@ class Case:
 
     @property
     def noise(self) -> Noise:
-        """Noise added to the rotation."""
+        """Noise to add to the simulated rotation."""
         return self.block.measurement.noise
 
     @property
     def sampling(self) -> Sampling:
-        """When the rotation is sampled."""
+        """Sampling of the rotation."""
         return self.block.measurement.sampling
 
     @property
     def samples(self) -> int:
-        """Samples in a trace, unless it was recorded."""
+        """Number of samples in a simulated trace."""
         return len(self.sampling.over(torque_history(self.phases).end_s))
 
     @property
     def nonlinear_target(self) -> bool:
-        """Whether the target is made by the nonlinear model."""
+        """True if the target is simulated with the nonlinear equations."""
         return self.block.models.target == "nonlinear"
 
     @property
     def unilateral(self) -> bool:
-        """Whether the jaws of its target press only, and let go where they would have to pull."""
+        """True if the target's jaws cannot pull: contact is lost where the force turns tensile."""
         return self.block.contact == "unilateral"
 
     @property
     def file(self) -> str:
-        """The recorded trace."""
+        """Path of the recorded trace."""
         assert self.block.measurement.file is not None
         return self.block.measurement.file
 
     @property
     def columns(self) -> Columns:
-        """Where in its file a recorded trace stands."""
+        """Columns of a recorded trace's file."""
         block = self.block.measurement
         assert block.time is not None
         assert block.rotation is not None
@@ -159,22 +159,22 @@ class Case:
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
-        """Range that is searched, by the name of the range."""
+        """Search ranges by name."""
         return dict(vars(self.block.search_range))
 
     @property
     def is_calibrated(self) -> bool:
-        """Whether its identification takes the gripper's arms from a calibration."""
+        """True if identification takes the gripper's arms from a calibration."""
         return self.block.assumed_gripper == CALIBRATED
 
     @property
     def calibration(self) -> CalibrationTest:
-        """The test without sample."""
+        """Settings of the calibration test without sample."""
         return self.block.calibration
 
     @cached_property
     def problem(self) -> CaseProblem:
-        """What its identification assumes; a calibration replaces the gripper's arms."""
+        """Assumptions of the identification; a calibration replaces the gripper's arms."""
         assumed, measurement = self.block.assumed_gripper, self.block.measurement
         gripper = self.gripper
         if isinstance(assumed, Mapping):
@@ -194,35 +194,35 @@ class Case:
         )
 
     def method(self, name: str) -> object:
-        """Settings of an identifier."""
+        """Return the settings of an identification method."""
         return self.block.of_methods.of(name)
 
     @property
     def mutation_start(self) -> int:
-        """First generation whose children mutate."""
+        """First generation in which children mutate."""
         settings = self.block.of_methods.block("genetic_algorithm")
         assert isinstance(settings, GeneticSettings)
         return settings.mutation_start
 
     @property
     def confidence(self) -> float:
-        """Confidence of all intervals."""
+        """Confidence level of all intervals."""
         return self.block.identifiability.confidence
 
     @property
     def posterior(self) -> PosteriorSettings | None:
-        """How the posterior of its first trace is sampled, if it is."""
+        """Settings of posterior sampling, if the posterior is sampled."""
         return self.block.posterior
 
     @property
     def coverage_seeds(self) -> int:
-        """Over how many seeds intervals are held against the truth: none without noise."""
+        """Number of seeds to test the coverage of intervals with; 0 without noise."""
         tried = not self.recorded and not self.noise.absent
         return self.block.identifiability.coverage_seeds if tried else 0
 
     @property
     def has_valley(self) -> bool:
-        """Whether two exchangeable parameters are searched, among others."""
+        """True if two exchangeable parameters are searched, and others besides."""
         model = self.sample.model
         pair = [name for name in model.exchangeable if name not in self.fixed]
         return len(pair) == 2 and len(model.names) - len(self.fixed) > 2
@@ -230,24 +230,24 @@ class Case:
 
 @dataclass(frozen=True)
 class Study:
-    """A checked study.
+    """A study whose config has been checked.
 
     Parameters
     ----------
     config
-        The whole config, every case with its blocks filled in.
+        The whole config, with the study's blocks merged into every case.
     """
 
     config: StudyConfig
 
     @cached_property
     def cases(self) -> dict[str, Case]:
-        """Cases by name, in their order."""
+        """Cases by name, in the order of the config."""
         return self._cases(self.config.cases)
 
     @cached_property
     def points(self) -> dict[str, Case]:
-        """The cases that the points of the sweeps are, by name."""
+        """Cases of all points of the sweeps, by name."""
         blocks = point_blocks(self.sweeps, self.config.cases)
         return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
 
@@ -258,7 +258,7 @@ class Study:
 
     @cached_property
     def readings(self) -> dict[str, dict[str, Case]]:
-        """The simulated cases under each reading, by its name and theirs."""
+        """Simulated cases under each reading, by name of reading and case."""
         found: dict[str, dict[str, Case]] = {name: {} for name in self.config.readings}
         for reading, name, block in read_blocks(self.config.readings, self.config.cases):
             found[reading] |= self._cases({name: built(CaseBlock, block)})
@@ -269,46 +269,46 @@ class Study:
         return {name: Case(name, block, actuator, seeds) for name, block in blocks.items()}
 
     def case(self, name: str) -> Case:
-        """Return a case, or the case that a point of a sweep is."""
+        """Return a case of the study or of a sweep's point."""
         return self.cases[name] if name in self.cases else self.points[name]
 
     @property
     def study_seed(self) -> int:
-        """The one seed of the study."""
+        """Seed from which all random streams are derived."""
         return self.config.study_seed
 
     @property
     def methods(self) -> list[str]:
-        """Identifiers; tables and figures that show one show the first."""
+        """Identification methods; tables and figures of a single method show the first."""
         return list(self.config.methods)
 
     @property
     def shown(self) -> str:
-        """The method that tables and figures of one method show."""
+        """Method that tables and figures of a single method show."""
         return self.methods[0]
 
     @property
     def selects_models(self) -> bool:
-        """Whether every trace is fitted with several sample models."""
+        """True if every trace is fitted with several sample models."""
         return bool(self.config.model_selection.models)
 
     def models_of(self, case: Case) -> tuple[str, ...]:
-        """Name the sample models that a case's traces are fitted with, see `CANDIDATES`."""
+        """Return the sample models to fit to a case's traces, see `CANDIDATES`."""
         return tuple(dict.fromkeys((*self.config.model_selection.models, case.sample.candidate)))
 
     @property
     def batch_size(self) -> int | None:
-        """Number of seeds a job, if the study says."""
+        """Number of seeds per job, if the config sets it."""
         return self.config.batch_size
 
     @property
     def near_noise_tolerance(self) -> float:
-        """By which share a misfit may exceed the noise, to be taken for as good."""
+        """Share by which the misfit may exceed the noise, to count as near the noise."""
         return self.config.evaluation.near_noise_tolerance
 
     @property
     def optimum_tolerance(self) -> float:
-        """By how much chi-squared may exceed the lowest known, to be taken for as low."""
+        """Increase of chi^2 over the lowest known that still counts as the global optimum."""
         return self.config.evaluation.optimum_tolerance
 
     @property
@@ -318,56 +318,56 @@ class Study:
 
     @property
     def jaw_gap_m(self) -> float:
-        """Distance between the jaws there."""
+        """Distance between the jaws in the neutral configuration."""
         return self.config.gripper.jaw_gap_m
 
     @property
     def actuator(self) -> CombDrive:
-        """The comb drives."""
+        """The comb drive of both arms."""
         return self.config.actuator
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """The protocol of all cases if it is the same, else of those without one of their own."""
+        """Protocol of all cases if it is the same, else of the study."""
         own = {case.phases for case in self.cases.values()}
         return own.pop() if len(own) == 1 else self.config.protocol.torques(self.config.actuator)
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
-        """Range that is searched, of cases without one of their own."""
+        """Search ranges of the study, for cases that do not change them."""
         return dict(vars(self.config.search_range))
 
     def reconstructed(self, block: str) -> tuple[str, ...]:
-        """Keys of a block, or the block itself, whose values the paper does not give."""
+        """Return marked keys of a block, or the block itself: the paper omits their values."""
         marked = self.config.reconstructed
         return tuple(key for key in marked if key == block or key.startswith(f"{block}."))
 
     def is_reconstructed(self, key: str) -> bool:
-        """Whether the paper does not give the value of a dotted key."""
+        """Return whether a dotted key is marked as reconstructed, i.e. omitted in the paper."""
         marked = self.config.reconstructed
         return any(key == name or key.startswith(f"{name}.") for name in marked)
 
     @property
     def simulated(self) -> list[str]:
-        """Cases with a target."""
+        """Names of cases that are simulated."""
         return [name for name, case in self.cases.items() if not case.recorded]
 
     @property
     def recorded(self) -> list[str]:
-        """Cases whose trace was recorded."""
+        """Names of cases with a recorded trace."""
         return [name for name, case in self.cases.items() if case.recorded]
 
     @property
     def covered(self) -> list[str]:
-        """Cases whose intervals are tested."""
+        """Names of cases whose intervals are tested for coverage."""
         return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
 
     @property
     def sampled(self) -> list[str]:
-        """Cases whose posterior is sampled."""
+        """Names of cases whose posterior is sampled."""
         return [name for name, case in self.cases.items() if case.posterior is not None]
 
     @property
     def published(self) -> list[str]:
-        """Cases that the paper reports on."""
+        """Names of cases that the paper reports results of."""
         return [name for name, case in self.cases.items() if case.published.table is not None]

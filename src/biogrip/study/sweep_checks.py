@@ -1,4 +1,4 @@
-"""What is wrong with the sweeps of a study that is else in order."""
+"""Checks of sweeps against the cases of a study."""
 
 from collections.abc import Iterator, Mapping
 
@@ -25,7 +25,7 @@ _LONGEST_NAME = 200
 def sweep_problems(
     blocks: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[Problem]:
-    """Find what does not go with the cases.
+    """Find sweeps that conflict with the cases or have too many points.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def sweep_problems(
     Yields
     ------
     tuple
-        The path of the key, and what was found and what is allowed.
+        Path of the key, and a message: what was found and what is allowed.
     """
     problems = [
         (("sweeps", name, *path), text)
@@ -55,12 +55,12 @@ def sweep_problems(
 
 
 def placed(by_name: Mapping[str, tuple[Sweep, Point]], problem: Problem) -> Problem:
-    """Return a problem of a point's case as one of the value that makes it.
+    """Return a problem of a point's case as a problem of the sweep value that causes it.
 
     Parameters
     ----------
     by_name
-        Points and their sweeps, by the name of the point.
+        Problem whose path starts with ``cases`` and the name of a point.
     problem
         Its path starts with ``cases`` and the name of a point.
     """
@@ -100,7 +100,7 @@ def _block_problems(block: SweepBlock, cases: Mapping[str, CaseBlock]) -> Iterat
 
 
 def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
-    """Every key must lead somewhere: blocks are laid over blocks, single values over others."""
+    """Refuse keys that no case may change: blocks change blocks, single values change values."""
     kinds = {isinstance(value, ValueBlock) for value in axis.values}
     if len(kinds) > 1:
         yield ("values",), "holds blocks and single values; allowed is one kind of them."
@@ -115,7 +115,7 @@ def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
 
 
 def _dotted(block: type, path: str = "") -> Iterator[tuple[str, bool]]:
-    """Keys in a block and below, and whether each is a block itself."""
+    """Yield dotted keys in a block and below, each with True if it is a block itself."""
     for name, entry in keys(block).items():
         inner = entry.shape.block
         if inner:

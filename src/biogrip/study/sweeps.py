@@ -1,4 +1,4 @@
-"""Sweeps: grids of cases, each a case of the study with two of its values changed."""
+"""Sweeps: grids of cases that differ from a case of the study in two values."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -18,7 +18,7 @@ _Text = Annotated[str, Key(most=_LONGEST_TEXT)]
 
 @dataclass(frozen=True)
 class ValueBlock:
-    """Keys that are laid over the block of the axis' key."""
+    """Keys to merge into the block that the axis' key names."""
 
     label: Annotated[str, printed("Name of the value in print.")]
     changes: Annotated[Mapping[str, _Number | _Text], Key(spread=True)]
@@ -26,7 +26,7 @@ class ValueBlock:
 
 @dataclass(frozen=True)
 class AxisBlock:
-    """What changes along one direction of a sweep's grid."""
+    """One axis of a sweep's grid: a key, or several, and its values."""
 
     label: Annotated[str, printed("Name in print.")]
     key: Annotated[
@@ -39,7 +39,7 @@ class AxisBlock:
     values: Annotated[
         tuple[_Number | _Text | ValueBlock, ...],
         Key(
-            "Values of the key; or blocks that are laid over the block of the key, each with a "
+            "Values of the key; or blocks to merge into the block of the key, each with a "
             "`label` of its own.",
             fewest=1,
             most=16,
@@ -48,18 +48,18 @@ class AxisBlock:
     ]
     unit: Annotated[str | None, printed("Unit in print.")] = None
     unit_in_si: Annotated[
-        float, Key("One such unit in that of the key, by default 1.", low=1e-24, high=1e24)
+        float, Key("Size of this unit in the unit of the key, by default 1.", low=1e-24, high=1e24)
     ] = 1.0
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """What changes together."""
+        """Dotted keys that change together."""
         return (self.key,) if isinstance(self.key, str) else self.key
 
 
 @dataclass(frozen=True)
 class SweepBlock:
-    """Every point of the grid is a case like another, but for the two values."""
+    """A grid of cases that differ from given cases in two values."""
 
     cases: Annotated[
         tuple[str, ...],
@@ -75,15 +75,15 @@ class SweepBlock:
 
 @dataclass(frozen=True)
 class Value:
-    """A value on an axis.
+    """A value on an axis of a sweep's grid.
 
     Parameters
     ----------
     name, text, shown
-        In the names of cases; in files, numbers as the config has them; on an
-        axis, numbers in the axis' unit.
+        Text for case names, text for files (numbers as in the config), and text for the axis
+        (numbers in the axis' unit).
     overrides
-        What a case has instead, by dotted key.
+        Values that replace those of the case, by dotted key.
     """
 
     name: str
@@ -94,14 +94,14 @@ class Value:
 
 @dataclass(frozen=True)
 class Axis:
-    """One of the two directions of a grid.
+    """One axis of a sweep's grid, with its values.
 
     Parameters
     ----------
     label
-        Name in print, with the unit.
+        Title with unit.
     values
-        In their order.
+        Values in the order of the config.
     """
 
     label: str
@@ -110,17 +110,17 @@ class Axis:
 
 @dataclass(frozen=True)
 class Point:
-    """A place in a grid.
+    """A point of a sweep's grid, i.e. a case with two values changed.
 
     Parameters
     ----------
     name
-        Name of its case. Made of the values, so that a value more on an axis
-        renames no other point: random streams go by the name.
+        Name of the point's case. It is made of the values only, since random streams derive from
+        it: an added value must not rename other points.
     case
-        The case that it is derived from.
+        Case that the point's case is derived from.
     row, column
-        What is different.
+        Values of the point on both axes.
     """
 
     name: str
@@ -130,7 +130,7 @@ class Point:
 
     @property
     def overrides(self) -> dict[str, float | str]:
-        """What its case has instead, by dotted key."""
+        """Values that replace those of the case, by dotted key."""
         return {**self.row.overrides, **self.column.overrides}
 
 
@@ -141,11 +141,11 @@ class Sweep:
     Parameters
     ----------
     name, title
-        In files; in print.
+        Name used in files, and title.
     cases
         Names of cases of the study.
     rows, columns
-        What changes from row to row, and from column to column.
+        Axes of the grid.
     """
 
     name: str
@@ -155,7 +155,7 @@ class Sweep:
     columns: Axis
 
     def points(self, case: str) -> list[Point]:
-        """Points of one of the cases, row by row."""
+        """Return the points of one case, row by row."""
         return [
             Point(f"{case}--{self.name}--{row.name}--{column.name}", case, row, column)
             for row in self.rows.values
@@ -164,7 +164,7 @@ class Sweep:
 
 
 def sweeps_of(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
-    """Read the sweeps of a study."""
+    """Return the sweeps that a study's config defines."""
     return {
         name: Sweep(
             name, block.title or name, block.cases, axis_of(block.rows), axis_of(block.columns)
@@ -174,13 +174,13 @@ def sweeps_of(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
 
 
 def axis_of(block: AxisBlock) -> Axis:
-    """Read an axis."""
+    """Return the axis that a config block defines."""
     unit = f" ({block.unit})" if block.unit is not None else ""
     return Axis(block.label + unit, tuple(_values(block)))
 
 
 def points_of(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
-    """Points of all sweeps."""
+    """Yield every point of all sweeps with its sweep."""
     for sweep in sweeps.values():
         for case in sweep.cases:
             for point in sweep.points(case):
@@ -190,14 +190,14 @@ def points_of(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
 def point_blocks(
     sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
 ) -> dict[str, dict[str, Any]]:
-    """Make the block of every point's case, by name, as a file would have it.
+    """Return the config block of every point's case by name, as plain data.
 
     Parameters
     ----------
     sweeps
-        Without `biogrip.study.sweep_checks.sweep_problems`.
+        Checked sweeps, see `biogrip.study.sweep_checks.sweep_problems`.
     cases
-        The study's.
+        Cases of the study.
     """
     found = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
@@ -226,7 +226,7 @@ def _text(value: float | str) -> str:
 
 
 def _word(value: float | str) -> str:
-    """Return a value as letters that a file name may have."""
+    """Return a value as text that is safe in file names."""
     return re.sub(r"[^A-Za-z0-9-]+", "_", _text(value))
 
 

@@ -1,4 +1,4 @@
-"""Whether there is a file at the path of a trace, whatever the path may be."""
+"""Check of the path of a recorded trace."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ _SHOWN = 200
 
 
 def trace_file_problem(path: str | Path) -> str | None:
-    """Say what is wrong with the path of a trace, if it leads to no file."""
+    """Return what is wrong with the path of a trace, or None if it is a file."""
     file = Path(path)
     shown = visible(path)
     shown = shown if len(shown) <= _SHOWN else f"{shown[:_SHOWN]}..."
@@ -23,6 +23,6 @@ def trace_file_problem(path: str | Path) -> str | None:
             return f"found '{shown}', which is no regular file; allowed is one."
         beside = [str(other) for other in file.parent.glob("*") if other.is_file()]
     except (OSError, ValueError):
-        # A name too long for any folder, or one that no system allows, has no neighbours.
+        # A name that is too long or invalid for the system: no neighbours to suggest.
         return found
     return found + nearest(str(file), beside)

@@ -1,6 +1,6 @@
-"""Between plain values, as files hold them, and the classes whose fields are the config's keys.
+"""Conversion between plain values, as in YAML, and the config dataclasses.
 
-Nothing is checked here: jobs read what has been checked, and pay for no more than that.
+Nothing is checked here: jobs read configs that were checked before, and need no pydantic.
 """
 
 import types
@@ -16,22 +16,22 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Shape:
-    """What a value may look like; of the fields below, the one that is given decides.
+    """Schema of a config value; which of the optional fields is given tells the kind of value.
 
     Parameters
     ----------
     key
-        What else is said of it.
+        Constraints and description.
     scalar
-        Type of a single value; `object` if it may be anything.
+        Type of a single value; `object` for any value.
     block
-        Class whose fields are the keys of a block.
+        Dataclass whose fields are the keys of a block.
     items
-        Of a list.
+        Schema of a list's items.
     names, values
-        Of a block whose keys are the user's.
+        Schemas of keys and values of a mapping with free keys.
     options
-        Shapes of which it has one.
+        Alternative schemas.
     """
 
     key: Key
@@ -44,31 +44,31 @@ class Shape:
 
     @property
     def text(self) -> str:
-        """What it means: what its key says, else its class."""
+        """Description of the key, or else the first docstring line of its dataclass."""
         doc = self.block.__doc__ if self.block and not self.key.text else None
         return doc.partition("\n")[0] if doc else self.key.text
 
     @property
     def single(self) -> bool:
-        """Whether it is the same plain and typed."""
+        """True if plain and typed value are the same."""
         inner = self.options or ((self.items,) if self.items else ())
         return self.scalar is not None or (bool(inner) and all(shape.single for shape in inner))
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A key of a block.
+    """A key of a config block, with schema and default.
 
     Parameters
     ----------
     name
-        Of the field that holds it.
+        Name of the field that holds the value.
     shape
-        What its value may look like.
+        Schema of the value.
     needed
-        Whether a config must give it.
+        True if a config must give the key.
     default
-        What it is otherwise.
+        Value if the config does not give the key.
     """
 
     name: str
@@ -79,7 +79,7 @@ class Entry:
 
 @cache
 def entries(block: Any) -> dict[str, Entry]:
-    """Return the fields of a block's class by name, one that is spread among them."""
+    """Return all fields of a config dataclass by name, including one that is spread."""
     hints = get_type_hints(block, include_extras=True)
     found = {}
     for field in fields(block):
@@ -92,13 +92,13 @@ def entries(block: Any) -> dict[str, Entry]:
 
 @cache
 def spread(block: Any) -> Entry | None:
-    """Return the field of a block that holds the keys which no other is named like, if any."""
+    """Return the field that collects all keys of a block that no other field names, if any."""
     return next((e for e in entries(block).values() if e.shape.key.spread), None)
 
 
 @cache
 def keys(block: type) -> dict[str, Entry]:
-    """Return the keys of a block that have names, those of all methods among them."""
+    """Return the named keys of a block, including those of all methods."""
     found = {}
     for name, entry in entries(block).items():
         if not entry.shape.key.spread:
@@ -112,7 +112,7 @@ def keys(block: type) -> dict[str, Entry]:
 
 @cache
 def shape_of(hint: Any) -> Shape:
-    """Read what the annotation of a field says."""
+    """Return the schema that a field's annotation describes."""
     if get_origin(hint) is Annotated:
         inner, *said = get_args(hint)
         key = next((item for item in said if isinstance(item, Key)), Key())
@@ -132,7 +132,7 @@ def shape_of(hint: Any) -> Shape:
 
 
 def _counted(key: Key, hint: Any) -> Key:
-    """Add how many items a tuple of fixed length has."""
+    """Return a key with the length of a fixed-length tuple added."""
     items = get_args(hint)
     if get_origin(hint) is not tuple or items[-1] is Ellipsis:
         return key
@@ -140,7 +140,7 @@ def _counted(key: Key, hint: Any) -> Key:
 
 
 def built(kind: type[T], block: Mapping[str, Any]) -> T:
-    """Make the object that a checked plain block says."""
+    """Return the object that a checked plain block describes."""
     known: Any = kind
     given: dict[str, Any] = {}
     rest = spread(known)
@@ -160,7 +160,7 @@ def built(kind: type[T], block: Mapping[str, Any]) -> T:
 
 
 def typed(shape: Shape, value: Any) -> Any:
-    """Make what a checked plain value says."""
+    """Return the typed value of a checked plain value."""
     if isinstance(value, dict):
         if shape.options:
             shape = next(o for o in shape.options if o.block or o.values)
@@ -177,7 +177,7 @@ def typed(shape: Shape, value: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Return what a file holds of a typed value; what is as by default is left out."""
+    """Return the plain value of a typed value, without keys that have their default."""
     if is_dataclass(value) and not isinstance(value, type):
         block: dict[str, Any] = {}
         for name, entry in entries(type(value)).items():
@@ -195,7 +195,7 @@ def plain(value: Any) -> Any:
 
 
 def parts(value: Any) -> Iterator[tuple[str | int, Any]]:
-    """Typed values in a typed value, by key or index."""
+    """Yield the typed values inside a typed value, by key or index."""
     if hasattr(value, "classes"):
         yield from ((name, value.block(name)) for name in value.classes())
     elif is_dataclass(value):

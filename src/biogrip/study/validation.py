@@ -1,4 +1,4 @@
-"""Checks a study's config, and says what is wrong so that it can be put right."""
+"""Validation of a study's config, with messages that name file, line and key."""
 
 from collections.abc import Iterator, Mapping
 from itertools import islice
@@ -17,7 +17,7 @@ from biogrip.study.sweeps import point_blocks, points_of, sweeps_of
 from biogrip.study.typed import Shape, built, parts, plain
 
 STUDY = Shape(Key(), block=StudyConfig)
-"""What a whole config should look like."""
+"""Schema of a whole config."""
 
 _CASE = Shape(Key(), block=CaseBlock)
 _GRIPPER = Shape(Key(), block=Gripper)
@@ -28,20 +28,19 @@ _SHOWN = 6
 def checked(
     config: Mapping[str, Any], files: ConfigFiles, *, for_workflow: bool = True
 ) -> StudyConfig:
-    """Check and type a complete config, in which every case has its blocks filled in.
+    """Validate a complete config and convert it to dataclasses; cases must have all blocks.
 
     Parameters
     ----------
     config, files
-        The config, and where its keys stand.
+        The merged config, and the line numbers of its keys.
     for_workflow
-        Whether it is to be run by the workflow, which names of files must suit.
+        If true, refuse paths of traces that Snakemake would read as wildcards.
 
     Raises
     ------
     BiogripError
-        Names file, line and key of every problem (the first few, where there
-        are many), what was found and what is allowed.
+        Names file, line and key of the first few problems, with what was found and what is allowed.
     """
     _refuse(_odd_keys((), config), files)
     _refuse(_plain_problems(config), files)
@@ -58,20 +57,20 @@ def checked(
 
 
 def value_problem(key: tuple[str, ...], value: Any) -> str | None:
-    """Say what is wrong with the value of a key, looked at alone, if anything is.
+    """Return what is wrong with a single key's value, or None.
 
     Parameters
     ----------
     key
-        Its path, blocks by name, e.g. ``("measurement", "noise_rad")``.
+        Path of the key, blocks by name, e.g. ``("measurement", "noise_rad")``.
     value
-        What it would be.
+        Plain value.
     """
     return next((text for _, text in value_problems(shape_at(STUDY, key), value)), None)
 
 
 def block_problems(path: KeyPath, value: Any) -> Iterator[Problem]:
-    """Find what only several keys together can get wrong, in blocks that are else in order."""
+    """Find conflicts between keys, in blocks whose single values are valid."""
     inside = [
         problem
         for part, inner in parts(value)
@@ -85,10 +84,10 @@ def block_problems(path: KeyPath, value: Any) -> Iterator[Problem]:
 
 
 def _refuse(problems: Iterator[Problem], files: ConfigFiles) -> None:
-    """Raise an error that names what there is of problems, the first few."""
+    """Raise an error that lists the first few problems, if there are any."""
     seen: dict[str, None] = {}
     for path, text in islice(problems, MOST_EXPLAINED):
-        # A block that a case inherits is wrong once, not once a case.
+        # A problem in a block that cases inherit is reported once, not once per case.
         origin = _origin(path, files)
         seen[f"{files.place(origin)}: {dotted(origin)}: {text}"] = None
     if seen:
@@ -100,7 +99,7 @@ def _refuse(problems: Iterator[Problem], files: ConfigFiles) -> None:
 
 
 def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
-    """Path of the study-wide key that a case inherits, or the path itself."""
+    """Return the path of the study-wide key that a case inherits, or the path itself."""
     if len(path) < 3 or path[0] != "cases" or path[2] not in OVERRIDABLE:
         return path
     for length in range(len(path), 2, -1):
@@ -121,14 +120,14 @@ def _odd_keys(path: KeyPath, value: Any) -> Iterator[Problem]:
 
 def _plain_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
     for path, text in value_problems(STUDY, config):
-        # Of a block that no case can inherit it is said elsewhere what is wrong with it.
+        # Skip inherited blocks that are invalid: the problem is reported for the study's block.
         inherited = len(path) == 3 and path[0] == "cases" and path[2] in OVERRIDABLE
         if not (inherited and path[2] not in config["cases"][path[1]]):
             yield path, text
 
 
 def _assumed_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
-    """Check the grippers that identifications believe in like the true ones."""
+    """Check the grippers assumed by identifications like true grippers."""
     for name, case in cases.items():
         if isinstance(case.assumed_gripper, Mapping):
             path = ("cases", name, "assumed_gripper")
@@ -140,7 +139,7 @@ def _assumed_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
 
 
 def _point_problems(study: StudyConfig) -> Iterator[Problem]:
-    """Check every point of every sweep like a case that the user wrote."""
+    """Check every point of every sweep as if it were a case of the config."""
     sweeps = sweeps_of(study.sweeps)
     by_name = {point.name: (sweep, point) for sweep, point in points_of(sweeps)}
     for name, block in point_blocks(sweeps, study.cases).items():
@@ -156,7 +155,7 @@ def _point_problems(study: StudyConfig) -> Iterator[Problem]:
 
 
 def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
-    """Check every case under every reading like one that the user wrote."""
+    """Check every case under every reading as if it were a case of the config."""
     for reading, _, block in read_blocks(study.readings, study.cases):
         path = ("readings", reading, "changes")
         found = [((*path, *place), text) for place, text in value_problems(_CASE, block)]
@@ -164,7 +163,7 @@ def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
 
 
 def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
-    """Find names that Snakemake would read as patterns."""
+    """Find paths of traces that Snakemake would read as wildcards."""
     for name, case in cases.items():
         file = case.measurement.file or ""
         if any(bracket in file for bracket in "{}<>"):

@@ -1,7 +1,7 @@
-"""YAML of a config, refused where it would stall its reader or mean something else than it seems.
+"""Reading of YAML config files within bounds on size, nesting and values.
 
-A few lines of YAML can stand for billions of values, by aliases of aliases, or for a nesting that
-no reader survives. Both are counted on the stream of parsing events, before anything is expanded.
+Aliases of aliases can expand few lines to billions of values, and deep nesting crashes readers.
+Both are counted on the stream of parsing events, before anything is expanded.
 """
 
 import re
@@ -16,11 +16,11 @@ from biogrip.terminal import visible
 LARGEST_BYTES = 1_000_000
 DEEPEST = 50
 MOST_VALUES = 100_000
-"""Keys, values and blocks of a file, those of an alias counted wherever it is used."""
+"""Bound on keys, values and blocks of a file, those of an alias counted at every use."""
 
 LONGEST_TEXT = 5000
 LONGEST_NUMBER = 100
-"""Characters of a number; Python refuses to read 4300 digits."""
+"""Bound on characters of a number; Python refuses 4300 digits or more."""
 
 # libyaml is ten times faster, but not part of every PyYAML.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -33,16 +33,16 @@ _SHOWN = 40
 
 @dataclass
 class _Open:
-    """A block or list whose end the events have not reached.
+    """A block or list whose end has not been reached in the parsing events.
 
     Parameters
     ----------
     anchor
         Its anchor, if it has one.
     before
-        How many values stood before it.
+        Number of values before it.
     levels
-        Levels of nesting in it, itself included.
+        Levels of nesting inside, itself included.
     """
 
     anchor: str | None
@@ -51,24 +51,24 @@ class _Open:
 
 
 def shown_path(file: Path) -> str:
-    """Name a file as the user would: relative to where they are, if it is below."""
+    """Return a path relative to the working directory, if it is below."""
     here = Path.cwd()
     return visible(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
 def compose(file: Path) -> yaml.Node | None:
-    """Read the one document of a file as nodes, in which no alias is expanded.
+    """Parse the document in a file to a tree of nodes, with aliases not expanded.
 
     Returns
     -------
     yaml.Node or None
-        Its root, none if it is empty.
+        Root of the tree; None if the file is empty.
 
     Raises
     ------
     BiogripError
-        With file and line, if it cannot be read, is no text in UTF-8 or no YAML, has more bytes,
-        levels, values or longer text than allowed, or has tags.
+        With file and line, if the file cannot be read, is not UTF-8 or not YAML, exceeds a bound on
+        bytes, levels, values or text, or has tags.
     """
     text = _text(file)
     try:
@@ -80,14 +80,14 @@ def compose(file: Path) -> yaml.Node | None:
 
 
 def no_yaml(file: Path, error: yaml.MarkedYAMLError) -> BiogripError:
-    """Return an error that says where a file is not YAML."""
+    """Return an error that names the line at which a file is not YAML."""
     mark = error.problem_mark or error.context_mark
     said = error.problem or error.context
     return BiogripError(_at(file, mark.line if mark else 0, f"not valid YAML: {said}."))
 
 
 def scalar_problem(node: yaml.ScalarNode) -> str | None:
-    """Say what is wrong with a value that YAML 1.1 reads otherwise than people do, if it is one."""
+    """Return what is wrong with a value that YAML 1.1 reads unexpectedly (dates, base 60)."""
     kind, text = node.tag.removeprefix(_TAG), node.value
     reading = None
     if kind in ("int", "float"):
@@ -106,7 +106,7 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
 
 def _text(file: Path) -> str:
     try:
-        # Of a pipe that nobody writes to, opening would wait without end.
+        # Opening a pipe without a writer would block forever.
         if file.exists() and not (file.is_file() or file.is_dir()):
             raise BiogripError(f"{shown_path(file)}: is no regular file; allowed is one.")
         with file.open("rb") as stream:
@@ -132,7 +132,7 @@ def _text(file: Path) -> str:
 
 
 def _check_size(file: Path, text: str) -> None:
-    """Count values and levels, those of an alias by looking up those of what it names."""
+    """Refuse too many values or levels, counting an alias as large as its anchor."""
     values = 0
     open_: list[_Open] = []
     sizes: dict[str, tuple[int, int]] = {}
@@ -178,5 +178,5 @@ def _node_problem(event: yaml.NodeEvent) -> str | None:
 
 
 def _at(file: Path, line: int, text: str) -> str:
-    """Return a message with its place; lines count from 0 here, and from 1 in print."""
+    """Return a message with file and line; `line` counts from 0."""
     return f"{shown_path(file)}, line {line + 1}: {text}"

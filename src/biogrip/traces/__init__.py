@@ -1,1 +1,1 @@
-"""Recorded traces: read, thinned, and held against what a grip can give."""
+"""Recorded traces: reading, thinning, and plausibility checks."""

@@ -1,9 +1,8 @@
-"""Two columns of a plain table of numbers, read in bulk.
+"""Fast reader for two columns of a plain CSV table.
 
-Plain is what leaves no question: ASCII, a row on every line, a cell in every
-column, no quotes, no comments, and numbers as computers write them. Of
-anything else nothing is said but that it is not plain; then it is for
-`biogrip.traces.recordings` to read with care, and to find what is wrong.
+A plain table is ASCII with one row per line, all cells present, no quotes, no comments, and
+numbers as programs write them. For other tables None is returned;
+`biogrip.traces.recordings` then reads them, or reports what is wrong.
 """
 
 from collections.abc import Sequence
@@ -17,35 +16,35 @@ from biogrip.arrays import Array
 
 _ODD = (b'"', b"#", b"\0")
 _GAPS = ("", "-", "na", "NA", "n/a", "N/A", "nan", "NaN", "NAN")
-# More than that is no cell of a table, see `csv.field_size_limit`.
+# Longer lines are not tables, see `csv.field_size_limit`.
 _LONGEST_LINE = 100_000
 
-# Made without a number of Python's, whose conversion loads pandas first.
+# Built from a buffer: conversion of a Python float would import pandas.
 _NO_NUMBER = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array([np.nan]))])[0]
 
 
 def plain_rows(
     path: Path, header_lines: int, width: int, wanted: Sequence[int], separator: str
 ) -> Array | None:
-    """Read the rows below a header, one a line, if all of them are plain.
+    """Read the rows below a header; None if any of them is not plain.
 
     Parameters
     ----------
     path
         The file.
     header_lines
-        How many lines come before the rows.
+        Number of lines before the rows.
     width
-        How many columns there are.
+        Number of columns.
     wanted
-        Which of them to read, from 0.
+        Indices of the columns to read, from 0.
     separator
-        Between cells; numbers may have a decimal comma where it is none.
+        Cell separator; unless it is a comma, numbers may have a decimal comma.
 
     Returns
     -------
     (n_rows, n_wanted) or None
-        NaN where there is a gap; None if the rows are not plain.
+        Numbers, NaN for gaps; None if the rows are not plain.
     """
     content = path.read_bytes()
     ends = np.flatnonzero(np.frombuffer(content, np.uint8) == ord("\n")) + 1
@@ -89,10 +88,10 @@ def _parsed(
     rows = np.empty((len(table), len(chosen)))
     for place, name in enumerate(chosen):
         column = table[name]
-        # Arrow's own conversion to numpy loads pandas first.
+        # Arrow's own conversion to NumPy would import pandas.
         filled = compute.fill_null(column, _NO_NUMBER).combine_chunks()
         rows[:, place] = np.frombuffer(filled.buffers()[1])[filled.offset :][: len(filled)]
-        # Infinity, or not a number in some other spelling.
+        # Infinity, or a spelling of NaN other than those of gaps.
         if np.count_nonzero(np.isfinite(rows[:, place])) != len(table) - column.null_count:
             return None
     return rows

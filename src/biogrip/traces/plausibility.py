@@ -1,19 +1,16 @@
-"""Whether a recorded trace can be what a gripper did under a protocol.
+"""Plausibility of a recorded trace as the response of a gripper to a protocol.
 
-What is tested is not the trace itself but the part of it that follows the
-torque. A linear viscoelastic sample makes the gripper a sum of lags with real
-relaxation times: it follows the torque at once (a spring), its integral (a
-damper), or something between. The trace is therefore fitted, in the least
-squares, with the protocol's torque lagged by three times T: next to nothing,
-a tenth of the protocol, and ten protocols. Three lags are too few to identify
-a sample but enough to find its response under noise; a peak of the samples
-themselves would be one of the noise, and means over blocks would lose a
-sinusoid.
+Tests use the part of a trace that follows the torque. A linear viscoelastic sample makes the
+gripper a sum of lags with real relaxation times: between proportional to the torque (a spring)
+and to its integral (a damper). So the trace is fitted by linear least squares with the torque
+lagged by three relaxation times: a negligible one, a tenth of the protocol, and ten protocols.
+Three lags are too few to identify a sample, but enough to find its response under noise. The
+peak of the readings would be a peak of the noise, and block means would lose a sinusoid.
 
 References
 ----------
 .. [1] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
-   chapter 23: weights that are not negative.
+   chapter 23: non-negative least squares.
 """
 
 import math
@@ -32,60 +29,60 @@ from biogrip.response.nuisance import without
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
 
 LARGEST_SHARE = 1.5
-"""Most that a trace may turn, in free rotations.
+"""Largest plausible rotation, as a multiple of the free rotation.
 
-No sample makes the arm turn further than without it. The excess is for the
-uncertainty of the fit and of the gripper's stiffness.
+No sample makes the arm turn further than without it. The excess allows for errors of the fit
+and of the gripper's stiffness.
 """
 
 SMALLEST_SHARE = 2e-3
-"""Least that a trace must turn, in free rotations.
+"""Smallest plausible rotation, as a multiple of the free rotation.
 
-The paper's stiffest sample, the endothelial cell, turns by 8e-3. Less than
-`LARGEST_SHARE` / `SMALLEST_SHARE` = 750 lies between both limits, so no trace
-can pass both as it is and in a unit a thousand times larger or smaller.
+The paper's stiffest sample, the endothelial cell, turns by 8e-3. The ratio of the limits,
+`LARGEST_SHARE` / `SMALLEST_SHARE` = 750, is below 1000, so no trace passes both in its unit and
+in one a thousand times larger or smaller.
 """
 
 SHORTEST_SHARE = 0.02
 """Least share of the protocol that a trace must cover: more than min/h = s/min = 1/60."""
 
 FALSE_ALARM = 1e-3
-"""Share of traces of mere noise that are taken for a response."""
+"""Share of pure-noise traces that are accepted as a response."""
 
-# Times are written to some digits.
+# Relative tolerance, since times are written with few digits.
 _TIME_SLACK = 1e-5
 _LAG_SHARES = (1e-6, 0.1, 10.0)
-# Twice the logarithm of how much likelier a trace must be with the other sign to be refused.
+# Log-likelihood ratio, times two, above which a trace counts as mirrored.
 _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
-# Share of a constant that offset and drift leave over, from which on it is one.
+# Norm below which a constant lies in the span of offset and drift.
 _NO_CONSTANT = 1e-6
-# Share of a function's norm that may be rounding.
+# Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
-# Of free rotations: no noise, and no unit, is that large.
+# Multiple of the free rotation that neither noise nor a wrong unit explains.
 _ABSURD = 1e9
-# Samples that are looked at at once.
+# Number of samples processed at once.
 _AT_ONCE = 65_536
 
 
 @dataclass(frozen=True)
 class _Functions:
-    """Functions of time as short vectors, whose products are those of their samples.
+    """Functions of time, projected to short vectors that have the same inner products.
 
-    All that is asked of a trace are such products, and of a million samples all functions
-    at once would be as much memory as all else.
+    All tests need only inner products. The functions themselves would take too much memory for
+    a million samples.
 
     Parameters
     ----------
     lagged : (n_lagged, n_rows)
-        The lagged torques, those of the left arm before those of the difference.
+        Lagged torques, first of the left arm, then of the difference of both.
     nuisance : (n_functions, n_rows)
-        What the instrument may have added, orthonormal.
+        Orthonormal nuisance functions of the instrument.
     constant : (1, n_rows)
-        One of norm 1.
+        Constant function of norm 1.
     trace : (n_rows,)
-        In rad.
+        Measured rotation in rad.
     samples
-        How many these stand for.
+        Number of samples that the vectors stand for.
     """
 
     lagged: Array
@@ -97,16 +94,16 @@ class _Functions:
 
 @dataclass(frozen=True)
 class _Fit:
-    """The part of a trace that follows the torque.
+    """Fit of a trace by lagged torques.
 
     Parameters
     ----------
     response : (n_rows,)
-        That part, without what the instrument may have added.
+        Fitted part of the trace, without nuisance functions.
     weights : (n_lagged,)
-        Of the lagged torques.
+        Weights of the lagged torques.
     unknowns
-        How many independent lagged torques it is made of.
+        Number of linearly independent lagged torques.
     """
 
     response: Array
@@ -123,39 +120,38 @@ def check_recording(
     nuisance: Array,
     noise_rad: float | None = None,
 ) -> None:
-    """Refuse a trace that the gripper cannot have shown under the protocol.
+    """Refuse a trace that is impossible with the gripper and protocol.
 
-    In this order: times outside the protocol, or covering next to none of it;
-    no response to the torque; a response of the wrong sign; a rotation larger
-    than the free gripper's, or so small that the sample would have to be
-    hundreds of times stiffer than the gripper's hinges, whose rotation then
-    tells nothing but the instrument's errors. A trace in a wrong unit ends up in one of them.
+    Checked in this order: times outside the protocol, or covering too little of it; no response
+    to the torque; a response of the wrong sign; a rotation above the free gripper's, or so small
+    that the sample would be hundreds of times stiffer than the hinges, so that the trace shows only
+    errors of the instrument. A trace in a wrong unit fails one of these checks.
 
     Parameters
     ----------
     recording
-        The trace, as read from `path`.
+        Trace that was read from `path`.
     gripper, torque
-        What it was recorded with.
+        Gripper and protocol it was recorded with.
     path, columns
-        Where it was read, for messages.
+        Source of the trace, for messages.
     nuisance : (n_functions, n_samples)
-        Orthonormal functions that the instrument may have added, see `nuisance_basis`.
+        Orthonormal nuisance functions of the instrument, see `nuisance_basis`.
     noise_rad
-        Standard deviation of the noise, if known; else it is taken from what
-        the fit leaves over.
+        Standard deviation of the noise, if known; otherwise it is estimated from the residuals
+        of the fit.
 
     Raises
     ------
     BiogripError
-        With file, line, column, what was found and allowed, and the unit in
-        which the trace would do.
+        With file, line, column, what was found and allowed, and the unit that would be
+        plausible.
     """
     _check_times(recording, torque.end_s, path, columns)
     trace, lagged, free = recording.rotation_rad, _lagged(torque), free_rotation(gripper, torque)
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
-        # Its square may be more than a number can be.
+        # Beyond this its square could overflow.
         _check_turn(recording, largest, free, path, columns)
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
@@ -178,7 +174,7 @@ def check_recording(
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
-    """Largest static rotation of the left arm in rad that any sample allows.
+    """Return the largest static rotation of the left arm in rad that any sample allows.
 
     Statically phi_2 = (1 - x) tau_2/k_2 + x (tau_2 - tau_4)/(k_2 + k_4), where x
     goes from 0 without a sample to 1 with a rigid one.
@@ -216,7 +212,7 @@ def _check_times(recording: Recording, end_s: float, path: Path, columns: Column
 
 
 def _lagged(torque: TorqueHistory) -> Callable[[Array], Array]:
-    """Lagged torques of the left arm and, if that differs, of the difference of both."""
+    """Return a function of time for lagged torques, of the left arm and the difference of arms."""
     drives = 1 if torque.symmetric else 2
     rates = -1 / (torque.end_s * np.tile(_LAG_SHARES, drives))
     static = np.repeat(np.eye(drives), len(_LAG_SHARES), axis=0)[:, None, :]
@@ -241,10 +237,10 @@ def _functions(
 
 
 def _cleared(basis: Array, functions: Array) -> Array:
-    """Do as `without`, and leave nothing of functions that lie in the span but for rounding.
+    """Project functions out of a basis, setting those to zero that lie in its span.
 
-    What rounding leaves of a lag that has long passed, beside an offset, would be a function like
-    any other, and among so few rows as good as any.
+    Otherwise the rounding error of a fully relaxed lag, which an offset spans, would count as
+    an independent function.
     """
     rest = without(basis, functions)
     left, whole = np.linalg.norm(rest, axis=1), np.linalg.norm(functions, axis=1)
@@ -260,11 +256,10 @@ def _fit(functions: _Functions) -> _Fit:
 
 
 def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool:
-    """Whether the trace follows the torque.
+    """Return whether the trace follows the torque.
 
-    It does not if it is better described by a constant; nor if white noise about
-    zero, where the arm stands until the torque sets in, would give as large a fit:
-    an F test, with known noise a chi-squared one.
+    It does not if a constant describes it better, or if white noise about zero would have as
+    large a fit by an F test (chi-squared test with known noise).
     """
     from scipy.special import chdtri, fdtri
 
@@ -281,10 +276,10 @@ def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool
 
 
 def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) -> bool:
-    """Whether the trace is a response with the wrong sign: the mirrored one is far likelier.
+    """Return whether the mirrored trace is far more likely to be a response.
 
-    It must be so with and without a constant that the instrument may have added: a constant
-    that was not declared is no wrong sign.
+    It must be so also with a constant fitted along: an undeclared offset is not a wrong
+    sign.
     """
     nuisance, trace = functions.nuisance, functions.trace
     rest = without(nuisance, functions.constant)
@@ -303,11 +298,11 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
 
 
 def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
-    """Responses of which all samples' are sums with weights that are not negative, (n, n_rows).
+    """Return extreme responses, (n, n_rows), of which all samples' are non-negative combinations.
 
     A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
-    where x tells how rigid it is and falls, as it relaxes, from at most 1 to at least 0. The
-    extremes are: no sample, rigid ones that relax within one of the lags, a rigid one for good.
+    where x is the sample's rigidity and decreases, as it relaxes, from at most 1 to at least 0.
+    The extremes are: no sample, rigid ones that relax with one of the lags, and a rigid one.
     """
     k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
     lags = len(_LAG_SHARES)
@@ -315,12 +310,12 @@ def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
     if len(lagged) == lags:
         return alone
     pushed = lagged[lags:] / (k_2 + k_4)
-    # The shortest lag is next to none.
+    # The shortest lag is negligible.
     return np.vstack((alone - pushed + pushed[0], pushed[0]))
 
 
 def _left_over(trace: Array, responses: Array) -> float:
-    """Sum of squares that no sum of the responses with weights of at least 0 explains."""
+    """Return the residual sum of squares of a non-negative least-squares fit of the responses."""
     from scipy.optimize import nnls
 
     scale = np.linalg.norm(responses, axis=1)
@@ -356,7 +351,7 @@ def _check_turn(
 
 
 def _other_units(unit: str, units: Mapping[str, float], fits: Callable[[float], bool]) -> str:
-    """Say by which factors the numbers would fit, and which units these would be."""
+    """Return a hint on units, or else factors, in which the numbers would be plausible."""
     factors = {size / units[unit]: f" (is it in {name}?)" for name, size in units.items()}
     named = [factor for factor in factors if fits(factor)]
     unnamed = [factor for factor in (1e-6, 1e-3, 1e3, 1e6) if fits(factor)]

@@ -1,4 +1,4 @@
-"""Recorded traces: the user's own CSV, read with its gaps, its units and its line numbers."""
+"""Reader of recorded traces in the user's own CSV, with gaps, units and line numbers."""
 
 import csv
 import re
@@ -22,7 +22,7 @@ ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
 FEWEST_SAMPLES = 10
 MOST_ROWS = 10_000_000
 
-# Of the last time: closer ones are no clock's, but of numbers that damage made.
+# Relative to the last time: smaller steps are damaged numbers, not a clock's.
 _SHORTEST_STEP = 1e-18
 
 _SPELLED_OUT = {
@@ -39,24 +39,23 @@ _SEPARATORS = (",", ";", "\t")
 _GAPS = ("", "-", "na", "n/a", "nan", "#n/a", "#nv")
 _ROWS_AT_ONCE = 100_000
 _MOST_LISTED = 50
-# What a spreadsheet shows for a value that it cannot compute, as #REF!, #DIV/0! or #NAME?, is no
-# comment when a separator follows.
+# Spreadsheet errors like #REF!, #DIV/0! or #NAME? followed by a separator are cells, not comments.
 _COMMENT = re.compile(r" *#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t])")
 _UNIT_AT_END = re.compile(r"(?:_(\w+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
 
 
 @dataclass(frozen=True)
 class Columns:
-    """Where in a file a trace stands.
+    """Names and units of the columns of a trace.
 
     Parameters
     ----------
     time, rotation
         Names of the columns.
     time_unit, rotation_unit
-        A key of `TIME_UNITS` and one of `ROTATION_UNITS`, or None if the name ends with it.
+        Keys of `TIME_UNITS` and `ROTATION_UNITS`; None if the column's name ends with the unit.
     by_options
-        Whether a command's options said so, not the keys of a config; messages name what did.
+        True if command-line options set them, false for config keys; used in messages.
     """
 
     time: str
@@ -73,11 +72,11 @@ class Recording:
     Parameters
     ----------
     time_s, rotation_rad : (n_samples,)
-        Strictly increasing instants, and the left arm's closing rotation.
+        Strictly increasing times, and the left arm's closing rotation.
     lines : (n_samples,)
-        Line of the file that each sample stands on, from 1.
+        Line number of each sample, from 1.
     without_number
-        How many rows were left out as gaps.
+        Number of rows left out as gaps.
     """
 
     time_s: Array
@@ -88,16 +87,16 @@ class Recording:
 
 @dataclass(frozen=True)
 class _Layout:
-    """What the header tells.
+    """Layout of a file, as its header tells it.
 
     Parameters
     ----------
     separator
-        Between cells.
+        Cell separator.
     width
-        How many columns there are.
+        Number of columns.
     indices
-        Where the time and the rotation stand, by name and in this order.
+        Indices of the time and the rotation column by name, in this order.
     """
 
     separator: str
@@ -108,41 +107,38 @@ class _Layout:
 def read_recording(path: Path, columns: Columns) -> Recording:
     """Read a recorded trace.
 
-    The file is UTF-8 text, with or without byte order mark, its lines ended in
-    any of the usual ways. Lines that start with ``#`` and empty lines are
-    ignored wherever they stand. The first other line is the header; from it
-    follows the separator: comma, semicolon or tab. After the last two, numbers
-    may have a decimal comma. Names and cells may be quoted and padded with
-    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+    The file is UTF-8 text, with or without byte order mark, with any usual line ends. Empty lines
+    and lines that start with ``#`` are ignored. The first other line is the header, which decides
+    the separator: comma, semicolon or tab. With the last two, numbers may have a decimal comma.
+    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
+    may hold anything.
 
-    The unit is that of `columns`, else the end of the column's name, as in
-    ``rotation_urad``, ``phi (mrad)`` or ``time [s]``; it is never guessed. The
-    micro sign may stand for the u.
+    The unit is that of `columns`, or else the end of the column's name, as in ``rotation_urad``,
+    ``phi (mrad)`` or ``time [s]``; it is never guessed. The micro sign may replace the u.
 
-    A cell that is empty or holds ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (capital or
-    not) or ``-`` is a gap. Its row is left out and counted; nothing is
-    interpolated. Other errors of spreadsheets, as ``#REF!``, are no numbers.
+    An empty cell, ``nan``, ``NA``, ``N/A``, ``#N/A``, ``#NV`` (in any case) or ``-`` is a gap. Its
+    row is left out and counted; nothing is interpolated. Other spreadsheet errors, as ``#REF!``,
+    are refused.
 
     Parameters
     ----------
     path
         The file.
     columns
-        Which of its columns to read.
+        Columns to read.
 
     Returns
     -------
     Recording
-        In s and rad.
+        Trace in s and rad.
 
     Raises
     ------
     BiogripError
-        If the file cannot be read as text; lacks a column or has it twice; its
-        unit is unknown or contradicts the name; a row has fewer or more cells
-        than the header, or other text than a finite number or a gap; the time
-        does not increase from sample to sample; there are fewer than
-        `FEWEST_SAMPLES` samples or more than `MOST_ROWS` rows.
+        If the file cannot be read as text, lacks a column or repeats it, its unit is unknown or
+        contradicts the name, a row has too few or too many cells, or text that is neither a finite
+        number nor a gap, the time does not increase, or there are fewer than `FEWEST_SAMPLES`
+        samples or more than `MOST_ROWS` rows.
     """
     try:
         if not path.is_file():
@@ -167,7 +163,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
 
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
-    """Return where in a file something was found, as messages begin."""
+    """Return the file, line and column at the beginning of a message."""
     where = visible(path)
     if line is not None:
         where += f", line {line}"
@@ -193,16 +189,16 @@ def unit_of(
     column
         Name of the column; it may end with the unit.
     given
-        The unit as the user states it, or None.
+        Unit that the user states, or None.
     allowed
-        The units there are, `TIME_UNITS` or `ROTATION_UNITS`.
+        Allowed units, `TIME_UNITS` or `ROTATION_UNITS`.
     by_options
-        As of `Columns`.
+        Field of `Columns`.
 
     Raises
     ------
     BiogripError
-        If neither tells an allowed unit, or they contradict each other.
+        If no allowed unit is given, or name and statement contradict each other.
     """
     choices = ", ".join(allowed)
     quantity = "time" if allowed is TIME_UNITS else "rotation"
@@ -228,14 +224,14 @@ def unit_of(
 
 
 def _said_by(by_options: bool, *names: str) -> str:
-    """Return the options or the keys of a config that say something of a trace."""
+    """Return the options or config keys that set something, for messages."""
     if by_options:
         return " and ".join(f"--{name.replace('_', '-')}" for name in names)
     return f"{' and '.join(names)} under measurement"
 
 
 def nearest_unit(name: object, allowed: Collection[str]) -> str:
-    """Return ``" Did you mean 'h'?"`` for ``hours`` and the like, else as `nearest` does."""
+    """Return a hint like ``" Did you mean 'h'?"`` for ``hours``; otherwise that of `nearest`."""
     plain = _plain(str(name)).lower()
     for unit in allowed:
         if plain in _SPELLED_OUT.get(unit, ()):
@@ -247,20 +243,20 @@ def _unit_at_end(column: str, allowed: Mapping[str, float]) -> str | None:
     ending = _UNIT_AT_END.search(_plain(column))
     if ending is None:
         return None
-    # A name may well end with something else, as in rotation_left or phi (2).
+    # A name may end with something other than a unit, as in rotation_left or phi (2).
     unit = next(group for group in ending.groups() if group is not None)
     return next((u for u in allowed if u in (unit.strip(), unit.rpartition("_")[2])), None)
 
 
 def _plain(name: str) -> str:
-    """Return the name without padding, either micro sign written as u."""
+    """Return a name without padding, with either micro sign written as u."""
     return normalize("NFKC", name).strip().replace("\u03bc", "u")
 
 
 def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, Array, IntArray]:
-    """Read what the file's units are in s and rad, (2,), the numbers, (n_rows, 2), and their lines.
+    """Read unit factors to s and rad, (2,), numbers, (n_rows, 2), and line numbers.
 
-    The numbers are time and rotation in the file's units, NaN where there is a gap.
+    The numbers are time and rotation in the file's units, with NaN for gaps.
     """
     at: list[int] = []
     lines = _significant(path, stream, at)
@@ -289,7 +285,7 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
 
 
 def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[str]:
-    """Yield the lines that are neither empty nor comments, and note in `at` where they stand."""
+    """Yield lines that are neither empty nor comments, appending their numbers to `at`."""
     for number, line in enumerate(stream, 1):
         if "\0" in line:
             raise BiogripError(f"{place(path, number)}: found binary data, allowed is text.")
@@ -314,7 +310,7 @@ def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> 
 
 
 def _header(path: Path, at: int, line: str, wanted: tuple[str, str]) -> tuple[str, list[str]]:
-    """Separator and names: those under which most wanted columns, then most columns, show up."""
+    """Return the separator that yields most wanted columns, then most columns, and the names."""
     readings = {}
     for separator in _SEPARATORS:
         try:
@@ -350,7 +346,7 @@ def _index(path: Path, line: int, names: list[str], column: str, which: str) -> 
 def _blocks(
     path: Path, lines: Iterator[str], separator: str, at: list[int]
 ) -> Iterator[list[list[str]]]:
-    """Yield the rows block by block, `at` then telling the lines of the block."""
+    """Yield the rows in blocks, with `at` holding the line numbers of the current block."""
     reader = csv.reader(lines, delimiter=separator, skipinitialspace=True)
     count = 0
     while True:
@@ -367,10 +363,9 @@ def _blocks(
 
 
 def _one_per_line(path: Path, reader: Iterator[list[str]], at: list[int]) -> Iterator[list[str]]:
-    """Yield rows, refusing those over several lines.
+    """Yield rows, refusing cells that span lines.
 
-    A quote that is never closed would swallow the rest of the file unnoticed,
-    were a cell allowed to span lines.
+    If cells could span lines, an unclosed quote would swallow the rest of the file.
     """
     try:
         for count, row in enumerate(reader, 1):
@@ -385,7 +380,7 @@ def _one_per_line(path: Path, reader: Iterator[list[str]], at: list[int]) -> Ite
 
 
 def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layout) -> None:
-    """Refuse rows too short for the wanted columns, and those with more than the header names."""
+    """Refuse rows that lack a wanted column, or have more cells than the header."""
     for line, row in zip(at, rows, strict=True):
         if len(row) == layout.width:
             continue
@@ -395,7 +390,7 @@ def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layou
                     f"{place(path, line, column)}: found only {counted(len(row), 'cell')} in the "
                     f"row, allowed are the header's {layout.width}."
                 )
-        # A separator at the end of every row is common, and harmless.
+        # Ignore empty cells at the end, since a trailing separator is common.
         if any(cell.strip() for cell in row[layout.width :]):
             raise BiogripError(
                 f"{place(path, line)}: found {counted(len(row), 'cell')} in the row, allowed "
@@ -405,10 +400,10 @@ def _check_rows(path: Path, at: list[int], rows: list[list[str]], layout: _Layou
 
 
 def _numbers(path: Path, at: list[int], column: str, cells: list[str], separator: str) -> Array:
-    """Cells as numbers, (n_rows,), NaN for gaps."""
+    """Return cells as numbers, (n_rows,), with NaN for gaps."""
     texts = cells if separator == "," else [cell.replace(",", ".") for cell in cells]
     try:
-        # Python reads 1_000 as a number; a table that holds it is damaged.
+        # Python reads 1_000 as a number; in a table it is damage.
         values = np.array(texts, dtype=float) if not any("_" in t for t in texts) else None
     except ValueError:
         values = None
@@ -423,7 +418,7 @@ def _numbers(path: Path, at: list[int], column: str, cells: list[str], separator
 
 
 def _number_or_inf(text: str) -> float:
-    """Return the number, NaN for a gap, and inf for what is neither."""
+    """Return a cell's number, NaN for a gap, and inf for anything else."""
     word = text.strip().lower()
     if word in _GAPS:
         return np.nan
@@ -464,7 +459,7 @@ def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> 
 
 
 def _not_text(path: Path) -> str:
-    """Say where a file stops being text; the decoder only knows the place within its buffer."""
+    """Return a message with the line of the first byte that is not UTF-8."""
     content = path.read_bytes()
     try:
         content.decode("utf-8")

@@ -127,7 +127,7 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert k["excluded"] == "1.5 to 1.8"
     headings = {column.name: column.heading for column in table.columns}
     assert (headings["low"], headings["high"]) == ("90 % from", "90 % to")
-    assert "one that stands alone holds with 95 %" in table.caption
+    assert "One-sided limits hold with 95 % confidence." in table.caption
     assert (k["target"], k["value"], k["low"], k["expected_high"]) == (2.5, 2.0, 1.0, 4.0)
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None

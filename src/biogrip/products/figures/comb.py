@@ -24,7 +24,7 @@ def draw(settings: Settings) -> Figure:
     whole = drawn.add_subplot(places[0, :])
     detail, curve = (drawn.add_subplot(places[1, column]) for column in range(2))
 
-    # On its side, it has the width of the page.
+    # Turned by 90 degrees, the comb fits the width of the page.
     _fingers(whole, comb, comb.fingers, turned_deg=-90)
     panel(whole, "a", f"all {comb.fingers} fingers")
     _scale_bar(whole, comb, 200)
@@ -85,7 +85,7 @@ def _fingers(axes: Axes, comb: CombDrive, count: int, turned_deg: float = 0.0) -
 
 
 def _scale_bar(axes: Axes, comb: CombDrive, length_um: float) -> None:
-    """Draw a scale below the comb on its side, and say which fingers are which."""
+    """Draw a scale bar below the comb, and label floating and fixed fingers."""
     first, last = 1e6 * comb.first_radius_m, 1e6 * comb.outer_radius_m
     reach = last * math.sin(math.radians(comb.finger_angle_deg - 0.5 * comb.initial_overlap_deg))
     y = -0.9 * reach

@@ -1,4 +1,4 @@
-"""Figure 8: how the best misfit falls from step to step."""
+"""Figure 8: the best misfit over generations."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,16 +23,16 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
 @dataclass(frozen=True)
 class Settings:
-    """How a case's convergence is drawn.
+    """Settings of a case's convergence figure.
 
     Parameters
     ----------
     title, method
-        The case in print, and whose histories.
+        Title of the case, and method whose histories are drawn.
     mutation_start
-        First generation whose children mutate; None for a method without.
+        First generation in which children mutate; None for methods without mutation.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to be taken for as good.
+        Share by which a misfit may exceed the noise to count as near it.
     """
 
     title: str
@@ -42,21 +42,21 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the convergence of a case depends on."""
+    """Return the settings that the convergence of a case depends on."""
     mutates = "genetic_algorithm" in METHODS[study.shown].blocks
     start = case.mutation_start if mutates else None
     return Settings(case.title, study.shown, start, study.near_noise_tolerance)
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
-    """Draw by how much the seeds' misfits exceed their noise, and that of the typical one.
+    """Draw each seed's excess of the misfit over its noise, highlighting the typical seed.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     identifications, histories
-        Of the case, CSV and Parquet.
+        Files of the case, CSV and Parquet.
     """
     found = read_identifications(identifications, settings.method)
     noise = found.set_index("seed")["noise_rms_rad"]
@@ -100,7 +100,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
 
 
 def _mutation(axes: Axes, start: int, last: int) -> None:
-    """Mark where mutation starts; it is said below the noise, where hardly a misfit gets."""
+    """Mark the generation in which mutation starts, with a label below the curves."""
     axes.axvline(start, color=TARGET, linestyle=":", linewidth=0.8)
     before = start > last / 2
     axes.annotate(

@@ -1,7 +1,7 @@
-"""The posterior of a sample's parameters: each alone, and each against each other.
+"""Corner plot of a posterior: marginal of every parameter, and density of every pair.
 
-Samples are drawn over logarithms. Densities of pairs are smoothed, and the least regions that
-hold half and 95 % of them are outlined.
+Axes are logarithmic. Densities of pairs are smoothed; contours enclose the smallest regions with
+half and 95 % of the samples.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,28 +26,28 @@ from biogrip.products.files.posterior import SAMPLES, TOLD, read_posterior, read
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.study.study import Case, Study
 
-# Parameters that a column has room for.
+# Most parameters that fit into a column's width.
 _MOST_IN_COLUMN = 4
 _BINS, _SMOOTH = 60, 1.5
 _HALF, _MOST = 0.5, 0.95
-# Of samples, beyond either end of an axis, where they are few.
+# Share of samples cut off beyond either end of an axis.
 _BEYOND = 0.002
-# An axis that spans less has no decades to be marked.
+# Ratio of the ends below which an axis spans too little for decade ticks.
 _WIDE = 5.0
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a case's posterior is drawn.
+    """Settings of a case's corner plot.
 
     Parameters
     ----------
     title
-        The case in print.
+        Title of the case.
     sample, fixed
-        Its model, and parameters that are known.
+        Sample model, and fixed parameters by name.
     parameters
-        True values by name, none if they are unknown.
+        True values by name; empty if unknown.
     """
 
     title: str
@@ -57,7 +57,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the figure of a case depends on."""
+    """Return the settings that the figure of a case depends on."""
     return Settings(case.title, case.sample, case.fixed, case.parameters)
 
 
@@ -67,9 +67,9 @@ def draw(settings: Settings, told: Path, samples: Path) -> Figure:
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     told, samples
-        What is said of it, JSON, and its samples, Parquet.
+        Summary of the posterior, JSON, and its samples, Parquet.
     """
     model = with_fixed(settings.sample.model, settings.fixed)
     values = read_samples(samples, model)
@@ -85,20 +85,20 @@ def draw_corner(
     truth: Mapping[str, float],
     title: str,
 ) -> Figure:
-    """Draw samples of a posterior.
+    """Draw posterior samples as a corner plot.
 
     Parameters
     ----------
     parameters
-        What they are of.
+        Parameters that were sampled.
     values : (n, n_parameters)
         Samples, SI units.
     told
-        What is said of them, see `posterior_data`.
+        Summary of the posterior, see `posterior_data`.
     truth
-        True values by name, where they are known.
+        True values by name, as far as known.
     title
-        Of what; may be empty.
+        Title of the legend; may be empty.
     """
     count = len(parameters)
     width = COLUMN_IN if count <= _MOST_IN_COLUMN else PAGE_IN
@@ -176,7 +176,7 @@ def _pair(axes: Axes, x: Array, y: Array, x_edges: Array, y_edges: Array) -> Non
 
 
 def _level(density: Array, share: float) -> float:
-    """Density at the edge of the least region that holds a share."""
+    """Return the density at the edge of the smallest region that contains a share of samples."""
     falling = np.sort(density.ravel())[::-1]
     place = np.searchsorted(np.cumsum(falling), share * falling.sum())
     return float(falling[min(place, len(falling) - 1)])
@@ -206,7 +206,7 @@ def _ticks(axes: Axes, x_edges: Array, y_edges: Array | None) -> None:
 
 
 def _few(low: float, high: float) -> tuple[list[float], list[str]]:
-    """Return one round value or two between the ends of an axis, and their labels."""
+    """Return one or two round values between the ends of an axis, and their labels."""
     inside = [float(v) for v in MaxNLocator(2).tick_values(low, high) if low <= v <= high]
     return inside, [f"{value:.6g}" for value in inside]
 

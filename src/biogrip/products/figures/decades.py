@@ -1,4 +1,4 @@
-"""Logarithmic axes labelled in plain text: as mathematics they take a tenth of a figure's time."""
+"""Ticks of logarithmic axes in plain text; math text would take a tenth of a figure's time."""
 
 import math
 import re
@@ -12,12 +12,12 @@ _POWER = re.compile(r"\^\{(.*?)\}")
 
 
 def power_of_ten(exponent: int) -> str:
-    """Return a power of ten as it is written."""
+    """Return a power of ten with a superscript exponent."""
     return "10" + str(exponent).translate(_SUPERSCRIPTS)
 
 
 def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
-    """Return three ticks of a logarithmic axis at most, and their labels, that do not collide."""
+    """Return at most three ticks of a logarithmic axis whose labels do not overlap."""
     first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
     decades = list(range(first, last + 1))
     if len(decades) >= 2:
@@ -26,13 +26,13 @@ def decade_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
         return [10.0**d for d in chosen], [power_of_ten(d) for d in chosen]
     steps = [m * 10.0**d for d in range(first - 1, last + 2) for m in (1, 2, 5)]
     found = [value for value in steps if low <= value <= high]
-    # Their labels are wide.
+    # Labels of these values are wide, so keep two.
     inside = [found[0], found[-1]] if len(found) > 2 else found
     return inside, [f"{value:g}" for value in inside]
 
 
 class _Plain(LogFormatterSciNotation):
-    """What it writes as mathematics, written plainly."""
+    """Log formatter that writes plain text instead of math text."""
 
     def __call__(self, x: float, pos: Any = None) -> str:
         text: str = super().__call__(x, pos)
@@ -41,7 +41,7 @@ class _Plain(LogFormatterSciNotation):
 
 
 def label_plainly(drawn: Figure) -> None:
-    """Label in plain text every logarithmic axis of a figure that has its usual labels."""
+    """Replace default formatters of logarithmic axes by plain-text ones."""
     for axes in drawn.axes:
         for axis in (axes.xaxis, axes.yaxis):
             for kind in ("major", "minor"):

@@ -1,4 +1,4 @@
-"""How a figure declares itself."""
+"""Declaration of figures as products."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial, wraps
@@ -39,27 +39,27 @@ def drawing(
     Parameters
     ----------
     draw
-        Draws it from its settings and, by keyword, from the files of `reads`.
+        Function that draws the figure from its settings and, by keyword, from the files of `reads`.
     name
-        Its name.
+        Name of the product.
     file
-        Name of its file, if that is another; of a case's figure, the case follows.
+        Name of the file, if it differs from `name`; the case's name is appended.
     caption
-        What the report says of it.
+        Caption in the report.
     settings
-        From the study; for a case's figure, from the study and the case (of a sweep, likewise).
+        Function of the study, of study and case, or of study and sweep.
     reads
-        Files that it is made from.
+        Input files.
     cases
-        Which cases have one; if that is not given there is one for the study.
+        Names of the cases that have the figure; if not given, there is one for the study.
     sweeps
-        Whether there is one for each sweep instead.
+        If true, there is one figure for each sweep.
     sheet
-        Figures of a sheet are drawn by one job.
+        Name of a group of figures that one job draws.
     when
-        Whether a study has it.
+        Condition for a study to have the figure.
     weight
-        How heavy its job is, if not as most.
+        Resources of the job, if not the default.
     """
     scope = Scope(cases, sweeps, when)
     whose = scope.whose

@@ -1,4 +1,4 @@
-"""Where the gripper is a measuring instrument: what two experiments tell of any sample."""
+"""Map of Cramér-Rao bounds over k_p and c, in the study's experiment and in the case's own."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,17 +18,17 @@ _SHOWN_PERCENT = (0.1, 1000.0)
 
 
 def of_case(study: Study, case: Case) -> CaseSettings:
-    """Choose what a case's map depends on."""
+    """Return the settings that a case's map depends on."""
     return settings(study)[case.name]
 
 
 def draw(case: CaseSettings) -> Figure:
-    """Draw bounds over k_p and c, in the study's experiment and in the case's own.
+    """Draw maps of the bounds over k_p and c, in the study's experiment and in the case's own.
 
     Parameters
     ----------
     case
-        Both experiments; k and c_p of the samples are as in its own.
+        Both experiments; k and c_p of all samples in the map are the case's.
     """
     symbols = [parameter.symbol for parameter in case.model.parameters]
     drawn = figure(PAGE_IN, 3.6)
@@ -51,7 +51,7 @@ def draw(case: CaseSettings) -> Figure:
 
 
 def samples_of(case: CaseSettings) -> Array:
-    """Return the map's samples, (n, n_parameters), k_p changing first."""
+    """Return parameters of the map's samples, (n, n_parameters), with k_p varying fastest."""
     stiffness, damping = np.meshgrid(_STIFFNESSES, _DAMPINGS)
     values = {name: np.full(stiffness.size, case.parameters[name]) for name in case.model.names}
     values |= {"k_p": stiffness.ravel(), "c": damping.ravel()}
@@ -59,7 +59,7 @@ def samples_of(case: CaseSettings) -> Array:
 
 
 def _map(axes: Axes, percent: Array) -> QuadMesh:
-    # No finite bound is as far beyond the scale as any.
+    # Draw an infinite bound like one above the scale.
     shown = np.where(np.isfinite(percent), percent, 1e9)
     mesh = axes.pcolormesh(
         _STIFFNESSES,
@@ -77,14 +77,14 @@ def _map(axes: Axes, percent: Array) -> QuadMesh:
 
 
 def _mark(axes: Axes, case: CaseSettings) -> None:
-    """Show the case itself, where it is on the map."""
+    """Mark the case, if it is inside the map."""
     k_p, c = case.parameters["k_p"], case.parameters["c"]
     if _STIFFNESSES[0] <= k_p <= _STIFFNESSES[-1]:
         axes.plot(k_p, c, "*", color="white", markeredgecolor="black", markersize=8)
 
 
 def _mapped(study: Study) -> list[str]:
-    """Cases of which both k_p and c are searched."""
+    """Return names of designed cases in which both k_p and c are searched."""
     return [
         name
         for name in designed_cases(study)
@@ -95,10 +95,9 @@ def _mapped(study: Study) -> list[str]:
 DESIGNED_MAP = drawing(
     draw,
     name="designed_map",
-    caption="Where the gripper is a measuring instrument: Cramér-Rao bounds of every parameter, "
-    "all of them free, over the parallel spring k_p and the branch's damper c of a sample, in the "
-    "study's experiment (above) and in the case's own (below), at the same noise. The line is "
-    f"{100 * WELL:g} %, the star the case.",
+    caption="Cramér-Rao bounds of every parameter, all of them free, over the parallel spring "
+    "k_p and the branch's damper c of a sample, in the study's experiment (above) and in the "
+    f"case's own (below), at the same noise. The line is {100 * WELL:g} %, the star the case.",
     settings=of_case,
     cases=_mapped,
 )

@@ -1,4 +1,4 @@
-"""Springs and dampers as they are drawn."""
+"""Symbols of springs and dampers."""
 
 import numpy as np
 from matplotlib.axes import Axes

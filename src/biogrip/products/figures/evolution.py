@@ -1,4 +1,4 @@
-"""Figure 10: the best individual's parameters from step to step."""
+"""Figure 10: parameters of the best individual over generations."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,26 +20,26 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Settings:
-    """The sample, and whose histories are drawn."""
+    """The sample, and the method whose histories are drawn."""
 
     truth: Truth
     method: str
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the evolution of a case depends on."""
+    """Return the settings that the evolution of a case depends on."""
     return Settings(case.truth, study.shown)
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
-    """Draw every parameter's evolution for the seeds and for the typical one.
+    """Draw every parameter over generations for all seeds, highlighting the typical seed.
 
     Parameters
     ----------
     settings
-        The sample, and whose histories.
+        The sample and the method.
     identifications, histories
-        Of the case, CSV and Parquet.
+        Files of the case, CSV and Parquet.
     """
     truth, step = settings.truth, METHODS[settings.method].step
     found = read_identifications(identifications, settings.method)
@@ -93,7 +93,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
 
 
 def _beside(ratio: float) -> str:
-    """Say how far a value is from the target; decades of an axis hide what a few percent are."""
+    """Return the distance to the target in words, as a few percent are invisible on the axis."""
     if not 0.5 < ratio < 2:
         return f"at {ratio:.2g} times the target"
     percent = 100 * (ratio - 1)

@@ -1,4 +1,4 @@
-"""Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residual."""
+"""Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residuals."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Settings:
-    """A case in print, what its identification assumes, whose fit, and the paper's axis."""
+    """Title, assumptions and method of a case's fit, and y-limits of the paper's figure."""
 
     title: str
     problem: CaseProblem
@@ -30,7 +30,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the fit of a case depends on."""
+    """Return the settings that the fit of a case depends on."""
     return Settings(case.title, case.problem, study.shown, case.published.axis_rad)
 
 
@@ -44,7 +44,7 @@ def draw(
     settings
         The case.
     identifications, measurements, calibrated
-        Of the case: CSV, Parquet, and YAML if its gripper was calibrated.
+        Files of the case: CSV, Parquet, and YAML if its gripper was calibrated.
     """
     problem = settings.problem.calibrated(calibrated)
     fit = typical_fit(problem, settings.method, identifications, measurements)
@@ -56,7 +56,7 @@ def draw(
 
 
 def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
-    """Draw a trace, its fit, and what the fit leaves of it; on an axis that holds the paper's."""
+    """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits."""
     factor, unit = scale_of(fit.fitted_rad, "rad")
     drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
@@ -91,8 +91,8 @@ FIT = drawing(
     draw,
     name="fit",
     caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and its fit, of the "
-    "seed of median excess of the misfit over the noise in its trace; and below what the fit "
-    "leaves of the measurement (points) and of the target (line).",
+    "seed of median excess of the misfit over the noise in its trace; and below the residuals of "
+    "the measurement (points) and of the target (line).",
     settings=settings,
     reads={
         "identifications": the(PATH),

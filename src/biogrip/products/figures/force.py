@@ -1,4 +1,4 @@
-"""The force of the jaws on the sample, and what becomes of the trace if they cannot pull."""
+"""Force of the jaws on the sample, and rotation of jaws that cannot pull."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Settings:
-    """A case in print, and all that its target is made of but for the sampling.
+    """Title of a case, and all inputs of its target except the sampling.
 
     Parameters
     ----------
     title
-        In print.
+        Title.
     gripper, phases, sample, parameters, nonlinear, unilateral
-        As of the target.
+        Inputs of the target.
     """
 
     title: str
@@ -43,7 +43,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the force in a case depends on."""
+    """Return the settings that the force in a case depends on."""
     return Settings(
         case.title,
         case.gripper,
@@ -56,7 +56,7 @@ def settings(study: Study, case: Case) -> Settings:
 
 
 def draw(settings: Settings, target: Path) -> Figure:
-    """Draw the force of jaws that hold the sample, and the rotation with and without adhesion.
+    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def draw(settings: Settings, target: Path) -> Figure:
     time_s, _, rotation = read_target(target)
     torque = torque_history(settings.phases)
     network = settings.sample.model.sample(settings.parameters)
-    # At a step: what follows it; the jaws jump within less than the first sample.
+    # Without inertia, since the jaws ring for less than a sampling interval after a step.
     held = jaw_force(
         settings.gripper, network, torque, time_s, nonlinear=settings.nonlinear, inertia=False
     )[0]
@@ -112,7 +112,7 @@ def draw(settings: Settings, target: Path) -> Figure:
 
 
 def _from_loss(found: UnilateralResponse, values: Array) -> Array:
-    """Values from the last sample before contact is first lost."""
+    """Return values from the last sample before contact is first lost, NaN before."""
     lost = np.flatnonzero(~found.touching)
     start = max(lost[0] - 1, 0) if len(lost) else len(values)
     return np.where(np.arange(len(values)) >= start, values, np.nan)

@@ -1,4 +1,4 @@
-"""The fit of the very trace that is judged."""
+"""Fit of the trace that the verdicts of a case are about."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Settings:
-    """A case in print, what its identification assumes, which trace it is, and the paper's axis."""
+    """Title, assumptions and trace of a case's judged fit, and y-limits of the paper's figure."""
 
     title: str
     problem: CaseProblem
@@ -28,20 +28,20 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the fit of the judged trace of a case depends on."""
+    """Return the settings that the fit of the judged trace of a case depends on."""
     trace = "recorded trace" if case.recorded else f"seed {TRACE}"
     return Settings(case.title, case.problem, trace, case.published.axis_rad)
 
 
 def draw(settings: Settings, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
-    """Draw the trace of a case that is judged, and the fit that its verdicts are about.
+    """Draw the judged trace of a case and its best fit.
 
     Parameters
     ----------
     settings
         The case.
     verdicts, measurements, calibrated
-        Of the case: JSON, Parquet, and YAML if its gripper was calibrated.
+        Files of the case: JSON, Parquet, and YAML if its gripper was calibrated.
     """
     problem = settings.problem.calibrated(calibrated)
     found = {item["quantity"]: item["value"] for item in read_verdicts(verdicts)["quantities"]}
@@ -54,8 +54,8 @@ def draw(settings: Settings, verdicts: Path, measurements: Path, calibrated: lis
 JUDGED_FIT = drawing(
     draw,
     name="judged_fit",
-    caption="The trace that this case's verdicts are about, the best fit of it, and below what "
-    "the fit leaves of the trace (points) and of the target (line).",
+    caption="The trace that this case's verdicts are about, its best fit, and below the "
+    "residuals of the trace (points) and of the target (line).",
     settings=settings,
     reads={
         "verdicts": the(PATH),

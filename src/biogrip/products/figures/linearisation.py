@@ -1,4 +1,4 @@
-"""Linear against nonlinear model: their difference, and the domain in which they agree."""
+"""Difference of the linear from the nonlinear model, over angle and torque."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,25 +27,25 @@ _MOST_CASES = 3
 
 @dataclass(frozen=True)
 class Settings:
-    """What is compared, and what it is called in print, by name."""
+    """Cases to compare and their titles, by name."""
 
     cases: Mapping[str, Compared]
     titles: Mapping[str, str]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what is compared."""
+    """Return the simulated cases and their titles."""
     cases = compared(study).cases
     return Settings(cases, {name: study.cases[name].title for name in cases})
 
 
 def draw(settings: Settings, differences: Path) -> Figure:
-    """Draw the difference for the last case at twenty times the torque, and maps of it.
+    """Draw the difference for the last case at twenty times the torque, and maps of a few.
 
     Parameters
     ----------
     settings
-        As of the comparison.
+        Settings of the comparison.
     differences
         The comparison of the models, CSV.
     """
@@ -90,7 +90,7 @@ def draw(settings: Settings, differences: Path) -> Figure:
 
 
 def _difference(axes: Axes, case: Compared) -> None:
-    """Draw nonlinear minus linear rotation, for the traces themselves cannot be told apart."""
+    """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
     gripper, network = case.gripper, case.network
     torque = scaled(torque_history(case.phases), _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
@@ -102,7 +102,7 @@ def _difference(axes: Axes, case: Compared) -> None:
     axes.set_xlabel("time (s)")
     axes.set_ylabel("nonlinear - linear rotation (mrad)")
     bottom, top = axes.get_ylim()
-    # Room above the curve for what is written there.
+    # Leave room for text above the curve.
     axes.set_ylim(bottom, top + 0.08 * (top - bottom))
     peak = f"peak rotation {1e3 * np.max(np.abs(linear)):.3g} mrad"
     axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)

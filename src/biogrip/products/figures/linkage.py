@@ -23,25 +23,25 @@ from biogrip.study.study import Study
 _ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 0}
 
 
-# Turned as much in the drawing, arms are seen to have turned, and still look like arms.
+# Rotation that is visible in the drawing while arms still look like arms.
 _SEEN_RAD = 0.012
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The gripper, and what closes it onto which samples."""
+    """The gripper, and the cases whose largest rotation is drawn."""
 
     gripper: Gripper
     cases: tuple[Compared, ...]
 
 
 def settings(study: Study) -> Settings:
-    """Choose the gripper and the samples."""
+    """Return the gripper and the simulated cases."""
     return Settings(study.gripper, tuple(compared(study).cases.values()))
 
 
 def draw(settings: Settings) -> Figure:
-    """Draw linkage, tips, names and networks."""
+    """Draw linkage, tips, nomenclature and networks."""
     gripper = settings.gripper
     drawn = figure(PAGE_IN, 4.8)
     (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
@@ -57,7 +57,7 @@ def draw(settings: Settings) -> Figure:
 
 
 def _joints(gripper: Gripper, closing_rad: float = 0.0) -> dict[str, tuple[float, float]]:
-    """Positions in millimetres of the four joints, both arms closed by an angle."""
+    """Return positions of the four joints in millimetres, with both arms closed by an angle."""
     length, angle = (
         1e3 * gripper.arm_length_m,
         math.radians(gripper.reference_angle_deg),
@@ -100,7 +100,7 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
 
 
 def _largest_rotation_rad(settings: Settings) -> float:
-    """Largest rotation of all samples; that of the drawing if there is none."""
+    """Return the largest rotation of all samples, or a visible one if there is none."""
     peaks = [0.0]
     for case in settings.cases:
         torque = torque_history(case.phases)
@@ -111,7 +111,7 @@ def _largest_rotation_rad(settings: Settings) -> float:
 
 
 def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
-    """Tips at the reference and closed as far as ever, turned several times as much."""
+    """Draw the tips at the reference and at the largest rotation, which is enlarged."""
     times = max(1, round(_SEEN_RAD / rotation_rad))
     enlarged = f" (drawn {times} times)" if times > 1 else ""
     reference, moved = (
@@ -166,7 +166,7 @@ def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
 
 
 def _networks(axes: Axes) -> None:
-    """Liquid drop with membrane (1) and generalized Maxwell model (2) of Figure 5."""
+    """Draw the liquid drop with membrane (1) and generalized Maxwell model (2) of Figure 5."""
     for top, rows, title in (
         (4.3, ("kc", "k_p"), "(1) Maxwell liquid drop, membrane"),
         (1.6, ("kc", "k_p", "c_p"), "(2) generalized Maxwell-Wiechert"),
@@ -205,7 +205,7 @@ LINKAGE = drawing(
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
     f"of {1e6 * LARGEST_M:g} µm; (b) its tips at the reference and closed as far as the study's "
     "softest sample lets them, the rotation enlarged as it says, and their displacements along x; "
-    "(c) what the angles and displacements are called: reference (hat, soft lines), deformed "
+    "(c) names of the angles and displacements: reference (hat, soft lines), deformed "
     "(tilde, hard lines), increments theta = tilde - hat and the closing rotations phi, "
     "displacements u of the tips and x of the node between spring and damper, all to the right; "
     "(d) the constitutive models. Arm length and angle are those of the config; in the default "

@@ -1,4 +1,4 @@
-"""The story at a glance: what fits agree on is what the experiment sees, and when it sees it."""
+"""Moduli of all fits over frequency, and sensitivities over time."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +38,7 @@ from biogrip.products.product import Weight, of_cases
 from biogrip.study.study import Study
 
 SEEN = 0.1
-"""The experiment sees a modulus on which nine tenths of the fits near the noise agree so well."""
+"""Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
 
 _POINTS = 121
 _TITLE_LETTERS = 28
@@ -50,7 +50,7 @@ _STYLES: tuple[dict[str, Any], ...] = (
 
 @dataclass(frozen=True)
 class ShownCase:
-    """A sample, what its identification assumes, and the noise that it meets."""
+    """True values, assumptions of the identification and noise of a drawn sample."""
 
     truth: Truth
     problem: CaseProblem
@@ -59,7 +59,7 @@ class ShownCase:
 
 @dataclass(frozen=True)
 class Settings:
-    """A few samples, whose identifications are drawn, and which of these are near the noise."""
+    """Drawn samples, methods whose fits are drawn, and tolerance of the noise."""
 
     cases: tuple[ShownCase, ...]
     methods: tuple[str, ...]
@@ -67,7 +67,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose what is drawn: the shown method, and least squares where there is such."""
+    """Return the first simulated cases, the shown method, and least squares if it is run."""
     cases = [study.cases[name] for name in shown_cases(study)]
     methods = [study.shown, *(["least_squares"] if "least_squares" in study.methods else [])]
     return Settings(
@@ -83,9 +83,9 @@ def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -
     Parameters
     ----------
     settings
-        What is drawn.
+        Settings of the figure.
     identifications, targets
-        Of the cases in their order, CSV.
+        Files of the cases in their order, CSV.
     """
     drawn = figure(PAGE_IN, 4.4)
     axes = drawn.subplots(2, len(settings.cases), squeeze=False, height_ratios=[1.35, 1])
@@ -95,7 +95,7 @@ def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -
         logs = case.problem.logs(case.truth.parameters)
         _, sensitivity = case.problem.of(time_s, rotation).residuals(logs)
         sigma = standard_deviation(rotation, case.noise)
-        # Where there is no noise there is nothing to compare with.
+        # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
         _moduli(axes[0, column], settings, case, identified, time_s)
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
@@ -150,7 +150,7 @@ def _moduli(
 
 
 def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Array) -> None:
-    # Where curves coincide each is seen beside the thinner ones on top of it, and through dashes.
+    # Decreasing widths and dashes keep coinciding curves visible.
     widths = np.linspace(2.2, 1.0, len(model.parameters))
     for parameter, row, style, width in zip(
         model.parameters, relative, _STYLES, widths, strict=False
@@ -165,7 +165,7 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
 
 
 def _modulus(network: Network, omega: Array) -> Array:
-    """Complex stiffness of n samples in N/m, force over shortening at s = i omega, (n, n_omega)."""
+    """Return complex stiffnesses of n samples in N/m at s = i omega, (n, n_omega)."""
     s = 1j * omega
     rates = (network.k / network.c)[:, :, None]
     branches = np.sum(network.k[:, :, None] * s / (s + rates), axis=1)
@@ -173,7 +173,7 @@ def _modulus(network: Network, omega: Array) -> Array:
 
 
 def _agreed(moduli: Array) -> BoolArray:
-    """Where nine tenths of fits, (n, n_omega), have about the same modulus."""
+    """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on the modulus."""
     low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
     agreed: BoolArray = high < (1 + SEEN) * low
     return agreed

@@ -1,4 +1,4 @@
-"""Figure 6: what the angles and displacements of the linkage are called."""
+"""Figure 6: names of the linkage's angles and displacements."""
 
 import math
 
@@ -8,12 +8,12 @@ from matplotlib.patches import Arc
 from biogrip.products.figures.elements import damper, spring
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE
 
-# So drawn that everything has room: degrees, arm lengths.
+# Exaggerated for legibility: degrees, arm lengths.
 _HAT_DEG, _CLOSING_DEG, _GAP, _NODE = 72.0, 16.0, 2.3, 0.2
 
 
 def nomenclature(axes: Axes) -> None:
-    """Draw the linkage at the reference and deformed, with the names of what changes."""
+    """Draw the linkage at the reference and deformed, with symbols for what changes."""
     hat, tilde = (math.radians(a) for a in (_HAT_DEG, _HAT_DEG - _CLOSING_DEG))
     base = math.cos(hat) + _GAP / 2
     b_hat, b = ((-base + math.cos(a), math.sin(a)) for a in (hat, tilde))
@@ -51,7 +51,7 @@ def nomenclature(axes: Axes) -> None:
 
 
 def _sample(axes: Axes, left: float, right: float, y: float) -> None:
-    """The Maxwell branch alone, whose node is what moves by x."""
+    """Draw a Maxwell branch; x is the displacement of its inner node."""
     size = (right - left) / 2.5
     spring(axes, left, _NODE, y, "$k$", size)
     damper(axes, _NODE, right, y, "$c$", size)
@@ -59,7 +59,7 @@ def _sample(axes: Axes, left: float, right: float, y: float) -> None:
 
 
 def _angles(axes: Axes, foot: float, index: int, hat: float, tilde: float) -> None:
-    """Arcs of both angles, and the rotation from one to the other."""
+    """Draw arcs of both angles, and the rotation between them."""
     for angle, size, colour, name in (
         (hat, 0.36, GREY, rf"$\hat\theta_{index}$"),
         (tilde, 0.68, BLUE, rf"$\tilde\theta_{index}$"),

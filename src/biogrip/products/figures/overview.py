@@ -1,4 +1,4 @@
-"""The study in one picture: one fit, and how all identifications scatter about the truth."""
+"""Overview of a study: one fit, and the scatter of all identifications about the truth."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,18 +49,18 @@ _MOST_CASES = 3
 
 @dataclass(frozen=True)
 class Settings:
-    """What the overview shows.
+    """Settings of the overview.
 
     Parameters
     ----------
     cases
-        A few samples.
+        True values of the first few simulated cases.
     problem
-        What the identification of the first assumes.
+        Assumptions of the first case's identification.
     method
-        Whose identifications.
+        Method whose identifications are drawn.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to be taken for as good.
+        Share by which a misfit may exceed the noise to count as near it.
     """
 
     cases: tuple[Truth, ...]
@@ -70,12 +70,12 @@ class Settings:
 
 
 def shown_cases(study: Study) -> list[str]:
-    """Cases that there is room for."""
+    """Return names of the first simulated cases, as many as fit."""
     return study.simulated[:_MOST_CASES]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what the overview shows."""
+    """Return the settings of the overview."""
     cases = [study.cases[name] for name in shown_cases(study)]
     truths = tuple(case.truth for case in cases)
     return Settings(truths, cases[0].problem, study.shown, study.near_noise_tolerance)
@@ -93,11 +93,11 @@ def draw(
     Parameters
     ----------
     settings
-        What is shown.
+        Settings of the figure.
     identifications, expected
-        Of the cases, CSV and JSON, in their order.
+        CSV and JSON files of the cases, in their order.
     measurements, calibrated
-        Of the first, Parquet, and YAML if its gripper was calibrated.
+        Files of the first case: Parquet, and YAML if its gripper was calibrated.
     """
     cases = settings.cases
     drawn = figure(PAGE_IN, 3.0)
@@ -196,7 +196,7 @@ def _scatter(
 def _quantities(
     case: Truth,
 ) -> list[tuple[str, str, list[str], float, float | None]]:
-    """Name, label, columns, target and the paper's value of each parameter, and of c + c_p."""
+    """Return name, label, columns, target and paper's value of each parameter, and of c + c_p."""
     identified = case.published.identified
     found = []
     for group in case.model.quantities:
@@ -211,7 +211,7 @@ def _quantities(
 
 
 def _points(axes: Axes, place: NDArray[np.floating], ratio: Array, color: str, label: str) -> None:
-    """Draw points, and triangles on the edge for those beyond the axis."""
+    """Draw points, with triangles at the edge for points beyond the axis."""
     style: dict[str, Any] = {"color": color, "linestyle": "", "markeredgewidth": 0, "alpha": 0.55}
     inside = (ratio > 1 / _WORST) & (ratio < _WORST)
     axes.plot(place[inside], ratio[inside], marker="o", markersize=2.2, label=label, **style)

@@ -1,4 +1,4 @@
-"""Profile likelihoods: what chi-squared says against other values of a quantity."""
+"""Profile likelihoods: increase of chi-squared over the values of each quantity."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,20 +23,20 @@ from biogrip.products.stages.expected import verdicts_expected
 from biogrip.study.study import Case, Study
 
 _HIGHEST = 12.0
-# A quotient beyond which an axis is logarithmic.
+# Ratio of the ends above which an axis is logarithmic.
 _WIDE = 5.0
 
 
 @dataclass(frozen=True)
 class Settings:
-    """A case in print, and its true parameters, none if they are unknown."""
+    """Title and true parameters of a case; none if they are unknown."""
 
     title: str
     parameters: Mapping[str, float]
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the profiles of a case depend on."""
+    """Return the settings that the profiles of a case depend on."""
     return Settings(case.title, case.parameters)
 
 
@@ -48,9 +48,9 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
     settings
         The case.
     measured
-        Verdicts on its trace, JSON.
+        Verdicts on the judged trace, JSON.
     expected
-        What its traces should tell, JSON, if the truth is known.
+        Verdicts on the trace without noise, JSON, if the truth is known.
     """
     others = [read_verdicts(path) for path in expected]
     return draw_profiles(settings, read_verdicts(measured), others)
@@ -59,7 +59,7 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
 def draw_profiles(
     settings: Settings, found: Mapping[str, Any], others: Sequence[Mapping[str, Any]] = ()
 ) -> Figure:
-    """Draw profiles of verdicts that are at hand; see `draw`."""
+    """Draw profiles from loaded verdicts; see `draw`."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     quantities = found["quantities"]
     drawn, grid = row_of_panels(len(quantities), 2.5, sharey=True)
@@ -99,13 +99,13 @@ def draw_profiles(
 
 
 def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
-    """Draw a profile smoothly through its points: of the square root of the rise, by cubics.
+    """Return a smooth curve: the root of the increase, interpolated by monotone cubics (PCHIP).
 
-    They do not overshoot (Fritsch & Carlson 1980), and a parabola is a straight line to them.
+    They do not overshoot (Fritsch & Carlson 1980); the root turns a parabola into straight lines.
     """
     from scipy.interpolate import PchipInterpolator
 
-    # Rounded values may coincide.
+    # Rounding may have made neighbours equal.
     values, places = np.unique(np.array(profile["values"]), return_index=True)
     roots = np.sqrt(np.clip(np.array(profile["rises"])[places], 0.0, 4 * _HIGHEST))
     dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
@@ -126,7 +126,7 @@ def _limits(axes: Axes, item: dict[str, Any]) -> None:
 
 
 def _window(item: dict[str, Any]) -> tuple[float, float]:
-    """Where the profile is below the top of the axis, and a little more."""
+    """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
     values, rises = (np.array(item["profile"][key]) for key in ("values", "rises"))
     inside = np.flatnonzero(rises < _HIGHEST)
     ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
@@ -139,8 +139,8 @@ PROFILES = drawing(
     draw,
     name="profiles",
     caption="Profile likelihoods of one seed, and without noise (grey); shaded: the confidence "
-    "interval; dashed: its threshold; dotted: what a profile has to reach at an end of the range "
-    "for that side to be closed.",
+    "interval; dashed: its threshold; dotted: the increase at an end of the search range above "
+    "which the interval has a limit on that side.",
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,

@@ -1,4 +1,4 @@
-"""What a fit leaves of a trace, and whether it looks like white noise."""
+"""Residuals of a fit: over time, autocorrelation, distribution."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +13,7 @@ _TWO_SIDED = 1.96
 
 
 def draw_residuals(fit: Fit) -> Figure:
-    """Draw residuals over time, their correlation and their distribution, in standard deviations.
+    """Draw standardised residuals over time, their autocorrelation and their quantiles.
 
     Parameters
     ----------

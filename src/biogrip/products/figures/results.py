@@ -1,4 +1,4 @@
-"""What the figures of results read: a case's typical seed, its trace and its fit."""
+"""Inputs of result figures: a case's typical seed, its trace and its fit."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
 
 SHOWN_SEEDS = 100
-"""Figures that draw something for each seed draw no more than so many: the first."""
+"""Most seeds drawn individually; figures show the first ones."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Fit:
     Parameters
     ----------
     time_s, measured_rad, fitted_rad : (n_samples,)
-        The traces.
+        Sampling times, and noisy and fitted rotation.
     target_rad : (n_samples,) or None
-        The trace without noise, unless it was recorded.
+        Noise-free rotation; None if the trace was recorded.
     """
 
     time_s: Array
@@ -48,7 +48,7 @@ class TypicalFit(Fit):
     Parameters
     ----------
     seed, generations
-        Which one it is and when it stopped.
+        Seed, and the number of generations it took.
     """
 
     seed: int
@@ -58,14 +58,14 @@ class TypicalFit(Fit):
 def typical_fit(
     problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
 ) -> TypicalFit:
-    """Read the typical seed and simulate its answer.
+    """Return the trace of the typical seed and its fit.
 
     Parameters
     ----------
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     method
-        Whose.
+        Method that identified it.
     identifications
         Identifications of the case, CSV.
     measurements
@@ -83,18 +83,18 @@ def typical_fit(
 def fit_of(
     problem: CaseProblem, parameters: Mapping[str, float], recorded: Measurements, seed: int
 ) -> Fit:
-    """Simulate a sample beside a trace that it is to fit.
+    """Return a trace, and the response of given parameters with nuisance terms fitted.
 
     Parameters
     ----------
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     parameters
         Values by name, SI units.
     recorded
         Noisy traces.
     seed
-        Which of them.
+        Seed of the trace.
     """
     network = problem.model.sample(parameters)
     simulated = simulated_rotation(
@@ -107,37 +107,37 @@ def fit_of(
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:
-    """Return the identifications of the seeds that are drawn one by one."""
+    """Return the identifications of seeds that are drawn individually."""
     return found[found["seed"] < SHOWN_SEEDS]
 
 
 def seeds_in_words(count: int) -> str:
-    """Say how many of a number of seeds are drawn one by one."""
+    """Return in words how many seeds are drawn individually."""
     if count == 1:
         return "the only trace"
     return f"all {count} seeds" if count <= SHOWN_SEEDS else f"first {SHOWN_SEEDS} of {count} seeds"
 
 
 def typical_in_words(found: pd.DataFrame) -> str:
-    """Say which of some identifications is the typical one."""
+    """Return the label of the typical seed."""
     return f"seed {int(typical(found)['seed'])}, typical" if len(found) > 1 else "the only trace"
 
 
 def read_history(
     path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
 ) -> pd.DataFrame:
-    """Read the histories, by one method, of the seeds that are drawn and of one more.
+    """Read one method's histories of the seeds drawn individually and of one more.
 
     Parameters
     ----------
     path
         Histories of a case, Parquet.
     method
-        Whose.
+        Method of identification.
     shown
-        The one more.
+        The additional seed.
     values
-        Columns that are wanted beside seed and generation.
+        Columns to read beside seed and generation.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def read_history(
     """
     columns = ["seed", "generation", *values]
     try:
-        # Pandas' own reader takes a tenth of a process's memory to load, for what is not needed.
+        # Import of pandas' own Parquet reader would take a tenth of the memory.
         with pq.ParquetFile(path, read_dictionary=["method"]) as file:
             parts = [
                 _of_seeds(file.read_row_group(group, ["method", *columns]), method, shown)

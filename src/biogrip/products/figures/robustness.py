@@ -1,4 +1,4 @@
-"""Heat maps of a sweep: who ends in the true basin, and how far above the bound errors are."""
+"""Heat maps of a sweep: share of seeds in the true basin, and their errors over the bound."""
 
 import re
 from pathlib import Path
@@ -26,7 +26,7 @@ from biogrip.products.heat_maps import (
 _MOST_CASES = 3
 _CELL_IN = 0.24
 _TALLEST_IN = 2.4
-# What two lines of the smallest print need.
+# Smallest cell that holds two lines of text.
 _LEGIBLE_IN = (0.26, 0.2)
 _SHARE = Normalize(0, 100)
 _RATIO = LogNorm(0.5, 100)
@@ -35,17 +35,17 @@ _WITHOUT_BOUND = "#dddddd"
 
 
 def draw(maps: HeatMaps, points: list[Path]) -> Figure:
-    """Draw the shares in the true basin, and errors there of the best and the worst determined.
+    """Draw shares in the true basin, and errors of the best and the worst determined quantity.
 
-    Numbers in the cells are those of the first method; in brackets stand the
-    share of the second, and the bound.
+    Numbers in cells are for the first method; brackets hold the share of the second method, and
+    the bound.
 
     Parameters
     ----------
     maps
-        The sweep.
+        The sweep's cases, axes and titles.
     points
-        Judged points, CSV, a file per case and named like it.
+        Judged points, CSV, one file per case and named like it.
     """
     cases = dict(list(maps.cases.items())[:_MOST_CASES])
     rows = len(maps.rows.values)
@@ -97,14 +97,14 @@ def _errors(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) 
     first = points[points["method"] == maps.methods[0]]
     error = _grid(maps, first, "basin_error_percent")
     bound = _grid(maps, first, "bound_percent")
-    # An error of exactly zero has no logarithm, but a colour: the best.
+    # Clip, since an error of zero has no logarithm.
     ratio = np.clip(error / bound, _RATIO.vmin, _RATIO.vmax)
     _heat_map(axes, maps, ratio, _RATIO, "cividis_r")
     _write(axes, [error, bound], _RATIO(ratio), "cividis_r", height_in)
 
 
 def _grid(maps: HeatMaps, points: pd.DataFrame, column: str) -> Array:
-    """Values of a column, (n_rows, n_columns); every quantity has the same shares."""
+    """Return a column's values as a grid, (n_rows, n_columns)."""
     wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
     rows, columns = (list(axis.values) for axis in (maps.rows, maps.columns))
     found: Array = wide.reindex(index=rows, columns=columns).to_numpy(float)
@@ -155,7 +155,7 @@ def _short(number: float) -> str:
 
 
 def _symbol(quantity: str) -> str:
-    """A quantity's label as mathtext."""
+    """Return a quantity's label as mathtext."""
     return "$" + re.sub(r"_(\w+)", r"_{\1}", quantity) + "$"
 
 

@@ -37,7 +37,7 @@ from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Case, Study
 
-# Beyond this bound (of a logarithm) an axis covers decades, not percents.
+# Bound of a logarithm above which an axis shows decades instead of percent.
 _LOOSE = 0.25
 _WIDTHS = 8.0
 _DECADES = 1e4
@@ -45,7 +45,7 @@ _DECADES = 1e4
 
 @dataclass(frozen=True)
 class Settings:
-    """The sample, what its identification assumes, the noise that it meets, and a confidence."""
+    """True values, assumptions of the identification, noise and confidence level of a case."""
 
     truth: Truth
     problem: CaseProblem
@@ -54,7 +54,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the scatter of a case depends on."""
+    """Return the settings that the scatter of a case depends on."""
     return Settings(case.truth, case.problem, case.noise, case.confidence)
 
 
@@ -72,9 +72,9 @@ def draw(
     settings
         The sample.
     identifications, target
-        Of the case, CSV.
+        Files of the case, CSV.
     expected
-        What its traces should tell, JSON.
+        Expected verdicts, JSON.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     """
@@ -97,8 +97,8 @@ def draw(
         ratios = found[[p.column for p in names]].sum(axis=1) / value
         limit = bound(sensitivity, noise_rad, log_truth, quantity)
         verdict = verdicts[quantity.label]
-        # Where the truth is not determined the tangent at it says nothing of where fits end,
-        # and a bound of no width is none.
+        # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
+        # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
         _quantity(axes, found["method"], ratios.to_numpy(float), known, settings.confidence)
         _paper(axes, truth.published.identified, [p.name for p in names], value)
@@ -112,7 +112,7 @@ def draw(
 def _quantity(
     axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float, confidence: float
 ) -> None:
-    """One column of points a method; what lies beyond the axis stands on its edge."""
+    """Draw one column of points per method, with points beyond the axis at its edge."""
     loose = limit > _LOOSE
     top = _DECADES if loose else 1 + _WIDTHS * limit
     bottom = 1 / _DECADES if loose else 1 - _WIDTHS * limit
@@ -142,7 +142,7 @@ def _quantity(
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
     if np.isfinite(limit):
         reach = NormalDist().inv_cdf((1 + confidence) / 2) * limit
-        # Of the logarithm, straight where the axis is.
+        # Limits of the logarithm; linearised on a linear axis.
         low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
         axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
     axes.axhline(1, color=TARGET, linewidth=0.6)
@@ -195,8 +195,8 @@ SCATTER = drawing(
     draw,
     name="scatter",
     caption="Identified over target values for every method and seed; shaded, where "
-    "traces determine it: the confidence interval by the Cramér-Rao bound, for which parameters "
-    "without information are taken as known; dashed: the paper. Bars are quartiles, triangles "
+    "traces determine it: the confidence interval by the Cramér-Rao bound, with parameters "
+    "without information fixed; dashed: the paper. Bars are quartiles, triangles "
     "stand for values beyond the axis.",
     settings=settings,
     reads={

@@ -1,4 +1,4 @@
-"""How many experiments it takes until simulated cells are known, quantity by quantity."""
+"""Number of experiments until parameters of simulated cells are known."""
 
 from pathlib import Path
 from typing import Any
@@ -23,24 +23,24 @@ _STYLES: dict[str, dict[str, Any]] = {
     TRUTH: {"color": BLUE, "marker": "D", "linestyle": "--"},
 }
 
-# Where intervals with an open end are drawn, in percent.
+# Height at which intervals with an open end are drawn, in percent.
 _OPEN = 100.0
 
 
 def of_case(_: Study, case: Case) -> dict[str, str]:
-    """Choose what a case's figure depends on: symbols of its quantities."""
+    """Return the symbols of the case's parameters by name."""
     return {p.name: p.symbol for p in case.problem.searched.parameters}
 
 
 def draw(symbols: dict[str, str], rows: list[Path]) -> Figure:
-    """Draw in how many cells quantities are known well, and how long their intervals are.
+    """Draw the share of cells in which each quantity is known, and the intervals' half widths.
 
     Parameters
     ----------
     symbols
-        In print, by quantity.
+        Symbols by quantity.
     rows
-        What is known of each cell, CSV.
+        Estimates and limits for each cell, CSV.
     """
     found = pd.concat([SEQUENCES.read(file) for file in rows])
     found = found.assign(well=known_well(found), half=half_widths(found))
@@ -71,7 +71,7 @@ def draw(symbols: dict[str, str], rows: list[Path]) -> Figure:
 
 
 def _lines(axes: Axes, values: "pd.Series[float]") -> None:
-    """Draw numbers by way and how many experiments."""
+    """Draw one line per way, over the number of experiments."""
     for way, style in _STYLES.items():
         own = values[way]
         axes.plot(own.index, own.to_numpy(), label=IN_WORDS[way], markersize=3.5, **style)

@@ -1,4 +1,4 @@
-"""One look for all figures: legible in a paper's column, safe for colour-blind eyes."""
+"""Common style of all figures: legible at column width, safe for colour-blind readers."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ BLUE, ORANGE, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY, PURPLE = "#56B4E9", "#CC79A7"
 SHADE = "#DCE6EE"
 
-# What a colour means, everywhere.
+# Colours have the same meaning in all figures.
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
 
 METHOD_STYLES: dict[str, dict[str, Any]] = {
@@ -32,7 +32,7 @@ METHOD_STYLES: dict[str, dict[str, Any]] = {
     "differential_evolution": {"color": PURPLE, "linestyle": "-."},
 }
 
-# Five quantities of a sample with one branch are legible in a row.
+# Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4
 
 _PANEL_SIZE = 7.5
@@ -42,7 +42,7 @@ _STYLE: dict[Any, Any] = {
     "font.size": 8,
     "axes.titlesize": 8,
     "axes.titlelocation": "left",
-    # Not sought above the ticks on top, of which there are none.
+    # A fixed position: automatic placement would search for ticks at the top.
     "axes.titley": 1.0,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
@@ -60,20 +60,20 @@ _STYLE: dict[Any, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw and save in the study's style."""
+    """Apply the study's Matplotlib style within a context."""
     with mpl.rc_context(_STYLE):
         yield
 
 
 def figure(width_in: float, height_in: float) -> Figure:
-    """Return an empty figure of a size in inches."""
+    """Return an empty figure of the given size."""
     return Figure(figsize=(width_in, height_in), layout="constrained")
 
 
 def row_of_panels(
     count: int, height_in: float, *, sharey: bool = False
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure as wide as a page with panels side by side, in rows where they are many."""
+    """Return a page-wide figure with panels in one or more rows."""
     rows = -(-count // _MOST_SIDE_BY_SIDE)
     columns = -(-count // rows)
     drawn = figure(
@@ -86,7 +86,7 @@ def row_of_panels(
 
 
 def save(drawn: Figure, output: Path) -> None:
-    """Write a figure as PNG, and beside it as PDF, without dates."""
+    """Write a figure as PNG and PDF, without dates, so that files are reproducible."""
     with written_whole(output) as scratch:
         save_png(drawn, scratch)
     with written_whole(output.with_suffix(".pdf")) as scratch, _glyphs_alone():
@@ -94,15 +94,15 @@ def save(drawn: Figure, output: Path) -> None:
 
 
 def save_png(drawn: Figure, output: Path | BinaryIO) -> None:
-    """Write a figure as PNG, and leave it laid out for other kinds."""
+    """Write a figure as PNG, and fix its layout for other formats."""
     lay_out(drawn, mpl.rcParams["savefig.dpi"])
     drawn.savefig(output, format="png", metadata={"Software": None})
 
 
 def lay_out(drawn: Figure, dots_per_inch: float) -> None:
-    """Label a figure and lay it out, once: a second layout would be another one.
+    """Replace tick formatters and run the layout engine once.
 
-    Each `savefig` would draw once more than it has to, for the layout.
+    Otherwise each `savefig` would draw twice, and a second layout would differ.
     """
     label_plainly(drawn)
     drawn.set_dpi(dots_per_inch)
@@ -113,9 +113,9 @@ def lay_out(drawn: Figure, dots_per_inch: float) -> None:
 
 @contextmanager
 def _glyphs_alone() -> Iterator[None]:
-    """Cut fonts down to their glyphs: in a PDF these are in place, and no table lays text out.
+    """Make Matplotlib skip font tables that are for text layout, since a PDF has placed glyphs.
 
-    To read those tables, and to cut them down, too, would take a quarter of a figure's time.
+    Parsing and subsetting those tables would take a quarter of a figure's time.
     """
     before = subset.load_font
 
@@ -133,7 +133,7 @@ def _glyphs_alone() -> Iterator[None]:
 
 
 def panel(axes: Axes, letter: str, title: str, most_letters: int = 34) -> None:
-    """Label a panel; a title too long for it is cut."""
+    """Label a panel, cutting a title that is too long."""
     short = title if len(title) <= most_letters else f"{title[: most_letters - 1]}…"
     place = axes.set_title(f"     {short}", fontsize=_PANEL_SIZE).get_transform()
     axes.text(0, 1, letter, transform=place, fontsize=_PANEL_SIZE, fontweight="bold")

@@ -1,4 +1,4 @@
-"""Figure 3: the torque that the comb drives exert, and the voltage it takes."""
+"""Figure 3: torque and voltage of the comb drives over time."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose protocol, comb drives and gripper."""
+    """Return protocol, comb drive and gripper."""
     return Settings(study.phases, study.actuator, study.gripper, study.jaw_gap_m)
 
 
@@ -39,7 +39,7 @@ def draw(settings: Settings) -> Figure:
     """Draw torque and voltage of both arms against time."""
     comb = settings.actuator
     history = torque_history(settings.phases)
-    # Both sides of every jump, and enough points for ramps and sinusoids.
+    # Include both sides of every jump, and enough points for ramps and sinusoids.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
     arms = [np.maximum(torque_at(history, time_s, arm), 0) for arm in ("left", "right")]
@@ -68,7 +68,7 @@ def draw(settings: Settings) -> Figure:
 
 
 def _touching(settings: Settings) -> Iterator[tuple[float, str, str]]:
-    """Torques that hold the jaws at a sample: none as the paper counts, and of the extremes."""
+    """Yield torques that hold the jaws at the extreme sample sizes, and zero, as in the paper."""
     for size_m, colour in ((SMALLEST_M, PURPLE), (LARGEST_M, GREEN)):
         try:
             found = contact(settings.gripper, settings.jaw_gap_m, settings.actuator, size_m)
@@ -88,7 +88,7 @@ def _line(
     colour: str,
     label: str,
 ) -> None:
-    """Draw what both arms have, and write down what is held."""
+    """Draw the values of both arms, and annotate held values."""
     left, right = arms
     axes.plot(time_s, left, color=colour, linewidth=1.4, label=label)
     if not np.array_equal(left, right):

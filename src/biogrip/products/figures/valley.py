@@ -1,4 +1,4 @@
-"""The valley of c against c_p, along which they trade against each other."""
+"""Chi-squared over c and c_p, whose valley shows that only their sum is determined."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,16 +23,16 @@ from biogrip.products.product import JUDGEMENT, the
 from biogrip.study.study import Case, Study
 
 _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
-# Axes show the valley up to this rise, and around it this share of what they show; they end at
-# this multiple of the sum, and are as long as this one at least.
+# Increase of chi^2 up to which axes show the valley; margin as a share of what they show; largest
+# end and least length of an axis as multiples of the sum c + c_p.
 _DEEP, _AROUND, _FARTHEST, _LEAST = 10.83, 0.12, 1.15, 0.02
 
-# The layout would make room at the origin for a name without points.
+# Not in layout: it would reserve room for labels of points.
 _POINTS: dict[str, Any] = {"linestyle": "", "clip_on": False, "in_layout": False}
 _FITS = _POINTS | {
     "color": FITTED, "marker": "o", "markersize": 2.5, "markeredgewidth": 0, "alpha": 0.8
 }  # fmt: skip
-# Open, and below the truth, which it may coincide with.
+# Open markers below the truth, since both may coincide.
 _THE_PAPERS = _POINTS | {
     "color": PAPER, "marker": "D", "markersize": 6, "markerfacecolor": "none",
     "markeredgewidth": 1.4, "zorder": 4,
@@ -45,16 +45,16 @@ _TRUE = _POINTS | {
 
 @dataclass(frozen=True)
 class Settings:
-    """How a case's valley is drawn.
+    """Settings of a case's valley figure.
 
     Parameters
     ----------
     title
-        The case in print.
+        Title of the case.
     method
-        Whose fits are shown in it.
+        Method whose fits are drawn.
     parameters, identified
-        True values, and the paper's, by name; none if they are unknown.
+        True values and the paper's, by name; empty if unknown.
     """
 
     title: str
@@ -64,18 +64,18 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the valley of a case depends on."""
+    """Return the settings that the valley of a case depends on."""
     method = "least_squares" if "least_squares" in study.methods else study.shown
     return Settings(case.title, method, case.parameters, case.published.identified)
 
 
 def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
-    """Draw the rise of chi-squared over two exchangeable dampers of a case.
+    """Draw the increase of chi-squared over the two exchangeable dampers of a case.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     measured, identifications
         Verdicts with a valley, JSON, and identifications, CSV, of the case.
     """
@@ -88,7 +88,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
     shown = []
     for grid in valley["grids"]:
-        # The square root of the rise is nearly straight, so that is what is interpolated.
+        # The root of the increase is nearly linear, so interpolate that.
         roots = np.sqrt(np.maximum(np.array(grid["rises"], dtype=float), 0.0))
         filled = axes.contourf(
             grid["x_values"],
@@ -133,7 +133,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
 
 
 def _window(places: Array, total: float) -> tuple[Array, Array]:
-    """Lower and upper ends of both axes around places, (n, 2), as far as the axes may go."""
+    """Return lower and upper ends of both axes around places, (n, 2), within bounds."""
     places = np.minimum(places, _FARTHEST * total)
     low, high = places.min(axis=0), places.max(axis=0)
     around = np.maximum(_AROUND * (high - low), (_LEAST * total - (high - low)) / 2)
@@ -141,7 +141,7 @@ def _window(places: Array, total: float) -> tuple[Array, Array]:
 
 
 def _points(axes: Axes, points: Array, ends: Array, style: dict[str, Any], label: str) -> None:
-    """Draw points, and triangles on the edge for those beyond the axes."""
+    """Draw points, with triangles at the edge for points beyond the axes."""
     right, above = (points > ends).T
     inside = ~right & ~above
     axes.plot(*points[inside].T, **style, label=label)

@@ -1,4 +1,4 @@
-"""Waterfall: how far above the global optimum each method ends, seed by seed."""
+"""Waterfall plot: sorted increase of chi-squared over the global optimum, by method."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,16 +20,16 @@ _LOWEST = 1e-3
 
 @dataclass(frozen=True)
 class Settings:
-    """How a case's waterfall is drawn.
+    """Settings of a case's waterfall plot.
 
     Parameters
     ----------
     title
-        The case in print.
+        Title of the case.
     samples
-        Samples in a trace.
+        Number of samples in a trace.
     optimum_tolerance, near_noise_tolerance
-        What counts as the optimum, and as near the noise.
+        Tolerances of the global optimum and of the noise.
     """
 
     title: str
@@ -39,20 +39,20 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the waterfall of a case depends on."""
+    """Return the settings that the waterfall of a case depends on."""
     tolerances = study.optimum_tolerance, study.near_noise_tolerance
     return Settings(case.title, case.samples, *tolerances)
 
 
 def draw(settings: Settings, identifications: Path) -> Figure:
-    """Draw every method's rises of chi-squared over the lowest known, sorted.
+    """Draw the sorted increases of chi-squared over the lowest known, for every method.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     identifications
-        Of the case, CSV.
+        Files of the case, CSV.
     """
     found = read_identifications(identifications)
     rise = np.maximum(chi_square_rise(found, settings.samples), _LOWEST)
@@ -61,7 +61,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     axes = drawn.subplots()
     methods = found["method"].unique()
     curves = []
-    # Where curves coincide each is seen beside the thinner ones on top of it.
+    # Decreasing widths keep coinciding curves visible.
     for method, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         mine = np.sort(rise[found["method"] == method])
         share = 100 * np.mean(mine <= tolerance)
@@ -69,7 +69,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
         label = f"{METHODS[method].title}: {share:.0f} %"
         curves += axes.plot(place, mine, label=label, linewidth=width, **METHOD_STYLES[method])
     near = settings.samples * ((1 + settings.near_noise_tolerance) ** 2 - 1)
-    # Named in the legend, for a curve may pass anywhere along them.
+    # Limits are named in the legend, since a curve may cover any place along them.
     words = near_noise_words(settings.near_noise_tolerance)
     line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
     limits = [
@@ -85,7 +85,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     axes.set_xlabel("seeds, sorted (%)")
     axes.set_ylabel("Δχ² over the lowest known")
     axes.set_title(f"{settings.title}: share at the global optimum")
-    # One limit below each column of methods, whose names would be too wide otherwise.
+    # Each legend column ends with a limit; a third column would be too wide.
     half = -(-len(curves) // 2)
     handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
     drawn.legend(handles=handles, loc="outside lower center", ncols=2, columnspacing=1.0)
@@ -95,8 +95,8 @@ def draw(settings: Settings, identifications: Path) -> Figure:
 WATERFALL = drawing(
     draw,
     name="waterfall",
-    caption="How far above the global optimum each method ends, seed by seed, sorted. Dashed: what "
-    "counts as the optimum; dotted: the study's tolerance above the noise, which is much more.",
+    caption="Increase of χ² over the global optimum at the end of each method, sorted over seeds. "
+    "Dashed: tolerance of the optimum; dotted: the study's much larger tolerance of the noise.",
     settings=settings,
     reads={"identifications": the(PATH)},
     cases=lambda study: study.simulated,

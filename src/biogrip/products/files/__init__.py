@@ -1,1 +1,1 @@
-"""The files of the results: each kind has one place with its path, columns, reader and writer."""
+"""File formats of the results: path, columns, reader and writer of each."""

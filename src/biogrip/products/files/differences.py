@@ -1,4 +1,4 @@
-"""How far the linear model is from the nonlinear one: a row per case, angle and torque."""
+"""Difference of the linear from the nonlinear model: a row per case, angle and torque."""
 
 from biogrip.products.files.rows import RowFile
 

@@ -1,4 +1,4 @@
-"""What was identified, how it was found, and what it took: a row a seed, method by method."""
+"""Identified parameters, histories and processor times: a row per seed and method."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from biogrip.products.files.rows import RowFile, read_frame, write_rows
 if TYPE_CHECKING:
     import pandas as pd
 
-# Fewer than those in which two processors' ways to an optimum differ.
+# Few enough that results on different processors agree.
 _DIGITS = 8
 
 PATH = "results/identifications/{case}.csv"
@@ -32,17 +32,17 @@ TIMINGS = RowFile(
     "results/timings/{case}.csv",
     "results/timings/{case}/{method}/{batch}.csv",
 )
-"""Processor time of each seed, apart from what is compared."""
+"""Processor time of each seed, in a file of its own since times are not reproducible."""
 
 LEADING = ("case", "method", "seed")
 TRAILING = ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason")
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
-    """Parameters that a file of identifications has columns for.
+    """Return the parameters that have columns in a file of identifications.
 
-    The paper's four wherever they cover the model, elements that it lacks being
-    zero, so that such files can be put together; else the model's own.
+    They are the paper's four if these cover the model, with 0 for missing elements, so that
+    files can be concatenated. Otherwise they are the model's own.
     """
     return (
         SINGLE_BRANCH if set(model.names) <= {p.name for p in SINGLE_BRANCH} else model.parameters
@@ -50,29 +50,29 @@ def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
 
 
 def columns(model: SampleModel) -> tuple[str, ...]:
-    """Columns of a file of identifications."""
+    """Return the columns of a file of identifications."""
     return (*LEADING, *(p.column for p in parameters_in_file(model)), *TRAILING)
 
 
 @dataclass(frozen=True)
 class Record:
-    """One identification and whose it is.
+    """One identification, with case, method and seed.
 
     Parameters
     ----------
     case, method
-        Whose it is.
+        Names of the case and of the method.
     model, searched, fixed
-        Sample model; the same without the parameters that were not identified;
-        and those, by name.
+        Sample model, the same without fixed parameters, and values of fixed parameters
+        by name.
     seed
-        Of which trace.
+        Seed of the trace.
     answer
-        What came out.
+        Result of the method.
     noise_rms_rad
-        RMS of the noise that the trace really contains; None if nobody knows.
+        RMS of the noise in the trace; None for a recorded trace.
     cpu_s
-        Processor time that it took; its share of those identified side by side with it.
+        Processor time in seconds; the mean over seeds that are identified together.
     """
 
     case: str
@@ -87,16 +87,16 @@ class Record:
 
 
 def write_identifications(path: Path, records: list[Record]) -> None:
-    """Write one row a seed as CSV; elements that the model lacks are 0.
+    """Write one row per seed as CSV; elements that the model lacks are 0.
 
-    Six significant digits are more than any trace determines, and fewer than those
-    in which two processors' optima differ.
+    Numbers have six significant digits: more than a trace determines, and few enough that
+    results on different processors agree.
     """
     write_rows(path, columns(records[0].model), map(_row, records))
 
 
 def write_histories(path: Path, records: list[Record]) -> None:
-    """Write one row a seed and generation as Parquet, its numbers to eight significant digits."""
+    """Write one row per seed and generation as Parquet, with eight significant digits."""
     write_tables(path, [_history(record) for record in records])
 
 
@@ -106,12 +106,12 @@ def write_timings(path: Path, records: list[Record]) -> None:
 
 
 def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame":
-    """Read a file of identifications, all of them or one method's.
+    """Read identifications by all methods or by one.
 
     Raises
     ------
     BiogripError
-        If it is missing or is not one.
+        If the file is missing or invalid, or has no row of the method.
     """
     frame = read_frame(path, "identifications", (*LEADING, *TRAILING))
     if method is None:
@@ -139,7 +139,7 @@ def _row(record: Record) -> tuple[str | int, ...]:
 
 
 def _by_name(record: Record, identified: Array) -> dict[str, Any]:
-    """Identified and fixed values by parameter name."""
+    """Return identified and fixed values by parameter name."""
     return {**record.fixed, **dict(zip(record.searched.names, identified, strict=True))}
 
 

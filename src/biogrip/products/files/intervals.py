@@ -1,8 +1,8 @@
 """Estimates with intervals: a row per quantity and seed.
 
-Of quantities that traces should determine an estimate and its limits, and the estimate with
-the rest known. Of every so many seeds, and there of all quantities, verdict and limits as shown
-to users, which come from whole profiles.
+Quantities that traces should determine have an estimate, its limits, and the estimate with
+uninformed parameters fixed at their true values. For some seeds, all quantities also have the
+verdict and limits that users are shown, from whole profiles.
 """
 
 from biogrip.products.files.rows import RowFile

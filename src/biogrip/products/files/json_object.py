@@ -1,4 +1,4 @@
-"""What is said of a case, as JSON, read with its keys checked."""
+"""Reader of JSON results that checks for required keys."""
 
 import json
 from collections.abc import Set
@@ -9,23 +9,23 @@ from biogrip.errors import BiogripError
 
 
 def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object.
+    """Read a JSON object, checking for required keys.
 
     Parameters
     ----------
     path
         The file.
     kind
-        What it should be, in words.
+        Content of the file, for messages.
     keys
-        Those that it must have.
+        Required keys.
     lacking
-        What is said of one without them.
+        Message if one is missing.
 
     Raises
     ------
     BiogripError
-        If it is missing or is not one.
+        If the file is missing or invalid.
     """
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))

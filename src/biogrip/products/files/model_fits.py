@@ -1,4 +1,4 @@
-"""How well each sample model fits: a row per model and seed."""
+"""Misfit of each sample model: a row per model and seed."""
 
 from biogrip.products.files.rows import RowFile
 

@@ -1,7 +1,7 @@
-"""Columns of numbers and words as Parquet files.
+"""Parquet files with columns of numbers and text.
 
-Arrays come from and go to Arrow as the memory they are. Its own conversions load
-pandas first, which takes longer than all else that a short job does.
+Arrays share memory with Arrow: Arrow's own conversions import pandas first, which takes longer
+than everything else in a short job.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +20,7 @@ Table: TypeAlias = pa.Table
 
 
 def table_of(columns: Mapping[str, NDArray[Any] | str], rows: int) -> Table:
-    """Make a table of numbers, (rows,) each, and of words that are the same in every row."""
+    """Return a table of numbers, (rows,) each, and of text that is the same in every row."""
     return pa.table(
         {
             name: _words(values, rows) if isinstance(values, str) else _numbers(values)
@@ -30,23 +30,23 @@ def table_of(columns: Mapping[str, NDArray[Any] | str], rows: int) -> Table:
 
 
 def write_tables(path: Path, tables: Sequence[Table], *, dictionary: bool = True) -> None:
-    """Write tables of the same columns one below the other.
+    """Write tables with equal columns to one file, one after another.
 
     Parameters
     ----------
     path
         The file.
     tables
-        From `table_of`.
+        Tables made by `table_of`.
     dictionary
-        Whether values that come again are written once; noise never comes again.
+        If true, use dictionary encoding, which pays for repeated values, not for noise.
     """
     with written_whole(path) as scratch:
         pq.write_table(pa.concat_tables(tables), scratch, use_dictionary=dictionary)
 
 
 def column_names(path: Path) -> list[str]:
-    """Names of the columns of a file.
+    """Return the column names of a file.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def column_names(path: Path) -> list[str]:
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Read some columns of numbers.
+    """Read columns of numbers.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
             name: np.concatenate([_values(chunk) for chunk in table[name].chunks]) for name in names
         }
     except (OSError, TypeError, ValueError) as error:
-        # Arrow's own errors are of these types, too.
+        # Arrow's exceptions are subclasses of these.
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
 
 

@@ -1,4 +1,4 @@
-"""A posterior as files: what is said of it as JSON, its samples as Parquet."""
+"""Files of a posterior: summary as JSON, samples as Parquet."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,7 +23,7 @@ SAMPLES = "results/posterior/{case}.parquet"
 _MOST_ROWS = 10_000
 
 Limits = Mapping[str, tuple[float | None, float | None]]
-"""Limits of profile likelihoods by quantity."""
+"""Confidence limits from profile likelihoods by quantity; None at an open end."""
 
 
 def posterior_data(
@@ -32,7 +32,7 @@ def posterior_data(
     marginals: Sequence["Marginal"],
     found: Limits,
 ) -> dict[str, Any]:
-    """Return what is said of a posterior as dictionaries, lists, text and numbers in SI units."""
+    """Return the summary of a posterior as plain data in SI units."""
     steps, walkers, _ = samples.log_parameters.shape
     convergence = samples.convergence
     return {
@@ -69,24 +69,24 @@ def _quantity(own: "Marginal", low: float | None, high: float | None) -> dict[st
 
 
 def limits_in(verdicts: Mapping[str, Any]) -> Limits:
-    """Return the limits of profiles from what was said of a trace."""
+    """Return the limits of profile likelihoods from verdicts."""
     return {item["quantity"]: (item["low"], item["high"]) for item in verdicts["quantities"]}
 
 
 def read_posterior(path: Path) -> dict[str, Any]:
-    """Read what is said of a posterior.
+    """Read the summary of a posterior.
 
     Raises
     ------
     BiogripError
-        If it is missing or says nothing of one.
+        If the file is missing or invalid.
     """
     keys = {"quantities", "converged", "in_words"}
     return read_object(path, "a posterior", keys, "says nothing of a posterior")
 
 
 def thinned(log_parameters: Array) -> Array:
-    """Return some thousand samples, evenly chosen, of all walkers.
+    """Return some thousand samples, evenly spaced over the steps of all walkers.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def thinned(log_parameters: Array) -> Array:
 def write_samples(
     path: Path, model: SampleModel, log_parameters: Array, words: Mapping[str, str] | None = None
 ) -> None:
-    """Write samples (n, n_parameters) as Parquet, a column a parameter in SI units, and words."""
+    """Write samples (n, n_parameters) as Parquet, a column per parameter in SI units, and text."""
     values = np.exp(log_parameters)
     columns: dict[str, Array | str] = {
         p.column: values[:, index] for index, p in enumerate(model.parameters)

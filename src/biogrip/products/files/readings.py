@@ -1,4 +1,4 @@
-"""What the genetic algorithm finds under readings of the paper: a row per reading and seed."""
+"""Identifications by the genetic algorithm under readings of the paper: a row per reading, seed."""
 
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.products.files.rows import RowFile

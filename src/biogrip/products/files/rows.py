@@ -1,4 +1,4 @@
-"""Files of rows: CSV with a header, written whole, and read with the message that fits."""
+"""CSV files with a header, written atomically and safe for spreadsheets."""
 
 import csv
 import re
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# What a spreadsheet computes as a formula, and what we have written of it.
+# A cell that a spreadsheet takes for a formula, and signed numbers, which it does not.
 _FORMULA = re.compile(r"'*[=+@\t\r-]")
 _SIGNED = re.compile(r"[+-]\d+(\.\d+)?(e[+-]?\d+)?|-(inf)?")
 
@@ -24,20 +24,20 @@ _END = "\r\n"
 
 @dataclass(frozen=True)
 class RowFile:
-    """A kind of file.
+    """A kind of CSV file.
 
     Parameters
     ----------
     what
-        What its rows are, for messages.
+        Content of a row, for messages.
     columns
-        Their names.
+        Column names.
     path
-        Where a case's file is, or that of the study.
+        Path pattern of a case's file, or path of the study's.
     batch_path
-        Where those of its batches are, if it is put together from batches.
+        Path pattern of a batch's file, if a case's file is joined from batches.
     words
-        Columns that are text, whatever they look like.
+        Columns to read as text even if they look like numbers.
     """
 
     what: str
@@ -47,7 +47,7 @@ class RowFile:
     words: tuple[str, ...] = ()
 
     def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
-        """Write all rows, as they come."""
+        """Write a header and rows, consuming an iterator row by row."""
         write_rows(path, self.columns, rows)
 
     def read(self, path: Path) -> "pd.DataFrame":
@@ -62,10 +62,10 @@ class RowFile:
 
 
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Write a header and rows, as they come, so that no cell is a formula to a spreadsheet."""
+    """Write a header and rows, escaping text that a spreadsheet would take for a formula."""
     with (
         written_whole(path) as scratch,
-        # Of a file's name, bytes may be no text.
+        # File names may hold bytes that are not valid text.
         scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
     ):
         writer = csv.writer(_Lines(stream), lineterminator=_END)
@@ -74,7 +74,7 @@ def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]
 
 
 class _Lines:
-    """Ends lines as we do, where cells with an end of line, of whatever kind, are in quotes."""
+    """Stream wrapper that ends lines with LF, while line ends inside quoted cells are kept."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -85,12 +85,12 @@ class _Lines:
 
 
 def inert(text: str) -> str:
-    """Return text that a spreadsheet takes for no formula, numbers with a sign as they are."""
+    """Return text that a spreadsheet takes for no formula; signed numbers stay as they are."""
     return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
 
 
 def as_it_was(cell: Any) -> Any:
-    """Return the text of which `inert` has made another, and what is no text as it is."""
+    """Undo `inert`; anything else is returned unchanged."""
     ours = isinstance(cell, str) and cell[:1] == "'" and _FORMULA.match(cell)
     return cell[1:] if ours else cell
 
@@ -98,18 +98,18 @@ def as_it_was(cell: Any) -> Any:
 def read_frame(
     path: Path, what: str, columns: Sequence[str], words: Sequence[str] = ()
 ) -> "pd.DataFrame":
-    """Read rows that have some columns at least.
+    """Read rows that have at least the given columns.
 
     Parameters
     ----------
     path
-        The file, CSV.
+        The CSV file.
     what
-        What it should hold, for messages.
+        Content of the file, for messages.
     columns
-        What its rows must have.
+        Required columns.
     words
-        Columns that are text, whatever they look like.
+        Columns to read as text even if they look like numbers.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def read_rows(path: Path, wanted: Sequence[str] | None = None) -> list[list[str]
     Raises
     ------
     BiogripError
-        If the file cannot be read, or its header is not the wanted one.
+        If the file cannot be read, or its header is not `wanted`.
     """
     try:
         with path.open(encoding="utf-8", newline="") as stream:

@@ -1,7 +1,7 @@
 """Sequences of experiments with a simulated cell: a row per way, number of experiments, quantity.
 
-Best fit and limits of all traces so far together; whether a fit that starts at the truth goes
-deeper; and whether the jaws have pressed the cell throughout.
+A row has the best fit and limits from all traces so far together, 1 if a fit started at the truth
+has a lower chi^2 (missed), and 1 if the jaws pressed the cell throughout.
 """
 
 from biogrip.products.files.rows import RowFile

@@ -1,4 +1,4 @@
-"""Targets and measurements as files."""
+"""Files of targets and measurements."""
 
 import math
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
-# Before a seed's number, of its column.
+# Prefix of a seed's column.
 _SEED = "seed_"
 _READ_AT_ONCE = 50
 _DIGITS = 9
@@ -35,11 +35,11 @@ class Measurements:
     time_s : (n_samples,)
         Sampling instants, ascending.
     target_rad : (n_samples,) or None
-        The trace without noise; nobody knows it of a recording.
+        Trace without noise; None for a recorded trace.
     rotation_rad
-        The noisy trace of each seed, (n_samples,) each.
+        Noisy trace of each seed, (n_samples,) each.
     gaps
-        Rows of a recording that hold no number, and were left out.
+        Number of rows of a recording that were left out for want of a number.
     """
 
     time_s: Array
@@ -53,9 +53,9 @@ def write_target(
 ) -> None:
     """Write a noise-free trace as CSV.
 
-    The rotation is written to nine significant digits: fewer than those in which
-    two processors differ, more than any instrument gives. So is the force, of its
-    largest value: where it passes zero, what is left is rounding.
+    Numbers have nine significant digits: more than any instrument gives, and few enough that
+    results on different processors agree. The force has these digits of its largest value, since
+    values near its zeros are rounding errors.
     """
     largest = float(np.max(np.abs(jaw_force_N)))
     digit = 10.0 ** (math.floor(math.log10(largest)) + 1 - _DIGITS) if largest else 1.0
@@ -69,7 +69,7 @@ def write_target(
 
 
 def as_written(rotation_rad: Array) -> Array:
-    """Return a rotation to the digits of a target, as if it had been written and read."""
+    """Return a rotation rounded like a target that was written and read."""
     return np.array([float(_WRITTEN.format(value)) for value in rotation_rad])
 
 
@@ -79,7 +79,7 @@ def read_target(path: Path) -> tuple[Array, Array, Array]:
     Raises
     ------
     BiogripError
-        If the file is missing, is no target, or holds what is no finite number.
+        If the file is missing, is no target, or holds a number that is not finite.
     """
     time_s, torque, rotation, _ = _target_columns(path)
     return time_s, torque, rotation
@@ -91,7 +91,7 @@ def read_jaw_force(path: Path) -> tuple[Array, Array, Array]:
     Raises
     ------
     BiogripError
-        As of `read_target`.
+        Errors of `read_target`.
     """
     time_s, torque, _, force = _target_columns(path)
     return time_s, torque, force
@@ -134,7 +134,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
 
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
-    """Read noisy traces, of all seeds or of some.
+    """Read noisy traces of all or of given seeds.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
 
 
 def seeds_in(path: Path) -> list[int]:
-    """Seeds whose noisy traces a file of `write_measurements` holds.
+    """Return the seeds whose noisy traces are in a file of `write_measurements`.
 
     Raises
     ------
@@ -162,12 +162,12 @@ def seeds_in(path: Path) -> list[int]:
 
 
 def each_trace(path: Path) -> Iterator[Array]:
-    """Noisy traces of a file one after the other, (n_samples,) each; some are read at once.
+    """Yield the noisy traces in a file, (n_samples,) each, reading some at once.
 
     Raises
     ------
     BiogripError
-        If it is damaged.
+        If the file is damaged.
     """
     seeds = seeds_in(path)
     for start in range(0, len(seeds), _READ_AT_ONCE):
@@ -177,6 +177,6 @@ def each_trace(path: Path) -> Iterator[Array]:
 
 
 def write_single_trace(path: Path, time_s: Array, rotation_rad: Array) -> None:
-    """Write one noisy trace as CSV, in the form in which recorded traces are read."""
+    """Write one noisy trace as CSV in the format of recorded traces."""
     samples = zip(time_s, rotation_rad, strict=True)
     write_rows(path, ("time_s", "rotation_rad"), ((f"{t:.10g}", f"{x:.6e}") for t, x in samples))

@@ -1,4 +1,4 @@
-"""A diagnosis as plain data, for JSON files and whatever reads them."""
+"""Diagnoses as plain data and JSON files."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,13 +17,13 @@ EXPECTED = "results/identifiability/expected/{case}.json"
 
 
 def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return a diagnosis as dictionaries, lists, text and rounded numbers in SI units."""
+    """Return a diagnosis as plain data in SI units, rounded."""
     data: dict[str, Any] = rounded_numbers(exact_data(diagnosis))
     return data
 
 
 def exact_data(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return what `diagnosis_data` does, with all digits but of rises: to be rounded once."""
+    """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded."""
     likelihood = diagnosis.likelihood
     return {
         "samples": likelihood.problem.residuals.samples,
@@ -51,13 +51,13 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     Raises
     ------
     BiogripError
-        If it is missing or is not one.
+        If the file is missing or invalid.
     """
     return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 
 def told_from_zero(verdicts: dict[str, Any]) -> set[str]:
-    """Return the quantities that are not just bounded above, so that ratios to them mean much."""
+    """Return the quantities whose verdict is not just an upper bound."""
     return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
 
 

@@ -1,1 +1,1 @@
-"""Pages to read."""
+"""HTML pages of single cases."""

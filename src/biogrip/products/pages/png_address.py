@@ -1,8 +1,8 @@
-"""Pictures inside a page."""
+"""Data URLs of PNG images."""
 
 import base64
 
 
 def png_address(content: bytes) -> str:
-    """Return a PNG as an address that holds it (RFC 2397)."""
+    """Return a PNG as a data URL (RFC 2397)."""
     return "data:image/png;base64," + base64.b64encode(content).decode()

@@ -1,4 +1,4 @@
-"""What a trace tells on one page, with its figures inside."""
+"""Summary page of one trace: confidence limits, notes and figures, self-contained."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,16 +22,16 @@ _TEMPLATE = "summary.html.j2"
 
 @dataclass(frozen=True)
 class Settings:
-    """What the page says of the case.
+    """Names and template of a case's summary page.
 
     Parameters
     ----------
     case, title, model
-        Its name, and in print its name and its sample model.
+        Name of the case, its title, and title of its sample model.
     trace
-        Which trace.
+        Description of the trace.
     template
-        The page's own source.
+        Jinja template of the page.
     """
 
     case: str
@@ -42,7 +42,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the page of a case says."""
+    """Return names and template of a case's summary page."""
     case = study.case(job["case"])
     trace = case.file if case.recorded else f"seed {TRACE} of the simulated traces"
     template = Path(__file__).with_name(_TEMPLATE).read_text(encoding="utf-8")
@@ -57,11 +57,11 @@ def write(settings: Settings, verdicts: Path, figures: list[Path], page: Path) -
     settings
         The case.
     verdicts
-        Verdicts on its trace, JSON.
+        Verdicts on the judged trace, JSON.
     figures
         Figures to show, PNG.
     page
-        A page that needs nothing else, HTML.
+        Self-contained page, HTML.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def write(settings: Settings, verdicts: Path, figures: list[Path], page: Path) -
 
 
 def embedded(path: Path) -> str:
-    """Return a PNG as an address that holds it.
+    """Return a PNG file as a data URL.
 
     Raises
     ------
@@ -104,10 +104,10 @@ SUMMARY = Product(
     write,
     settings,
     lambda plan: wildcards_of(plan.study.cases),
-    message="Writing what a trace of {case} tells on one page",
+    message="Writing the summary page of {case}",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},
     sheet="case_figures",
     category="Summaries",
     item="summary",
-    caption="What one trace of this case tells, on one page.",
+    caption="Verdicts, notes and figures for one trace of this case.",
 )

@@ -1,4 +1,4 @@
-"""What the explorer in the page of a study works with: traces, fits, and what made them."""
+"""Data for the explorer in the report: traces, fits and models."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 MOST_SEEDS = 50
 MOST_BYTES = 3_000_000
-"""Of all traces in the page: it is to be read on a phone."""
+"""Bound on all traces in the report, so that phones can load it."""
 
 _NUMBER_BYTES = 4
 
@@ -37,15 +37,15 @@ class ExploredCase:
     Parameters
     ----------
     name, title
-        In files, and in print.
+        Name used in files, and title.
     parameters
-        True values by name, as far as there are any.
+        True values by name, if known.
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     noise
-        Noise on the rotation; None of a recorded trace.
+        Noise of the rotation; None for a recorded trace.
     nonlinear
-        Whether target or identification is nonlinear: the closed form is then an approximation.
+        True if target or identification is nonlinear: the closed form is then approximate.
     """
 
     name: str
@@ -56,7 +56,7 @@ class ExploredCase:
     nonlinear: bool
 
     def closed_form(self, time_s: Array, rotation_rad: Array, noise_rad: float) -> bool:
-        """Whether the page can compute responses: arms and torques are alike, and do not ring."""
+        """Return whether the page can compute responses: symmetric, and without ringing."""
         problem = self.problem
         alike = is_symmetric(problem.gripper, problem.torque)
         return alike and not problem.shows_inertia(time_s, rotation_rad, noise_rad)
@@ -64,7 +64,7 @@ class ExploredCase:
 
 @dataclass(frozen=True)
 class CaseFiles:
-    """Results of one case; see the fields of the same name of the files."""
+    """Result files of one case."""
 
     identifications: Path
     histories: Path
@@ -76,14 +76,14 @@ class CaseFiles:
 def explorer_data(
     cases: Sequence[ExploredCase], files: Sequence[CaseFiles], methods: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Return what the explorer is given, as plain data.
+    """Return the data for the explorer.
 
     Parameters
     ----------
     cases, files
-        The cases, and their results.
+        The cases, and their result files.
     methods
-        By which their traces were identified.
+        Methods of identification.
 
     Raises
     ------
@@ -145,9 +145,9 @@ def _case(
 
 
 def _elements(problem: CaseProblem) -> list[dict[str, Any]]:
-    """Elements of the network that the model has, and the logarithms of their search ranges.
+    """Return the network's elements, and log bounds of their search ranges.
 
-    None of a power-law sample: its branches are no parameters.
+    Empty for power-law models, whose branches are not parameters.
     """
     model, ranges = problem.model, problem.ranges
     if model.power_law:
@@ -203,12 +203,12 @@ def _method(
 
 
 def _words(model: SampleModel, row: Mapping[str, Any]) -> str:
-    """Parameters as the page says them."""
+    """Return identified parameters in words."""
     return ", ".join(f"{p.name} {row[p.column]:.3g} {p.unit}".rstrip() for p in model.parameters)
 
 
 def _history(rows: "pd.DataFrame | None") -> list[list[Any]]:
-    """Generations and the lowest misfit in them."""
+    """Return generations and the lowest misfit in each."""
     if rows is None or len(rows) < 2:
         return []
     best = [rounded(float(misfit)) for misfit in rows["best_misfit_rad"]]

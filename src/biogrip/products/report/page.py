@@ -1,4 +1,4 @@
-"""The page of the study: one file that needs nothing else, to read, print and explore."""
+"""The report of a study: one self-contained HTML file with tables, figures and an explorer."""
 
 import json
 import platform
@@ -32,7 +32,7 @@ from biogrip.study.typed import plain
 
 PAGE = "results/report.html"
 
-# What a page of at most 15 MB has left for pictures.
+# Characters left for images in a report of at most 15 MB.
 _MOST_PICTURE_LETTERS = 6_600_000
 _SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
@@ -46,20 +46,20 @@ _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure or table in the page.
+    """A figure or table in the report.
 
     Parameters
     ----------
     name, whose
-        Its name, and the case or sweep that it is of, if any.
+        Name of the product, and of its case or sweep, if any.
     caption
-        What it shows.
+        Caption.
     file
-        Where it stands among the results.
+        Path among the results.
     rule
-        The rule of the workflow that makes it.
+        Snakemake rule that makes it.
     command
-        What makes it again.
+        Command that makes it again.
     """
 
     name: str
@@ -72,20 +72,20 @@ class Entry:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the page is made of beside results.
+    """Content of the report, except results.
 
     Parameters
     ----------
     cases
-        What the explorer shows.
+        Cases of the explorer.
     methods
-        By which traces were identified; the one that is shown comes first.
+        Methods of identification; the shown one comes first.
     figures, tables
-        What else is in the page.
+        Other content of the report.
     config
         The whole config, YAML.
     sources
-        The page's own, by name.
+        Sources of the page, by file name.
     """
 
     cases: tuple[ExploredCase, ...]
@@ -97,7 +97,7 @@ class Settings:
 
 
 def settings(study: Study, _: Wildcards) -> Settings:
-    """Choose what the page shows."""
+    """Return the content of the report, except results."""
     plan = Plan(study, Path("results"))
     rules = _rules(plan)
     return Settings(
@@ -131,18 +131,18 @@ def write(
     calibrated: list[Path],
     page: Path,
 ) -> None:
-    """Write the page.
+    """Write the report.
 
     Parameters
     ----------
     settings
-        What it shows.
+        Content, except results.
     figures, tables
-        As PNG and HTML, in the order of the entries.
+        PNG and HTML files, in the order of the entries.
     identifications, histories, verdicts
-        Of all cases, in their order.
+        Files of all cases, in their order.
     measurements, calibrated
-        Of all cases; those of a case are told by their folder, and by their name.
+        Files of all cases; the case is told by folder or file name.
     page
         HTML.
 
@@ -179,7 +179,7 @@ def write(
         style=settings.sources["report.css"],
         scripts=[settings.sources[name] for name in _SOURCES[2:]],
         plotly=_plotly(),
-        # Within a script, no text of a case may end it.
+        # Prevent text of a case from closing the script element.
         data=json.dumps(data).replace("<", "\\u003c"),
         cases=[
             {"title": case.title, "recorded": case.noise is None, **read_verdicts(v)}
@@ -203,18 +203,18 @@ def write(
 
 
 def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildcards, str]]:
-    """Products of a category, their jobs, and the file of some kind of each."""
+    """Yield products of a category with their jobs and the shown file of each."""
     category, kind = kinds
     for product in products().values():
         for job in product.jobs(plan) if product.category == category else []:
             file = product.outputs(job)[kind]
-            # Times differ from run to run, and the page is not to.
+            # Skip processor times, since the report must be reproducible.
             if file.startswith(_FOLDERS):
                 yield product, job, file
 
 
 def _rules(plan: Plan) -> dict[tuple[Any, ...], str]:
-    """Which rule makes a product's job."""
+    """Return the rule of every job of every product."""
     return {
         (product.name, *job.items()): each.rule
         for each in together(products().values(), plan)
@@ -243,7 +243,7 @@ def _reads(kinds: tuple[str, str]) -> Reads:
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:
-    """Pictures within the page, as far as there is room."""
+    """Yield images as data URLs, None when there is no more room."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
         image = embedded(path)
@@ -252,7 +252,7 @@ def _images(paths: Sequence[Path]) -> Iterable[str | None]:
 
 
 def _table(path: Path) -> Markup:
-    """The table of a page that `biogrip.products.tables.layout` wrote, its text escaped there."""
+    """Return the table element of an HTML file written by `biogrip.products.tables.layout`."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -310,5 +310,5 @@ REPORT = Product(
     weight=Weight(10, 2000),
     category="Summaries",
     item="report",
-    caption="What came out, and what it means, on one page to read and to explore.",
+    caption="Results of the study with an interactive explorer, on one page.",
 )

@@ -1,1 +1,1 @@
-"""The stages of the study, each from files of the stage before to files of its own."""
+"""Stages of the study; each reads files of an earlier stage and writes its own."""

@@ -1,4 +1,4 @@
-"""The calibration that a case relies on, if it does."""
+"""Input of jobs that use a calibrated gripper."""
 
 from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.plan import Plan, Wildcards
@@ -6,7 +6,7 @@ from biogrip.products.product import Reads
 
 
 def calibration_of() -> Reads:
-    """Read the calibration of the job's case, where its gripper is to be a calibrated one."""
+    """Return the input with the calibration of the job's case; no file if it uses none."""
     return Reads(_files)
 
 

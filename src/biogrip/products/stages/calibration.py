@@ -1,4 +1,4 @@
-"""Stage 0: the gripper's arms from a test without sample, for identifications that rely on it."""
+"""Stage 0: calibration of the gripper's arms by a test without sample."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,7 +18,7 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """What a calibration is made of: the true gripper, and the test."""
+    """True gripper and calibration test of a case."""
 
     study_seed: int
     case: str
@@ -27,13 +27,13 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's calibration depends on."""
+    """Return the settings that a case's calibration depends on."""
     case = study.case(job["case"])
     return Settings(study.study_seed, case.name, case.gripper, case.calibration)
 
 
 def run(settings: Settings, gripper: Path, records: Path) -> None:
-    """Record both arms' free motion with noise, and identify them from it.
+    """Simulate both arms' free motion with noise, and identify their properties.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What users are shown of a trace, for some of the seeds that intervals are tested with."""
+"""Full verdicts, as users are shown them, for some seeds of the coverage test."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.multi_start import fit_from
 
 EVERY = 10
-"""A seed that is a multiple of this is judged in full: its whole profiles."""
+"""Seeds that are multiples of this get full verdicts, from whole profiles."""
 
 _MOST_RESTARTS = 3
 
@@ -27,17 +27,17 @@ class Shown:
 
 
 def judged_in_full(seed: int) -> bool:
-    """Whether a seed is, whatever its batch."""
+    """Return whether a seed gets a full verdict; it does not depend on the batch."""
     return seed % EVERY == 0
 
 
 def refitted(likelihood: Likelihood, deeper: np.ndarray, confidence: float) -> Likelihood | None:
-    """Fit again from where a trace's chi^2 was found to be below that of its optimum.
+    """Fit again, started at parameters whose chi^2 is below that of the optimum.
 
     Returns
     -------
     Likelihood or None
-        Of the deeper optimum; None if there is none.
+        Likelihood at the new optimum; None if chi^2 did not fall.
     """
     fit = fit_from([likelihood.problem], deeper)
     misfit_rad = float(fit.misfit_rad[0])
@@ -49,7 +49,7 @@ def refitted(likelihood: Likelihood, deeper: np.ndarray, confidence: float) -> L
 def shown_of(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], confidence: float
 ) -> Iterator[list[Shown]]:
-    """Judge traces as `diagnose` does, quantity by quantity; all at once where that is possible."""
+    """Yield verdicts on each trace, as `diagnose` gives them, for all quantities."""
     current = list(likelihoods)
     profiles = profiles_of(current, quantities, smooth=False)
     for _ in range(_MOST_RESTARTS):

@@ -1,4 +1,4 @@
-"""Stage 3: the sample's parameters from each noisy trace."""
+"""Stage 3: identification of the sample's parameters in each noisy trace."""
 
 import time
 from collections.abc import Sequence
@@ -29,16 +29,16 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """How a case is identified.
+    """Settings of the identification of a case by one method.
 
     Parameters
     ----------
     study_seed, case
-        Whose random streams.
+        Random streams derive from them.
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     method, of_method
-        The identifier and its settings.
+        Name of the method and its settings.
     """
 
     study_seed: int
@@ -49,7 +49,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the identification of a case by a method depends on."""
+    """Return the settings that the identification of a case by a method depends on."""
     case, method = study.case(job["case"]), job["method"]
     problem, of_method = case.problem.to_identify(), case.method(method)
     return Settings(study.study_seed, case.name, problem, method, of_method)
@@ -69,17 +69,17 @@ def identify(
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     seeds
-        The batch.
+        Seeds of the batch.
     measurements
         Noisy traces, Parquet.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     parameters, history
-        Identified parameters, CSV, and the way to them, Parquet.
+        Identified parameters, CSV, and histories, Parquet.
     timing
-        Processor times, CSV: of traces that are identified together, the mean.
+        Processor times, CSV; for traces identified together, the mean.
     """
     case, method = settings.case, settings.method
     posed = settings.problem.calibrated(calibrated)

@@ -1,4 +1,4 @@
-"""Stage 4: the batches of a case put together, a row per method and seed."""
+"""Stage 4: identifications of a case joined from batches, a row per method and seed."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,15 +24,15 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """What belongs together.
+    """Seeds, methods and sample model to join.
 
     Parameters
     ----------
     seeds, methods
-        How many seeds there are, and the methods in their order; batches may hold
-        more seeds, left from a larger study.
+        Number of seeds, and methods in order; batches may hold more seeds, of an earlier run with
+        more.
     sample
-        Decides what the columns are.
+        Sample model, which decides the columns.
     """
 
     seeds: int
@@ -41,7 +41,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what belongs to a case."""
+    """Return the seeds, methods and sample model of a case."""
     case = study.case(job["case"])
     return Settings(case.seeds, tuple(study.methods), case.sample)
 
@@ -58,16 +58,16 @@ def join(
     Parameters
     ----------
     settings
-        What belongs together.
+        Seeds, methods and sample model.
     batches, history_batches
         Files of the identification stage, in the order of methods and seeds.
     parameters, history
-        The same for the whole case.
+        Joined files of the case.
 
     Raises
     ------
     BiogripError
-        If a seed is missing or comes twice.
+        If a seed is missing or occurs twice.
     """
     header = columns(settings.sample.model)
     rows = [row for batch in batches for row in read_rows(batch, header)[1:]]
@@ -84,7 +84,7 @@ def join(
         schema = pq.read_schema(history_batches[0])
         with pq.ParquetWriter(scratch, schema) as joined:
             for batch in history_batches:
-                # Reading it as a data set would load pandas.
+                # The data set API would import pandas.
                 with pq.ParquetFile(batch) as file:
                     table = file.read()
                 joined.write_table(table.filter(pc.less(table["seed"], settings.seeds)))

@@ -1,4 +1,4 @@
-"""Stage 4: how often the intervals hold the truth, and how the estimates scatter."""
+"""Stage 4: estimates and intervals of many seeds, to test coverage and spread."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -33,28 +33,28 @@ from biogrip.products.stages.groups import groups
 from biogrip.progress import Progress
 from biogrip.study.study import Study
 
-# Digits of what is found, and of what is known to within less than a thousandth.
+# Significant digits, and those of values known to within a relative `_NARROW`.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
-# Local fits take less memory a seed than populations do, and the last of them come alone.
+# Local fits need less memory per seed than populations.
 _TIMES = 2
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What intervals are made of.
+    """Settings of the coverage test of a case.
 
     Parameters
     ----------
     study_seed, case
-        Whose random streams.
+        Random streams derive from them.
     problem, least_squares
-        What is identified, and by how many fits.
+        Assumptions of the identification, and settings of its fits.
     parameters
         True values by name, SI units.
     noise
-        What is added to the target.
+        Noise to add to the target.
     confidence
-        Of the intervals.
+        Confidence level of the intervals.
     """
 
     study_seed: int
@@ -67,7 +67,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's intervals depend on."""
+    """Return the settings that a case's intervals depend on."""
     case = study.case(job["case"])
     return Settings(
         study.study_seed,
@@ -88,27 +88,26 @@ def estimate(
     calibrated: list[Path],
     intervals: Path,
 ) -> None:
-    """Identify a batch of seeds by least squares, with intervals for what should be determined.
+    """Fit a batch of seeds by least squares, and compute intervals of determined quantities.
 
-    The noise of a seed is the same as in its measurement. A second estimate has
-    the parameters of which the trace carries no information at their true values,
-    as the Cramer-Rao bound has them. Every so many seeds are judged in full, as
-    users are shown it, see `judged_in_full`.
+    The noise of a seed is that of its measurement. A second estimate has parameters without
+    information fixed at their true values, as the Cramér-Rao bound assumes. Some seeds get a full
+    verdict as well, as users are shown it, see `judged_in_full`.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     seeds
-        The batch.
+        Seeds of the batch.
     target
-        A target, CSV.
+        Target, CSV.
     expected
-        Which quantities its traces should determine, JSON.
+        Expected verdicts, JSON, which name the quantities that traces should determine.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     intervals
-        A row per quantity and seed, CSV.
+        One row per quantity and seed, CSV.
     """
     posed = settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
@@ -119,7 +118,7 @@ def estimate(
 
 @dataclass(frozen=True)
 class _Quantities:
-    """All of them, and the indices of those that traces should determine."""
+    """All quantities, and indices of those that traces should determine."""
 
     every: list[Quantity]
     wanted: list[int]
@@ -137,7 +136,7 @@ def _rows(
     chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in wanted])
     rest_known, told, truth = _rest_known(settings, posed, time_s, rotation)
     progress = Progress(f"{settings.case}, intervals", len(seeds))
-    # As many groups together as hold enough seeds that are judged in full.
+    # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, EVERY):
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
@@ -162,7 +161,7 @@ def _rows(
 def _rest_known(
     settings: Settings, posed: CaseProblem, time_s: Array, rotation: Array
 ) -> tuple[SampleModel, IntArray, Array]:
-    """Model without the parameters that traces say nothing of, which it has, and the truth."""
+    """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
     truth = posed.logs(settings.parameters)
     _, sensitivity = posed.of(time_s, rotation).residuals(truth)
     spread = np.diag(covariance(sensitivity, standard_deviation(rotation, settings.noise)))
@@ -187,7 +186,7 @@ def _fitted(
     traces: list[Array],
     chosen: _Quantities,
 ) -> tuple[list[Likelihood], Array]:
-    """Optima of a group and their limits; where these lead deeper, both are found again."""
+    """Return optima of a group and their limits; refit where a profile has a lower chi^2."""
     rngs = [stream(settings.study_seed, settings.case, seed, "coverage") for seed in group]
     confidence = settings.confidence
     found = [
@@ -209,7 +208,7 @@ def _optima(
     traces: list[Array],
     rngs: Sequence[np.random.Generator],
 ) -> Iterator[tuple[Problem, Identification]]:
-    """Pose and identify traces, together where they share all but white noise."""
+    """Yield problems and fits of traces, fitted together if their noise is white."""
     if posed.plain:
         problems = [posed.of(time_s, trace) for trace in traces]
         identify = identifier("least_squares", settings.least_squares)
@@ -225,7 +224,7 @@ def _optima(
 
 
 def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:
-    """Estimate, limits and estimate with the rest known, of every quantity; some are empty."""
+    """Return estimate, limits and estimate with the rest fixed for every quantity, as text."""
     lines = [[_text(quantity.log(best), _DIGITS), "", "", ""] for quantity in chosen.every]
     for which, index in enumerate(chosen.wanted):
         quantity, (low, high) = chosen.every[index], limits[which]

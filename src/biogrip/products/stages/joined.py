@@ -1,4 +1,4 @@
-"""Stage 4: the rows of a case's batches in one file, for what needs no sorting out."""
+"""Stage 4: CSV files of a case joined from batches."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -18,11 +18,11 @@ def join(seeds: int, batches: list[Path], rows: Path) -> None:
     Parameters
     ----------
     seeds
-        How many there are; batches may hold more, left from a larger study.
+        Number of seeds; batches may hold more, of an earlier run with more.
     batches
         The files, in the order of their seeds.
     rows
-        The rows of these seeds under one header.
+        Joined file with the rows of these seeds.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def joined(
     cases: Callable[[Plan], Iterable[str]],
     seeds: Callable[[Case], int],
 ) -> Product:
-    """Declare the joining of a stage's batches."""
+    """Declare a product that joins the batches of a stage."""
     return Product(
         name,
         {"rows": kind.path},

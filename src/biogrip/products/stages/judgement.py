@@ -1,4 +1,4 @@
-"""Stage 4: what one trace of a case tells about its sample, and what it does not."""
+"""Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
 
 import json
 from collections.abc import Mapping
@@ -27,21 +27,21 @@ from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Case, Study
 
 TRACE = 0
-"""The seed whose trace is judged."""
+"""Seed of the trace that is judged."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a trace is judged.
+    """Settings of the judgement of a trace.
 
     Parameters
     ----------
     study_seed, case
-        Whose random streams.
+        Random streams derive from them.
     problem, least_squares
-        What is identified, and by how many fits.
+        Assumptions of the identification, and settings of its fits.
     confidence
-        Of the limits.
+        Confidence level of the limits.
     """
 
     study_seed: int
@@ -58,7 +58,7 @@ class Settings:
         seed: int,
         progress: Progress = silent,
     ) -> TraceFit:
-        """Identify a trace as all judgements do, by least squares."""
+        """Return the least-squares fit of a trace that its judgement is based on."""
 
         def find(problem: Problem) -> Identification:
             rng = stream(self.study_seed, self.case, seed, "identifiability")
@@ -69,18 +69,18 @@ class Settings:
 
 @dataclass(frozen=True)
 class ExpectedSettings:
-    """How a target is judged as if it had noise.
+    """Settings of the judgement of a target, as if it had noise.
 
     Parameters
     ----------
     case, problem
-        Whose it is, and what its identification would assume.
+        Name of the case, and assumptions of its identification.
     confidence
-        Of the limits.
+        Confidence level of the limits.
     parameters
         True values by name, SI units.
     noise
-        The noise.
+        Noise of the measurement.
     """
 
     case: str
@@ -91,31 +91,31 @@ class ExpectedSettings:
 
 
 def settings_of(study: Study, case: Case) -> Settings:
-    """Choose what the judgement of a case depends on."""
+    """Return the settings that the judgement of a case depends on."""
     fits = case.method("least_squares")
     return Settings(study.study_seed, case.name, case.problem, fits, case.confidence)
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the judgement of a case depends on."""
+    """Return the settings that the judgement of a case depends on."""
     chosen = settings_of(study, study.case(job["case"]))
     return replace(chosen, problem=chosen.problem.searched_for())
 
 
 def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
-    """Choose what the judgement of a target depends on."""
+    """Return the settings that the judgement of a target depends on."""
     case = study.case(job["case"])
     problem = case.problem.to_identify()
     return ExpectedSettings(case.name, problem, case.confidence, case.parameters, case.noise)
 
 
 def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
-    """Judge the trace of the first seed, identified by least squares.
+    """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     measurements
         Noisy traces, Parquet.
     calibrated
@@ -143,7 +143,7 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
 def _diagnosed(
     problem: Problem, posed: CaseProblem, found: Identification, confidence: float
 ) -> tuple[Diagnosis, dict[str, Any] | None]:
-    """Judge a trace, and once more if its valley leads deeper than its optimum."""
+    """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
     model, noise_rad = posed.searched, posed.noise_rad
     told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
     valley, deeper = valley_and_deeper(told.likelihood, model)
@@ -159,17 +159,17 @@ def _diagnosed(
 def expect(
     settings: ExpectedSettings, target: Path, calibrated: list[Path], verdicts: Path
 ) -> None:
-    """Judge the trace without noise as if it had the noise of the measurement.
+    """Write verdicts on the trace without noise, judged with the noise level of the measurement.
 
-    What such a trace determines, any trace of the case does but for its luck. A
-    measurement without noise has that of the digits in which a target is written.
+    They are what to expect of any trace of the case. Without noise, the rounding of the
+    target's digits takes its place.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     target
-        A target, CSV.
+        Target, CSV.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     verdicts
@@ -198,7 +198,7 @@ JUDGED = Product(
     judge,
     settings,
     lambda plan: wildcards_of(plan.study.cases),
-    message="Judging what the first trace of {case} tells",
+    message="Computing confidence limits for the first trace of {case}",
     reads={
         "measurements": Reads(
             lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
@@ -215,7 +215,7 @@ EXPECTATION = Product(
     expect,
     expected_settings,
     lambda plan: wildcards_of(plan.study.simulated),
-    message="Judging what traces of {case} should tell",
+    message="Computing expected confidence limits for {case}",
     reads={"target": the(TARGETS), "calibrated": calibration_of()},
     weight=JUDGEMENT,
 )

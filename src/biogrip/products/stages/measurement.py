@@ -1,4 +1,4 @@
-"""Stage 2: the response as an instrument records it, one noisy trace a seed."""
+"""Stage 2: noisy traces of a target, one per seed."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """What makes a case's noise."""
+    """Noise of a case, and the origin of its random streams."""
 
     study_seed: int
     case: str
@@ -28,12 +28,12 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's noise depends on."""
+    """Return the settings that a case's noise depends on."""
     return Settings(study.study_seed, job["case"], study.case(job["case"]).noise)
 
 
 def measure(settings: Settings, seeds: Iterable[int], target: Path, measurements: Path) -> None:
-    """Add the noise of a batch of seeds to a target, CSV, and write the traces, Parquet."""
+    """Add noise of each seed in a batch to a target, CSV, and write the traces, Parquet."""
     time_s, _, rotation = read_target(target)
     traces = {
         seed: add_noise(

@@ -1,4 +1,4 @@
-"""How far the linear model is from the nonlinear one, over angle and torque."""
+"""Difference of the linear from the nonlinear model, over angle and torque."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -22,14 +22,14 @@ FACTORS = np.geomspace(0.25, 32.0, 15)
 
 @dataclass(frozen=True)
 class Compared:
-    """A case of which the models are compared.
+    """A case for which the models are compared.
 
     Parameters
     ----------
     sample, parameters
-        The model, and true values in SI units by name.
+        Sample model, and true values in SI units by name.
     gripper, phases
-        With what, and under what.
+        Gripper and protocol.
     """
 
     sample: Sample
@@ -39,19 +39,19 @@ class Compared:
 
     @property
     def network(self) -> Network:
-        """The sample."""
+        """Network of the sample."""
         return self.sample.model.sample(self.parameters)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is compared, by name."""
+    """Cases to compare, by name."""
 
     cases: Mapping[str, Compared]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what is compared."""
+    """Return the simulated cases, by name."""
     cases = {name: study.cases[name] for name in study.simulated}
     return Settings(
         {
@@ -62,7 +62,7 @@ def settings(study: Study) -> Settings:
 
 
 def compare(settings: Settings, differences: Path) -> None:
-    """Compare the models on a grid; a row per case, angle and multiple of the torque, CSV."""
+    """Compare the models on a grid; write a row per case, angle and torque factor, CSV."""
     DIFFERENCES.write(differences, _rows(settings))
 
 
@@ -81,18 +81,18 @@ def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
 def difference_over_peak(
     gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array
 ) -> Array:
-    """Largest difference of the models over the protocol, as a share of the nonlinear peak.
+    """Return the largest difference of the models as a share of the nonlinear peak rotation.
 
     Parameters
     ----------
     gripper, network, torque
         The arms, n samples, the protocol.
     factors : (n,)
-        By which the torque on each is multiplied.
+        Factors of the torque, one per sample.
 
     Returns
     -------
-    (n,), NaN where the torque closes the arms beyond what the model describes.
+    (n,), NaN where the torque closes the arms beyond the model's validity.
     """
     time_s = _times(torque)
     found = correction(gripper, network, torque, FINE, factors)
@@ -104,7 +104,7 @@ def difference_over_peak(
 
 
 def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
-    """Return the same protocol with every torque multiplied."""
+    """Return the protocol with every torque multiplied by a factor."""
     return replace(
         torque,
         left=factor * torque.left,
@@ -115,7 +115,7 @@ def scaled(torque: TorqueHistory, factor: float) -> TorqueHistory:
 
 
 def _times(torque: TorqueHistory) -> Array:
-    """Times dense after every jump, and at its far end."""
+    """Return times that are dense after every jump and reach up to the next."""
     ends = np.append(torque.time_s[1:], torque.end_s)
     pieces = [
         start + np.geomspace(min(0.1, (end - start) / 2), end - start, 60)

@@ -1,4 +1,4 @@
-"""Stage 4: every trace fitted with every sample model, for the choice of the simplest adequate."""
+"""Stage 4: fits of every sample model to every trace, for model selection."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """What the fits of models depend on.
+    """Settings of the model fits of a case.
 
     Parameters
     ----------
     study_seed, case
-        Whose random streams.
+        Random streams derive from them.
     problem, least_squares
-        What is identified, but for the model, and by how many fits.
+        Assumptions of the identification except the model, and settings of the fits.
     models
         Names of the models, see `CANDIDATES`.
     """
@@ -43,7 +43,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the fits of a case depend on."""
+    """Return the settings that the fits of a case depend on."""
     case = study.case(job["case"])
     fits, models = case.method("least_squares"), study.models_of(case)
     assert isinstance(fits, LeastSquaresSettings)
@@ -63,15 +63,15 @@ def fit(
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     seeds
-        The batch.
+        Seeds of the batch.
     measurements
         Noisy traces, Parquet.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     fits
-        A row per model and seed, CSV.
+        One row per model and seed, CSV.
     """
     posed = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, list(seeds))

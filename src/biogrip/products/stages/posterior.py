@@ -1,4 +1,4 @@
-"""Stage 4: samples of the posterior of one trace of a case, and the evidence for models."""
+"""Stage 4: posterior samples of one trace of a case, and evidence of sample models."""
 
 import json
 from collections.abc import Callable
@@ -38,21 +38,21 @@ from biogrip.products.stages.calibrated import calibration_of
 from biogrip.products.stages.judgement import TRACE
 from biogrip.study.study import Case, Study
 
-# The sampler is loaded where something is sampled: that takes a second.
+# Imported lazily: the sampler takes a second to import.
 _SAMPLER = "biogrip.identifiability.sampling"
 _EVIDENCE = "biogrip.identifiability.evidence"
 
 
 @dataclass(frozen=True)
 class Settings(judgement.Settings):
-    """How a posterior is sampled, of the trace that is judged.
+    """Settings of posterior sampling for the judged trace.
 
     Parameters
     ----------
     posterior
         Prior, walkers and steps.
     models
-        Names of those whose evidence is compared, see `CANDIDATES`; none without.
+        Models whose evidence is compared, see `CANDIDATES`; empty for none.
     """
 
     posterior: PosteriorSettings
@@ -60,7 +60,7 @@ class Settings(judgement.Settings):
 
 
 def settings_of(study: Study, case: Case) -> Settings:
-    """Choose what the posterior of a case depends on."""
+    """Return the settings that the posterior of a case depends on."""
     assert case.posterior is not None
     compared = case.posterior.evidence and not case.fixed
     return Settings(
@@ -71,7 +71,7 @@ def settings_of(study: Study, case: Case) -> Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what the posterior of a case depends on."""
+    """Return the settings that the posterior of a case depends on."""
     return settings_of(study, study.case(job["case"]))
 
 
@@ -83,12 +83,12 @@ def sample(
     told: Path,
     samples: Path,
 ) -> None:
-    """Sample the posterior of the trace of the first seed.
+    """Sample the posterior of the trace of seed 0.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     measurements
         Noisy traces, Parquet.
     verdicts
@@ -96,9 +96,9 @@ def sample(
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
     told
-        What is said of the posterior, JSON.
+        Summary of the posterior, JSON.
     samples
-        Samples of the parameters, Parquet.
+        Posterior samples, Parquet.
     """
     posed = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
@@ -106,7 +106,7 @@ def sample(
     limits = limits_in(read_verdicts(verdicts))
     pose = partial(posed.of, time_s, trace)
     if not posed.plain:
-        # In the noise that the verdicts are told in.
+        # Use the noise model that the verdicts are based on.
         fit = settings.fit(posed, time_s, trace, TRACE)
         pose = partial(posed.for_model, fit.problem)
     data, drawn = posterior_of_trace(settings, posed, pose, limits, silent)
@@ -121,25 +121,25 @@ def posterior_of_trace(
     limits: Limits,
     progress: Progress,
 ) -> tuple[dict[str, Any], Array]:
-    """Sample the posterior of a trace, and the evidence of other models for it.
+    """Sample the posterior of a trace, and compute the evidence of other models.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     posed
-        What is assumed, calibrated if need be.
+        Assumptions of the identification, with a calibrated gripper if the case uses one.
     pose
-        Poses the trace, in its noise, for a sample model.
+        Function that returns the trace's fit problem for a sample model.
     limits
-        Of its profile likelihoods.
+        Limits of its profile likelihoods.
     progress
-        Is told of the evaluations.
+        Callback for progress.
 
     Returns
     -------
     data
-        What is said of it.
+        Summary of the posterior.
     log_parameters : (n, n_parameters)
         Some thousand samples.
     """
@@ -178,7 +178,7 @@ def _evidence(
     noise_rad: float | None,
     progress: Progress,
 ) -> list[dict[str, Any]]:
-    """Compare models by their evidence for a trace, beside AIC and BIC; a row each."""
+    """Return one row per model: evidence, AIC and BIC, as differences from the best."""
     if not settings.models:
         return []
     from biogrip.identifiability.evidence import evidence_of

@@ -1,4 +1,4 @@
-"""Stage 3: what the genetic algorithm finds under other readings of the paper."""
+"""Stage 3: identifications by the genetic algorithm under alternative readings of the paper."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,16 +25,16 @@ from biogrip.study.study import Case, Study
 
 @dataclass(frozen=True)
 class Reading:
-    """A case as a reading has it.
+    """Assumptions, genetic algorithm and noise of a case under one reading of the paper.
 
     Parameters
     ----------
     problem
-        What is identified.
+        Assumptions of the identification.
     genetic
-        How the population evolves.
+        Settings of the genetic algorithm.
     noise
-        What is added to the target.
+        Noise to add to the target.
     """
 
     problem: CaseProblem
@@ -44,14 +44,14 @@ class Reading:
 
 @dataclass(frozen=True)
 class Settings:
-    """What the readings of a case depend on.
+    """All readings of a case.
 
     Parameters
     ----------
     study_seed, case, seeds
-        Whose random streams, and how many.
+        Random streams derive from seed and name; the number of seeds.
     readings
-        By name.
+        Readings by name.
     """
 
     study_seed: int
@@ -61,26 +61,26 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's readings depend on."""
+    """Return the settings that a case's readings depend on."""
     name = job["case"]
     readings = {reading: _reading(cases[name]) for reading, cases in study.readings.items()}
     return Settings(study.study_seed, name, study.case(name).seeds, readings)
 
 
 def read(settings: Settings, target: Path, rows: Path) -> None:
-    """Identify every noisy trace of a case under every reading.
+    """Identify every noisy trace of a case under every reading by the genetic algorithm.
 
-    Noise and algorithm draw as in the study itself, so that a reading that changes
-    nothing finds what the study finds.
+    Random streams are those of the study, so a reading that changes nothing reproduces the
+    study's results.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     target
-        A target, CSV.
+        Target, CSV.
     rows
-        A row per reading and seed, CSV.
+        One row per reading and seed, CSV.
     """
     READINGS.write(rows, _rows(settings, target))
 
@@ -115,7 +115,7 @@ def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
 
 
 def _last_improvement(answer: Identification) -> int:
-    """Generation in which the best misfit fell for the last time."""
+    """Return the last generation in which the best misfit fell."""
     falls = np.flatnonzero(np.diff(answer.history.best_misfit) < 0)
     return int(falls[-1]) + 1 if len(falls) else 0
 
@@ -126,7 +126,7 @@ def _reading(case: Case) -> Reading:
 
 
 def read_cases(study: Study) -> list[str]:
-    """Cases that readings are tried on: simulated, and with the paper's parameters."""
+    """Return the simulated cases that readings apply to: their model has the paper's parameters."""
     ours = {parameter.name for parameter in SINGLE_BRANCH}
     names = study.simulated if study.readings else []
     return [name for name in names if set(study.case(name).sample.model.names) <= ours]

@@ -1,4 +1,4 @@
-"""Stage 2 for recorded traces: from the user's file to a measurement like the simulated ones."""
+"""Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,16 +19,16 @@ from biogrip.traces.recordings import Columns, place, read_recording
 
 @dataclass(frozen=True)
 class Settings:
-    """What a recorded trace is held against.
+    """Settings for reading and checking a recorded trace.
 
     Parameters
     ----------
     gripper
-        With what it was recorded.
+        Gripper that it was recorded with.
     problem
-        Under what, and what the instrument may have added.
+        Protocol and instrument, as assumed by the identification.
     columns
-        Where in its file it stands.
+        Columns of the file.
     """
 
     gripper: Gripper
@@ -37,12 +37,12 @@ class Settings:
 
 
 def settings_of(case: Case) -> Settings:
-    """Choose what a recorded case's trace is held against."""
+    """Return the settings for a recorded case."""
     return Settings(case.gripper, case.problem, case.columns)
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a recorded case's trace is held against."""
+    """Return the settings for the job's recorded case."""
     return settings_of(study.case(job["case"]))
 
 
@@ -61,7 +61,7 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
 
 
 def read_checked(settings: Settings, recorded: Path) -> Measurements:
-    """Read a recorded trace, and refuse what its gripper and protocol cannot have given."""
+    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
     trace, problem = read_recording(recorded, settings.columns), settings.problem
     if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
@@ -82,7 +82,7 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
 
 
 def notes_on_gaps(trace: Measurements) -> list[str]:
-    """Say how many rows of a recording were left out, if any were."""
+    """Return a note on rows of a recording that were left out, if any were."""
     samples = len(trace.time_s)
     if not trace.gaps:
         return []
@@ -91,12 +91,12 @@ def notes_on_gaps(trace: Measurements) -> list[str]:
 
 
 def check_traces(study: Study) -> None:
-    """Refuse recorded traces that cannot be used, before anything is made of any.
+    """Check all recorded traces before a run starts.
 
     Raises
     ------
     BiogripError
-        One message with a line for each of them.
+        One line for each trace that cannot be used.
     """
     problems = []
     for name in study.recorded:

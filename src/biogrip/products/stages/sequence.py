@@ -1,4 +1,4 @@
-"""One experiment after another with a simulated cell: each designed from those before, or not."""
+"""Sequences of experiments with a simulated cell, planned in four ways."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -33,36 +33,36 @@ from biogrip.study.asked_design import plausible_ends, wanted_of
 from biogrip.study.study import Case, Study
 
 REPEATED, AFTER, BEFOREHAND, TRUTH = WAYS = ("repeated", "after", "beforehand", "truth")
-"""The config's experiment again and again; that once, and then each designed after all before;
-one designed for the ranges, again and again; and one designed for the cell itself."""
+"""Ways: the config's experiment repeated; that once, then experiments each designed from all
+earlier traces; one designed for the ranges, repeated; one designed for the cell, repeated."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a sequence of experiments depends on.
+    """Settings of the sequences of one case.
 
     Parameters
     ----------
     study_seed, case
-        Whose random streams.
+        Random streams derive from them.
     problem
-        What is identified, with known noise; its protocol is the first one.
+        Assumptions of the identification, with known noise; its protocol is the first one.
     sampling
-        Of the first experiment.
+        Sampling of the first experiment.
     wanted
-        Designs, for the ranges.
+        Inputs of designs for the ranges.
     low, high
-        Logarithms between which cells lie.
+        Log bounds between which cells are drawn.
     within
-        Logarithms between which lies what traces do not tell.
+        Log bounds of the prior.
     tried, drawn
-        Torques that a search tries, and plausible samples that it is for.
+        Numbers of torques that a search tries, and of posterior samples it is for.
     least_squares
-        By how many fits the best is found.
+        Settings of the fits.
     confidence
-        Of the limits.
+        Confidence level of the limits.
     experiments
-        How many there are.
+        Number of experiments in a sequence.
     """
 
     study_seed: int
@@ -86,18 +86,18 @@ class Settings:
 
 
 def sequenced(study: Study) -> list[str]:
-    """Name the simulated cases of which sequences are asked for."""
+    """Return the simulated cases whose `design` block asks for sequences."""
     return [name for name in study.simulated if cells_of(study.cases[name])]
 
 
 def cells_of(case: Case) -> int:
-    """Return how many cells a case has, of which sequences are asked for."""
+    """Return the number of cells whose sequences are simulated."""
     asked = case.block.design
     return asked.sequence.cells if asked and asked.sequence else 0
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a cell's experiments depend on."""
+    """Return the settings that the sequences of a case depend on."""
     case = study.case(job["case"])
     asked = case.block.design
     assert asked is not None
@@ -124,23 +124,23 @@ def settings(study: Study, job: Wildcards) -> Settings:
 
 
 def sequence(settings: Settings, seed: int, rows: Path) -> None:
-    """Do experiments one after the other with a simulated cell, in every way.
+    """Simulate sequences of experiments with one cell, in all four ways.
 
     Parameters
     ----------
     settings
-        How.
+        Settings of the job.
     seed
-        Which cell.
+        Number of the cell.
     rows
-        What is known after each experiment, CSV.
+        Estimates and limits after each experiment, CSV.
     """
     SEQUENCES.write(rows, _Cell(settings, seed).rows())
 
 
 @dataclass(frozen=True)
 class _Known:
-    """What traces are told to be, together: their problem, its noise, and the best fit."""
+    """Joint fit problem of all traces so far, its noise, and the best fit."""
 
     problem: Problem
     noise_rad: float
@@ -149,7 +149,7 @@ class _Known:
 
 
 class _Cell:
-    """A simulated cell."""
+    """A simulated cell, whose sequences of experiments are simulated in four ways."""
 
     def __init__(self, settings: Settings, number: int) -> None:
         self._settings, self._number = settings, number
@@ -173,7 +173,7 @@ class _Cell:
             progress.done()
 
     def _repeated(self, way: str, experiment: Experiment) -> Iterator[_Known]:
-        """The same experiment again and again: of its traces the mean tells all they tell."""
+        """Yield results of one experiment repeated; the mean trace has all the information."""
         settings, total = self._settings, np.zeros(())
         for count in range(1, settings.experiments + 1):
             problem, time_s, trace = self._trace(way, count, experiment)
@@ -184,7 +184,7 @@ class _Cell:
             yield _Known(mean, noise_rad, np.log(found.parameters), found.misfit_rad)
 
     def _one_after_another(self, done: list[Experiment]) -> Iterator[_Known]:
-        """Each experiment, but the first, is designed after all before, and added to them."""
+        """Yield results of experiments each designed from all earlier ones, extending `done`."""
         settings = self._settings
         problems: list[Problem] = []
         told: Earlier | None = None
@@ -211,13 +211,13 @@ class _Cell:
     def _trace(
         self, way: str, count: int, experiment: Experiment
     ) -> tuple[CaseProblem, Array, Array]:
-        """Simulate a trace; the problem is that of its protocol."""
+        """Simulate a trace; return the fit problem's assumptions, times and rotation."""
         phases, sampling = experiment
         posed = replace(self._settings.problem, phases=phases)
         time_s = sampling.over(posed.torque.end_s)
         network = posed.searched.network(np.exp(self._truth)[None])
         clean = simulated_rotation(posed.gripper, network, posed.torque, time_s, nonlinear=False)
-        # Ways that begin with the same experiment begin with the same trace.
+        # The first trace is the same in all ways that start with the same experiment.
         rng = self._stream(f"{way if count > 1 else 'first'} {count}, noise")
         return posed, time_s, clean[0] + self._settings.noise_rad * rng.standard_normal(len(time_s))
 
@@ -254,7 +254,7 @@ class _Cell:
                 yield (*head, quantity.label, *numbers, missed, pressed)
 
     def _pressed(self, experiment: Experiment) -> bool:
-        """Whether the jaws press the cell throughout an experiment."""
+        """Return whether the jaws press the cell throughout an experiment."""
         wanted = replace(self._settings.wanted, parameters=np.exp(self._truth)[None])
         return presses(wanted, experiment[0])
 

@@ -1,4 +1,4 @@
-"""A single noisy trace as CSV, in the form in which recorded traces are read."""
+"""Export of a single noisy trace as CSV in the format of recorded traces."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from biogrip.products.product import Product, Reads
 
 
 def export(settings: None, seed: int, measurements: Path, trace: Path) -> None:
-    """Write the trace of one seed of some measurements, Parquet, as CSV."""
+    """Write the trace of one seed as CSV, from measurements in Parquet."""
     recorded = read_measurements(measurements, [seed])
     write_single_trace(trace, recorded.time_s, recorded.rotation_rad[seed])
 

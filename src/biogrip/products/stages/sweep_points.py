@@ -1,4 +1,4 @@
-"""How well a case is identified from point to point of a sweep."""
+"""Identification errors at every point of a sweep."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -36,7 +36,7 @@ POINTS = RowFile(
     words=("row", "column"),
 )
 
-# Logarithm of the factor, and number of bounds, within which a value is in the basin of the truth.
+# Log factor, and multiple of the bound, within which a value is in the basin of the truth.
 _FACTOR, _BOUNDS = math.log(2), 4.0
 
 
@@ -47,11 +47,11 @@ class PointSettings:
     Parameters
     ----------
     row, column
-        What is different, as files have it.
+        Values on the axes, as text in files.
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     noise, sampling
-        What the trace is like.
+        Noise and sampling of the traces.
     """
 
     row: str
@@ -63,18 +63,18 @@ class PointSettings:
 
 @dataclass(frozen=True)
 class Settings:
-    """What a sweep over a case is judged by.
+    """Settings for judging the sweep of a case.
 
     Parameters
     ----------
     methods
-        Identifiers.
+        Names of the methods.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to be taken for as good.
+        Share by which a misfit may exceed the noise to count as near it.
     parameters
         True values by name, SI units.
     points
-        By name.
+        Points by name.
     """
 
     methods: tuple[str, ...]
@@ -84,7 +84,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a sweep over a case is judged by."""
+    """Return the settings for judging the sweep of a case."""
     points = {}
     for point in study.sweeps[job["sweep"]].points(job["case"]):
         case = study.points[point.name]
@@ -98,18 +98,18 @@ def settings(study: Study, job: Wildcards) -> Settings:
 def judge(
     settings: Settings, identifications: list[Path], calibrated: list[Path], points: Path
 ) -> None:
-    """Judge the identifications of every point of a sweep over a case.
+    """Compute errors and shares of successful seeds at every point of a case's sweep.
 
     Parameters
     ----------
     settings
-        By what.
+        Settings of the sweep.
     identifications
-        Those of every point, CSV, named like it.
+        Identifications of every point, CSV, named like the point.
     calibrated
-        Calibrations, YAML, of those points that rely on one, named like them.
+        Calibrations, YAML, of points that use one, named like the point.
     points
-        A row per point, method and quantity, CSV.
+        One row per point, method and quantity, CSV.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def _judged(
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
 ) -> Iterator[tuple[str | int, ...]]:
-    """Judge one point, for every method and quantity."""
+    """Yield rows for one point, for every method and quantity."""
     problem, parameters = point.problem, settings.parameters
     time_s = point.sampling.over(problem.torque.end_s)
     searched = problem.searched.parameters
@@ -176,10 +176,10 @@ def _judged(
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
-    """Whether identified values lie in the basin of the truth, (n_seeds,).
+    """Return whether identified values lie in the basin of the truth, (n_seeds,).
 
-    That is, within a factor of two, or, where noise leaves more than that, within four
-    times the bound of the logarithm. Without noise the bound is NaN.
+    The basin reaches to a factor of two or, where the noise allows no more, to four times the
+    bound of the logarithm. Without noise the bound is NaN and the factor holds.
     """
     with np.errstate(divide="ignore"):
         away = np.abs(np.log(values / truth))
@@ -200,10 +200,10 @@ def _median(values: Array) -> float:
 def _succeeded(
     settings: Settings, point: PointSettings, time_s: Array, found: pd.DataFrame
 ) -> np.ndarray:
-    """Whether each seed is near the noise, (n_seeds,).
+    """Return whether each seed is near the noise, (n_seeds,).
 
-    Where there is no noise, it is held against what the genome can do: the misfit of the
-    truth when it is rounded to two digits.
+    Without noise, the misfit of the true values rounded to the genes' two digits takes its
+    place.
     """
     if point.noise.absent:
         resolution = _resolution_rad(point.problem, settings.parameters, time_s)
@@ -212,7 +212,7 @@ def _succeeded(
 
 
 def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
-    """RMS misfit, without noise, of the encodable parameters that are nearest to the truth."""
+    """Return the noise-free RMS misfit of the encodable parameters nearest to the truth."""
     truth = [parameters[p.name] for p in problem.model.parameters]
     rounded = [
         problem.fixed.get(p.name, nearest_encodable(value, problem.ranges[p.range_name]))

@@ -1,4 +1,4 @@
-"""Stage 1: the noise-free response of a case, and the force of the jaws on its sample."""
+"""Stage 1: noise-free rotation of a case, and the force of the jaws on its sample."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,20 +25,20 @@ from biogrip.study.study import Study
 
 @dataclass(frozen=True)
 class Settings:
-    """What makes a target.
+    """Inputs of a target.
 
     Parameters
     ----------
     case
-        Its name.
+        Name of the case.
     gripper, phases, sampling
-        With what, under what, and when.
+        Gripper, protocol and sampling.
     sample, parameters
-        Of what: the model, and true values in SI units by name.
+        Sample model, and true values in SI units by name.
     nonlinear, unilateral
-        Whether the nonlinear model is solved; whether the jaws can only press.
+        True for nonlinear equations; true if the jaws cannot pull.
     stroke_rad
-        How far the comb drives can turn the arms.
+        Largest rotation that the comb drive's stroke allows.
     """
 
     case: str
@@ -53,7 +53,7 @@ class Settings:
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
-    """Choose what a case's target depends on."""
+    """Return the settings that a case's target depends on."""
     case = study.case(job["case"])
     return Settings(
         case.name,
@@ -69,12 +69,12 @@ def settings(study: Study, job: Wildcards) -> Settings:
 
 
 def simulate(settings: Settings, target: Path) -> None:
-    """Simulate a case and write its target, CSV.
+    """Simulate a case, and write its target, CSV.
 
     Raises
     ------
     BiogripError
-        If the rotation is not finite, or the arms turn further than the comb drives can.
+        If the rotation is not finite, or exceeds the stroke of the comb drives.
     """
     torque = torque_history(settings.phases)
     network = settings.sample.model.sample(settings.parameters)
@@ -88,7 +88,7 @@ def simulate(settings: Settings, target: Path) -> None:
 def _response(
     settings: Settings, network: Network, torque: TorqueHistory, time_s: Array
 ) -> tuple[Array, Array]:
-    """Rotation of the left arm and jaw force."""
+    """Return the rotation of the left arm and the jaw force."""
     gripper, nonlinear = settings.gripper, settings.nonlinear
     if settings.unilateral:
         found = unilateral_response(gripper, network, torque, time_s)
@@ -103,9 +103,9 @@ def _say_if_contact_is_lost(settings: Settings, network: Network, torque: Torque
     if words is None:
         return
     then = (
-        "they leave it there, which its identification does not know"
+        "contact is lost there, which its identification ignores"
         if settings.unilateral
-        else "unless it sticks to them, contact is lost there (contact: unilateral simulates that)"
+        else "without adhesion contact is lost there (contact: unilateral simulates that)"
     )
     warn(f"{settings.case}: under this protocol {words}; {then}.")
 

@@ -1,4 +1,4 @@
-"""The error tables of all cases in one."""
+"""Error tables of all cases, joined."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ _WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
 
 def all_errors(near_noise_tolerance: float, tables: list[Path]) -> Table:
-    """Join the error tables of the cases, CSV, which were made with a tolerance."""
+    """Join the error tables of all cases, CSV."""
     columns = table_columns(near_noise_tolerance)
     names = [column.name for column in columns]
     rows: list[tuple[Cell, ...]] = [

@@ -1,4 +1,4 @@
-"""What it takes to close the jaws onto samples of the sizes that the gripper is made for."""
+"""Table of rotation, torque and voltage at contact with samples of several sizes."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What closes onto the samples: the neutral gripper, its jaw gap, its drives; the protocol."""
+    """Neutral gripper, jaw gap, comb drive and protocol."""
 
     gripper: Gripper
     jaw_gap_m: float
@@ -35,7 +35,7 @@ class Settings:
 
 
 def contacts(settings: Settings) -> Table:
-    """Close the jaws onto samples from the smallest to the largest."""
+    """Return the state of the gripper closed onto samples from the smallest to the largest."""
     grip_Nm = largest_torque(torque_history(settings.phases))
     rows: list[tuple[Cell, ...]] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):

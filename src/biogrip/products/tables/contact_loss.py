@@ -1,4 +1,4 @@
-"""What is identified if the jaws let go of the sample and nobody notices."""
+"""Errors of identifications that wrongly assume bilateral contact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -47,11 +47,11 @@ class CaseSettings:
     Parameters
     ----------
     sample, parameters, gripper, phases, sampling, noise
-        What makes its traces; true values by name, SI units.
+        Inputs of its traces; true values by name, SI units.
     problem, least_squares
-        How they are identified.
+        Assumptions of the identification, and settings of its fits.
     seeds
-        How many are.
+        Number of seeds.
     """
 
     sample: Sample
@@ -67,14 +67,14 @@ class CaseSettings:
 
 @dataclass(frozen=True)
 class Settings:
-    """Whose random streams, and the cases by name."""
+    """Seed of the study, and cases by name."""
 
     study_seed: int
     cases: Mapping[str, CaseSettings]
 
 
 def settings(study: Study) -> Settings:
-    """Choose the simulated cases that the linear model makes and identifies."""
+    """Return the simulated cases whose target and identification are linear."""
     linear = [
         (name, study.cases[name])
         for name in study.simulated
@@ -100,19 +100,19 @@ def settings(study: Study) -> Settings:
 
 
 def contact_loss(settings: Settings) -> Table:
-    """Identify traces of jaws that hold the sample, and of jaws that only press."""
+    """Identify traces simulated with bilateral and with unilateral contact, and compare errors."""
     rows = [
         row
         for name, case in settings.cases.items()
         for row in _rows(settings.study_seed, name, case)
     ]
     caption = (
-        "Cases in which the jaws would have to pull: what least squares identifies, on the "
-        "assumption that they hold the sample, in traces in which they do, in traces in which they "
-        "let go where the force reaches zero, and in the samples of the latter up to there. "
+        "Cases in which the jaws would have to pull: what least squares identifies, assuming "
+        "bilateral contact, in traces with bilateral contact, in traces with loss of contact where "
+        "the force reaches zero, and in the readings of the latter before the loss. "
         f"Medians over the same noise of at most {_MOST_SEEDS} seeds; the misfit is over the RMS "
-        "of the noise. Errors are (target - identified)/target; empty if there is no meaning in "
-        f"them, beyond {_MEANS_LITTLE:g} %."
+        "of the noise. Errors are (target - identified)/target; empty beyond "
+        f"{_MEANS_LITTLE:g} %."
     )
     return Table(caption, _COLUMNS, rows)
 
@@ -159,7 +159,7 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
 def _medians(
     study_seed: int, name: str, case: CaseSettings, time_s: Array, traces: Sequence[Array]
 ) -> list[float] | None:
-    """Median of every quantity, and last of the misfit in rad; None of too few samples."""
+    """Return the median of every quantity and of the misfit in rad; None for too few samples."""
     searched, model = case.problem.searched, case.problem.model
     nuisance = case.problem.offset + case.problem.drift
     if len(time_s) <= len(searched.names) + nuisance + 1:
@@ -188,8 +188,8 @@ CONTACT_LOSS = table(
     contact_loss,
     name="contact_loss",
     item="contact loss",
-    caption="How wrong an identification is that takes the jaws to hold a sample that they have "
-    "let go of, and what the samples up to there tell.",
+    caption="Errors of identifications that assume bilateral contact in traces with loss of "
+    "contact, and in the readings before the loss.",
     settings=settings,
     when=lambda study: bool(settings(study).cases),
     weight=Weight(60, 1000),

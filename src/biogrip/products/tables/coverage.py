@@ -1,4 +1,4 @@
-"""Whether intervals keep their promise, and estimates reach the Cramer-Rao bound."""
+"""Coverage of confidence intervals, and spread of estimates over the Cramér-Rao bound."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -50,20 +50,20 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class CaseSettings:
-    """What the intervals of a case are held against.
+    """True values, noise and assumptions of a case whose intervals are tested.
 
     Parameters
     ----------
     problem
-        What the identification assumes.
+        Assumptions of the identification.
     parameters
         True values by name, SI units.
     noise
-        What is added to the target.
+        Noise to add to the target.
     confidence
-        Of the intervals.
+        Confidence level of the intervals.
     calibrated
-        Whether a calibration replaces the gripper's arms.
+        True if a calibration replaces the gripper's arms.
     """
 
     problem: CaseProblem
@@ -74,7 +74,7 @@ class CaseSettings:
 
 
 def settings(study: Study) -> dict[str, CaseSettings]:
-    """Choose what the intervals are held against, by case."""
+    """Return the cases whose intervals are tested, by name."""
     cases = {name: study.cases[name] for name in study.covered}
     return {
         n: CaseSettings(c.problem, c.parameters, c.noise, c.confidence, c.is_calibrated)
@@ -88,16 +88,16 @@ def coverage(
     intervals: list[Path],
     calibrated: list[Path],
 ) -> Table:
-    """Hold estimates and intervals of many seeds against the truth and the bound.
+    """Compare estimates and intervals of many seeds with the true values and the bound.
 
     Parameters
     ----------
     settings
-        Against what, by case.
+        Settings by case.
     targets, intervals
-        Those of the cases, CSV, in their order.
+        Files of the cases, CSV, in their order.
     calibrated
-        Calibrations, YAML, of those cases that rely on one, in their order.
+        Calibrations, YAML, of cases that use one, in their order.
     """
     calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
@@ -110,7 +110,7 @@ def coverage(
         noise_rad = standard_deviation(rotation, case.noise)
         for quantity in parameters_and_sum(posed.searched):
             mine = found[found["quantity"] == quantity.label]
-            # Not as lifted into the search range.
+            # The config's value: `log_truth` is clipped to the search range.
             names = [posed.searched.names[index] for index in quantity.members]
             truth = sum(case.parameters[member] for member in names)
             head = (name, quantity.label, quantity.unit, truth)
@@ -123,20 +123,19 @@ def coverage(
     caption = (
         "Least squares over many seeds, for every quantity that a case's traces should determine: "
         "standard deviation of the estimates' logarithms beside the Cramér-Rao bound, and how "
-        "often the intervals hold the truth. The bound is that of a simpler problem, and none of "
-        "the one that is fitted: parameters of which the traces carry no information are taken as "
-        "known. Fits have to find these too; they can only be too large, near zero as they are, "
-        "and what they take is missing elsewhere: hence the bias, and a spread above the bound. "
-        "Rest known: the spread with these parameters at their true values. On the right: what "
-        f"users are shown, verdicts from whole profiles, in every {EVERY}th seed, and how many of "
-        "them are true; a limit on one side is an end of the interval with two, and holds more "
-        "often than the confidence says."
+        "often the intervals hold the truth. The bound is for a simpler problem than that of the "
+        "fits: parameters without information in the traces are fixed. Fits search these too; as "
+        "they are near zero they can only be overestimated, at the expense of others: hence the "
+        "bias, and a spread above the bound. Rest known: the spread with these parameters at "
+        "their true values. On the right: verdicts from whole profiles, as users are shown them, "
+        f"in every {EVERY}th seed, and how many of them are true; one-sided limits hold more often "
+        "than the confidence says."
     )
     return Table(caption, _COLUMNS, rows)
 
 
 def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> list[Cell]:
-    """Bound, spread and intervals of a quantity that traces should determine; else empty."""
+    """Return bound, spread and coverage of a determined quantity, else empty cells."""
     if found.empty:
         return [None] * 8
     spread = _spread(found["estimate"])
@@ -153,7 +152,7 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
 
 
 def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
-    """How many verdicts are determined, and of these true; the same of those on one side."""
+    """Yield counts of determined verdicts and true ones among them, then of one-sided verdicts."""
     holds = _holds(found, truth, "shown_")
     for verdicts in ((DETERMINED,), (BOUNDED_BELOW, BOUNDED_ABOVE)):
         chosen = found["verdict"].isin(verdicts).to_numpy()
@@ -162,7 +161,7 @@ def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
 
 
 def _spread(estimates: "pd.Series[float]") -> float:
-    """Standard deviation of the logarithm in percent."""
+    """Return the standard deviation of the logarithm in percent."""
     return 100 * float(np.std(np.log(estimates.to_numpy(float)), ddof=1))
 
 
@@ -181,7 +180,7 @@ COVERAGE = table(
     name="coverage",
     item="coverage",
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
-    "their intervals hold the truth; and how often the verdicts that users are shown are true.",
+    "their intervals, and the verdicts that users are shown, hold the truth.",
     sheet="tables",
     settings=settings,
     reads={

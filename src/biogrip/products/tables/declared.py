@@ -1,4 +1,4 @@
-"""How a table declares itself."""
+"""Declaration of tables as products."""
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial, wraps
@@ -30,27 +30,27 @@ def table(
     Parameters
     ----------
     make
-        Makes it from its settings and, by keyword, from the files of `reads`.
+        Function that makes the table from its settings and, by keyword, the files of `reads`.
     name
-        Its name; of a case's table, the case follows in the file.
+        Name of the product; the case's name is appended for files.
     caption, item
-        What the report says of it.
+        Caption and place in the report.
     settings
-        From the study; for a case's table, from the study and the case (of a sweep, likewise).
+        Function of the study, of study and case, or of study and sweep.
     reads
-        Files that it is made from.
+        Input files.
     cases
-        Which cases have one; if that is not given there is one for the study.
+        Names of the cases that have the table; if not given, there is one for the study.
     sweeps
-        Whether there is one for each sweep instead.
+        If true, there is one table for each sweep.
     sheet
-        Tables of a sheet are made by one job.
+        Name of a group of tables that one job makes.
     when
-        Whether a study has it.
+        Condition for a study to have the table.
     weight
-        How heavy its job is.
+        Resources of the job.
     stem
-        Path but for the ending.
+        Path without suffix.
     """
     scope = Scope(cases, sweeps, when)
     whose = scope.whose

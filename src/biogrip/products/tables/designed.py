@@ -1,4 +1,4 @@
-"""What designed experiments tell beside the study's own, and whether they keep their promise."""
+"""Bounds of designed experiments beside the study's own, and coverage of their intervals."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -37,33 +37,33 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """The experiments by case, and of which cases seeds are there to be held against the bound."""
+    """Experiments by case, and names of cases whose seeds are compared with the bound."""
 
     cases: Mapping[str, CaseSettings]
     covered: tuple[str, ...]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what is held against one another."""
+    """Return designed experiments by case, and cases with intervals."""
     return Settings(experiments(study), tuple(covered_cases(study)))
 
 
 def covered_cases(study: Study) -> list[str]:
-    """Name the cases of which intervals are known."""
+    """Return the designed cases that have intervals."""
     return [name for name in designed_cases(study) if study.cases[name].coverage_seeds > 0]
 
 
 def designed(settings: Settings, expected: list[Path], intervals: list[Path]) -> Table:
-    """Hold bounds of both experiments, and estimates of many seeds, against one another.
+    """Compare bounds of both experiments with estimates of many seeds.
 
     Parameters
     ----------
     settings
-        The experiments, and which cases have intervals.
+        Experiments by case, and cases with intervals.
     expected
-        Verdicts of their traces without noise, JSON, in their order.
+        Verdicts on traces without noise, JSON, in the order of the cases.
     intervals
-        Estimates and limits of those cases that have them, CSV, in their order.
+        Estimates and limits of cases with intervals, CSV, in their order.
     """
     files = iter(intervals)
     rows: list[tuple[Cell, ...]] = []
@@ -94,7 +94,7 @@ def designed(settings: Settings, expected: list[Path], intervals: list[Path]) ->
 
 
 def _least_force(case: CaseSettings) -> float:
-    """Least force of the jaws, in N, from the second step on: at first it has to rise."""
+    """Return the least jaw force in N from the second step on; before, it starts at zero."""
     torque = torque_history(case.after[0])
     values = [[case.parameters[name] for name in case.model.names]]
     time_s, force = forces(case.gripper, case.model.network(values), case.after[0])
@@ -103,12 +103,12 @@ def _least_force(case: CaseSettings) -> float:
 
 
 def _percent(bound: float) -> Cell:
-    """Print no bound of which nobody would say that it is one."""
+    """Return a relative bound in percent; none if it is 1000 % or more."""
     return 100 * float(bound) if bound < 10 else None
 
 
 def _of_seeds(found: pd.DataFrame | None, name: str, truth: float, bound: float) -> list[Cell]:
-    """Spread, its share of the bound, coverage, and over how many seeds."""
+    """Return spread, its ratio to the bound, coverage, and number of seeds."""
     if found is None:
         return [None] * 4
     mine = found[(found["quantity"] == name) & found["low"].notna() & found["high"].notna()]
@@ -123,8 +123,8 @@ DESIGNED = table(
     designed,
     name="designed",
     item="designed experiments",
-    caption="What designed experiments tell beside the study's own, and whether seeds that are "
-    "identified on them keep that promise.",
+    caption="Bounds of designed experiments beside those of the study's own, with spread and "
+    "coverage over seeds identified in them.",
     settings=settings,
     reads={
         "expected": of_cases(EXPECTED, designed_cases),

@@ -1,4 +1,4 @@
-"""Tables 5 to 7: target, the paper's identification and ours."""
+"""Tables 5 to 7: target, the paper's identification and this study's."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,23 +39,23 @@ TYPICAL = (
 
 
 def table_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
-    """Columns of an error table."""
+    """Return the columns of an error table."""
     share = f"Share {near_noise_words(near_noise_tolerance)}"
     return (*_COLUMNS, Column("near_noise_share", share, 2))
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What errors are told by.
+    """Sample, method and tolerance of an error table.
 
     Parameters
     ----------
     case, truth
-        The sample.
+        Name and true values of the sample.
     method
-        Whose identifications.
+        Method of identification.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to be taken for as good.
+        Share by which a misfit may exceed the noise to count as near it.
     """
 
     case: str
@@ -65,7 +65,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the error table of a case depends on."""
+    """Return the settings that the error table of a case depends on."""
     return Settings(case.name, case.truth, study.shown, study.near_noise_tolerance)
 
 
@@ -114,7 +114,7 @@ def errors(settings: Settings, identifications: Path) -> Table:
 
 
 def error_percent(target: float | None, identified: Array) -> Array:
-    """Signed error (target - identified) / target in percent; NaN for a target of zero or none."""
+    """Return (target - identified) / target in percent; NaN if the target is zero or unknown."""
     if not target:
         return np.full_like(identified, np.nan)
     return 100 * (target - identified) / target

@@ -1,4 +1,4 @@
-"""What speaks for the reconstructed values, and where the paper's statements do not agree."""
+"""Evidence for the reconstructed values, and contradictions within the paper."""
 
 import math
 from collections.abc import Mapping
@@ -41,16 +41,16 @@ _PRINTED_GENE_VALUES = "9 or 12"
 
 @dataclass(frozen=True)
 class Settings:
-    """What the paper's statements are held against.
+    """Values that the paper's statements are compared with.
 
     Parameters
     ----------
     cases
-        Samples that it reports on, by name.
+        True values of samples that the paper reports on, by name.
     method
-        Whose identifications.
+        Method of identification.
     gripper, actuator, ranges
-        The study's.
+        Gripper, comb drive and search ranges of the study.
     """
 
     cases: Mapping[str, Truth]
@@ -61,7 +61,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose what the paper's statements are held against."""
+    """Return the values that the paper's statements are compared with."""
     cases = {name: study.cases[name].truth for name in study.published}
     return Settings(cases, study.shown, study.gripper, study.actuator, study.ranges)
 
@@ -72,14 +72,14 @@ def evidence(
     measurements: list[Path],
     targets: list[Path],
 ) -> Table:
-    """Hold statements of the paper against what the study computes.
+    """Compare statements of the paper with results of the study.
 
     Parameters
     ----------
     settings
-        What they are held against.
+        Values that statements are compared with.
     identifications, measurements, targets
-        Of the cases, CSV, Parquet and CSV.
+        Files of the cases: CSV, Parquet and CSV.
     """
     rows = [*_actuator_rows(settings), *_gripper_rows(settings), *_gene_rows(settings)]
     for name, case in settings.cases.items():
@@ -149,9 +149,9 @@ def _gene_rows(settings: Settings) -> list[tuple[Cell, ...]]:
 
 
 def _grip_rows(case: Truth, target: Path) -> list[tuple[Cell, ...]]:
-    """Section 2 reduces the torque "in order to maintain the grip with the sample"."""
+    """Return the jaw force at the lower torque, which the paper says maintains the grip."""
     time_s, torque, force = read_jaw_force(target)
-    # The first sample at the lower torque may be the instant of the step itself.
+    # The first such sample may coincide with the step, so skip it.
     reduced = np.flatnonzero(torque < torque.max())[1:]
     if not len(reduced):
         return []
@@ -167,7 +167,7 @@ def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
     axis = case.published.axis_rad
     if not axis or not traces:
         return []
-    # Not the traces themselves are kept: of many seeds they are more than fits into memory.
+    # Keep only extremes: traces of many seeds exceed the memory.
     extremes = [(trace.min(), trace.max()) for path in traces for trace in each_trace(path)]
     low, high = (1e3 * float(value) for value in np.median(extremes, axis=0))
     remark = (

@@ -1,4 +1,4 @@
-"""Tables 1 to 4: what goes into the study, as the config has it."""
+"""Tables 1 to 4: inputs of the study, from its config."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _LEGEND = (
 
 @dataclass(frozen=True)
 class GripperSettings:
-    """The gripper in its neutral configuration, and which of its keys are reconstructed."""
+    """The neutral gripper, and reconstructed keys among its own."""
 
     gripper: Gripper
     reconstructed: tuple[str, ...]
@@ -27,7 +27,7 @@ class GripperSettings:
 
 @dataclass(frozen=True)
 class ActuatorSettings:
-    """The comb drive, and which of its keys are reconstructed."""
+    """The comb drive, and reconstructed keys among its own."""
 
     actuator: CombDrive
     reconstructed: tuple[str, ...]
@@ -35,7 +35,7 @@ class ActuatorSettings:
 
 @dataclass(frozen=True)
 class RangeSettings:
-    """The range that is searched, and which of its keys are reconstructed."""
+    """The search ranges, and reconstructed keys among their own."""
 
     ranges: Mapping[str, GeneRange]
     reconstructed: tuple[str, ...] = ()

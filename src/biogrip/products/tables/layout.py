@@ -1,4 +1,4 @@
-"""How a table looks: the same numbers as CSV to compute with and as text to read."""
+"""Tables as CSV for computing, and as Markdown, LaTeX and HTML for reading."""
 
 import math
 from collections.abc import Sequence
@@ -16,14 +16,14 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Column:
-    """A column.
+    """A column of a table: its names in CSV and print.
 
     Parameters
     ----------
     name, heading
-        In the CSV; in print.
+        Name in the CSV, and heading in print.
     digits
-        Significant digits in print, for numbers.
+        Significant digits of numbers in print.
     """
 
     name: str
@@ -33,14 +33,14 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
+    """A table with caption, columns and rows.
 
     Parameters
     ----------
     caption
-        What it shows, in a sentence or two.
+        Description of the table in a sentence or two.
     columns, rows
-        Its contents; None is an empty cell.
+        Columns and rows; None is an empty cell.
     """
 
     caption: str
@@ -49,9 +49,9 @@ class Table:
 
 
 def write(table: Table, output: Path) -> None:
-    """Write a table as CSV with six significant digits, and beside it .md, .tex and .html.
+    """Write a table as CSV with six significant digits, and as .md, .tex and .html.
 
-    To read, it has no columns in which there is nothing.
+    The latter omit empty columns.
     """
     shown = pd.DataFrame(
         [
@@ -82,15 +82,14 @@ def _text(cell: Cell, digits: int) -> str:
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return ""
     if isinstance(cell, float):
-        # Print rounds what the CSV shows, so that no table disagrees with its own
-        # digits; adding zero turns -0 into 0.
+        # Round the CSV's number, so that print and CSV agree; adding zero turns -0 into 0.
         shown = float(f"{cell:.6g}")
         return f"{float(f'{shown:.{digits}g}') + 0.0:.{digits}g}"
     return str(cell)
 
 
 def _without_bars(text: str) -> str:
-    """Return text that neither ends a cell of a Markdown table nor its row."""
+    """Escape bars and line ends, which would end a cell or row of a Markdown table."""
     return text.replace("|", r"\|").replace("\n", " ")
 
 

@@ -1,4 +1,4 @@
-"""What the model leaves out, with its size."""
+"""Size of the physical effects that the model leaves out."""
 
 from dataclasses import dataclass
 
@@ -30,14 +30,14 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What estimates are made of.
+    """Inputs of the estimates.
 
     Parameters
     ----------
     gripper, actuator, phases
-        The study's.
+        Gripper, comb drive and protocol of the study.
     least_damping_Ns_per_m
-        All dampers of the sample that has least of them, if one has any; a springpot is none.
+        Sum of dampers of the sample that has least; None if only springpots or none are there.
     """
 
     gripper: Gripper
@@ -47,7 +47,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose what estimates are made of."""
+    """Return the inputs of the estimates."""
     dampings = [_damping(study.cases[name]) for name in study.simulated]
     least = min((damping for damping in dampings if damping > 0), default=None)
     return Settings(study.gripper, study.actuator, study.phases, least)
@@ -62,7 +62,7 @@ def _damping(case: Case) -> float:
 
 
 def left_out(settings: Settings) -> Table:
-    """Estimate what the model leaves out, for the largest sample."""
+    """Estimate effects that the model leaves out, for the largest sample."""
     gripper, comb, least = settings.gripper, settings.actuator, settings.least_damping_Ns_per_m
     b, arm = gripper.lever_m, gripper.left
     turn = largest_torque(torque_history(settings.phases)) / arm.stiffness_Nm_per_rad
@@ -109,7 +109,7 @@ LEFT_OUT = table(
     left_out,
     name="left_out",
     item="left out",
-    caption="What the model leaves out, with its size: drag, rolling, fringing, the sample's "
+    caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
     "inertia.",
     settings=settings,
     sheet="tables",

@@ -1,4 +1,4 @@
-"""The domain in which the paper's linearisation is good."""
+"""Domain in which the paper's linearisation is accurate."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 
 LIMIT_PERCENT = 1.0
-"""Difference up to which it is, as a share of the peak."""
+"""Difference up to which it counts as accurate, as a share of the peak."""
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -21,7 +21,7 @@ _COLUMNS = (
 
 
 def linearisation(settings: None, differences: Path) -> Table:
-    """Find, for every case and angle, the multiple of the torque that reaches `LIMIT_PERCENT`.
+    """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`.
 
     Parameters
     ----------

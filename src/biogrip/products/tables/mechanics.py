@@ -1,4 +1,4 @@
-"""What biologists compare: strain, force, stiffness and modulus of every sample."""
+"""Strain, force, stiffness and apparent modulus of every sample."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,14 +35,14 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class CaseSettings:
-    """A simulated case.
+    """Inputs of a simulated case, from which its mechanics are computed.
 
     Parameters
     ----------
     title
-        In print.
+        Title of the case.
     gripper, phases, sample, parameters, nonlinear
-        As of the target.
+        Inputs of the target.
     size_m
         Diameter of the sample, if it is given.
     """
@@ -57,7 +57,7 @@ class CaseSettings:
 
 
 def settings_of(case: Case) -> CaseSettings:
-    """Choose what a case's mechanics depend on."""
+    """Return the settings that a case's mechanics depend on."""
     return CaseSettings(
         case.title,
         case.gripper,
@@ -70,12 +70,12 @@ def settings_of(case: Case) -> CaseSettings:
 
 
 def settings(study: Study) -> list[CaseSettings]:
-    """Choose the simulated cases."""
+    """Return the settings of all simulated cases."""
     return [settings_of(study.cases[name]) for name in study.simulated]
 
 
 def mechanics(settings: list[CaseSettings]) -> Table:
-    """Tell strain, force, stiffness and modulus of every sample."""
+    """Compute strain, force, stiffness and modulus of every sample."""
     caption = (
         "Each sample while jaws hold it: shortening and strain at the end of the first phase; the "
         "largest force, and the lowest, which is negative where the jaws would have to pull; "
@@ -92,13 +92,13 @@ def mechanics(settings: list[CaseSettings]) -> Table:
 def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
     torque = torque_history(case.phases)
     network = case.sample.model.sample(case.parameters)
-    # Just before the torque changes.
+    # Immediately before the first change of torque.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     given = case.gripper, network, torque
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear)[0, 0])
     force = float(jaw_force(*given, end, nonlinear=case.nonlinear)[0, 0])
     grip = grip_of(*given, nonlinear=case.nonlinear)
-    # A springpot has no stiffness at once, nor one in the end.
+    # A springpot has neither instantaneous nor long-term stiffness.
     power_law = case.sample.model.power_law
     in_the_end = None if power_law else float(network.k_p[0])
     at_once = None if power_law else float(network.k_p[0] + network.k[0].sum())

@@ -1,4 +1,4 @@
-"""The identifiers compared on the same traces."""
+"""Comparison of identification methods on the same traces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -31,14 +31,14 @@ _LEADING = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What methods are compared by.
+    """Settings of the comparison of identification methods.
 
     Parameters
     ----------
     cases
-        The samples, and how many samples their traces have, by name.
+        True values, and number of samples in a trace, by case.
     optimum_tolerance, near_noise_tolerance
-        What counts as the optimum, and as near the noise.
+        Tolerances of the global optimum and of the noise.
     """
 
     cases: Mapping[str, tuple[Truth, int]]
@@ -47,7 +47,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose what methods are compared by."""
+    """Return the settings of the comparison."""
     cases = {name: study.cases[name] for name in study.simulated}
     return Settings(
         {name: (case.truth, case.samples) for name, case in cases.items()},
@@ -57,14 +57,14 @@ def settings(study: Study) -> Settings:
 
 
 def methods(settings: Settings, identifications: list[Path]) -> Table:
-    """Compare how often each method reaches the global optimum, how exactly, and at what cost.
+    """Compare success rate, errors and cost of each method.
 
     Parameters
     ----------
     settings
-        By what.
+        Settings of the comparison.
     identifications
-        Those of the cases, CSV, in the order of the cases.
+        Identifications of the cases, CSV, in their order.
     """
     labels = dict.fromkeys(
         _label(quantity)

@@ -1,4 +1,4 @@
-"""Which sample model is the simplest that a case's traces ask for."""
+"""Model selection by AIC and BIC, counted over seeds."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,19 +26,19 @@ _COLUMNS = (
 
 
 def settings(study: Study) -> dict[str, str | None]:
-    """Name the sample models that made the traces, by case; None of a recorded one."""
+    """Return the sample model that simulated the traces, by case; None for recorded traces."""
     return {
         name: None if case.recorded else case.sample.candidate for name, case in study.cases.items()
     }
 
 
 def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
-    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`.
+    """Count over seeds how often each model has the lowest AIC and BIC, see `aic_and_bic`.
 
     Parameters
     ----------
     made_by
-        The sample models that made the traces, by case; None of a recorded one.
+        Sample model that simulated the traces, by case; None for recorded traces.
     fits
         Fits of all models, CSV.
     """
@@ -52,7 +52,7 @@ def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
         delta = {}
         for criterion in ("aic", "bic"):
             wide = of_case.pivot(index="seed", columns="model", values=criterion)
-            # In the order that the models were asked for: the first of equals is chosen.
+            # In the configured order, since idxmin takes the first of equals.
             wide = wide[list(of_case["model"].unique())]
             delta[criterion] = wide.sub(wide.min(axis=1), axis=0)
         for name in of_case["model"].unique():
@@ -72,8 +72,7 @@ MODELS_COMPARED = table(
     models,
     name="models",
     item="sample models",
-    caption="Which sample model is the simplest that the traces ask for, by AIC and BIC, counted "
-    "over seeds.",
+    caption="Number of seeds in which each sample model has the lowest AIC and BIC.",
     sheet="tables",
     settings=settings,
     reads={"fits": of_cases(MODEL_FITS.path, lambda study: study.cases)},

@@ -1,4 +1,4 @@
-"""What posteriors say of all quantities, beside profile likelihoods."""
+"""Posterior intervals of all quantities, beside those of profile likelihoods."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -37,18 +37,18 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """True parameters of the cases by name, none if they are unknown."""
+    """True parameters of the cases by name; empty if unknown."""
 
     parameters: Mapping[str, Mapping[str, float]]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what the table depends on."""
+    """Return the settings that the table depends on."""
     return Settings({name: study.case(name).parameters for name in study.sampled})
 
 
 def posteriors(settings: Settings, told: list[Path]) -> Table:
-    """List posteriors; `told` is what is said of that of each case, JSON."""
+    """List posteriors from the summary of each case, JSON."""
     found = [read_posterior(path) for path in told]
     rows = [
         row
@@ -86,7 +86,7 @@ def _rows(
 
 
 def _rounded(value: float | None) -> float | None:
-    # As many digits as some thousand samples give.
+    # Some thousand samples give about three digits.
     return None if value is None else float(f"{value:.3g}")
 
 

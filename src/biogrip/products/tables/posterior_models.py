@@ -22,7 +22,7 @@ _COLUMNS = (
 
 
 def compared(study: Study) -> list[str]:
-    """Cases whose models are compared by their evidence."""
+    """Return the cases whose models are compared by evidence."""
     cases = {name: study.case(name) for name in study.sampled}
     return [
         name
@@ -32,7 +32,7 @@ def compared(study: Study) -> list[str]:
 
 
 def posterior_models(cases: list[str], told: list[Path]) -> Table:
-    """List models; `told` is what is said of the posterior of each case, JSON."""
+    """List models and their evidence from the posterior summary of each case, JSON."""
     rows: list[tuple[Cell, ...]] = [
         (
             case,

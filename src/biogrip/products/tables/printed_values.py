@@ -1,4 +1,4 @@
-"""The numbers printed in Tables 5 to 7, held against the paper's own encoding and formula."""
+"""Check of the values in Tables 5 to 7 against the paper's own encoding and error formula."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,19 +27,19 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """What the paper prints, by case, and the range that it searches."""
+    """Published values by case, and the search ranges."""
 
     cases: Mapping[str, Truth]
     ranges: Mapping[str, GeneRange]
 
 
 def settings(study: Study) -> Settings:
-    """Choose what is checked."""
+    """Return published values by case, and the search ranges."""
     return Settings({name: study.cases[name].truth for name in study.published}, study.ranges)
 
 
 def printed_values(settings: Settings) -> Table:
-    """Check what the paper prints."""
+    """Compare published values with encoding, range and error formula."""
     ranges = settings.ranges
     rows: list[tuple[Cell, ...]] = []
     for case, truth in settings.cases.items():

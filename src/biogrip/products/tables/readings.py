@@ -1,4 +1,4 @@
-"""Readings of section 4 side by side: how often each finds the samples, and when it stops."""
+"""Comparison of readings of section 4: success rate, errors and last improvement."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,24 +18,24 @@ from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
 
-# What the paper finds is compared in these together; c_p no trace determines.
+# Parameters compared jointly with the paper's values; c_p is left out as undetermined.
 _TOGETHER = ("k", "k_p", "c")
-# What is printed is rounded, to a share of about this.
+# Relative rounding error of the paper's values.
 _ROUNDING = 0.005
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How readings are told.
+    """Settings of the comparison of readings of the paper.
 
     Parameters
     ----------
     titles
-        Of the readings in print, by name.
+        Titles of the readings by name.
     truths
-        What is known of each case, by name.
+        True values of each case, by name.
     near_noise_tolerance
-        By which share a misfit may exceed the noise, to be taken for near it.
+        Share by which a misfit may exceed the noise to count as near it.
     """
 
     titles: Mapping[str, str]
@@ -44,7 +44,7 @@ class Settings:
 
 
 def settings(study: Study) -> Settings:
-    """Choose what the table depends on."""
+    """Return the settings that the table depends on."""
     return Settings(
         {name: block.title for name, block in study.config.readings.items()},
         {name: study.case(name).truth for name in read_cases(study)},
@@ -53,7 +53,7 @@ def settings(study: Study) -> Settings:
 
 
 def readings(settings: Settings, found: list[Path]) -> Table:
-    """Compare the readings; `found` are the rows of each case, CSV."""
+    """Compare the readings from the rows of each case, CSV."""
     rows = [
         row
         for path, (case, truth) in zip(found, settings.truths.items(), strict=True)
@@ -105,7 +105,7 @@ def _rows(
 
 
 def _as_close(truth: Truth, found: pd.DataFrame) -> BoolArray | None:
-    """Whether each seed comes as close as the paper does, in all of some parameters."""
+    """Return whether each seed is as close to the truth as the paper in compared parameters."""
     published = truth.published.identified
     columns = {p.name: p.column for p in SINGLE_BRANCH}
     names = [name for name in _TOGETHER if name in published and truth.parameters.get(name)]

@@ -1,4 +1,4 @@
-"""What a sweep says of robustness, a row per case and point."""
+"""Results of a sweep: a row per case and point."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from biogrip.products.heat_maps import (
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 
-# Columns of a point, by method: name and heading in the table.
+# Name and heading of columns that exist for every method.
 _BY_METHOD = {
     "near_noise_share": ("near_noise", "Share {near_noise}"),
     "basin_share": ("basin", "Share in the true basin"),
@@ -25,14 +25,14 @@ _BY_METHOD = {
 
 
 def robustness(maps: HeatMaps, points: list[Path]) -> Table:
-    """Put together the sweep over all its cases.
+    """Join the points of a sweep over all its cases.
 
     Parameters
     ----------
     maps
-        The sweep.
+        Titles and axes of the sweep.
     points
-        Judged points, CSV, a file per case and named like it.
+        Judged points, CSV, one file per case and named like it.
     """
     rows: list[tuple[Cell, ...]] = []
     for name in maps.cases:

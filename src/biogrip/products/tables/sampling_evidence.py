@@ -1,4 +1,4 @@
-"""At which sampling rate the paper's errors are of the size that noise allows."""
+"""Sampling rate at which the paper's errors agree with Cramér-Rao bounds."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
-# Where c and c_p trade against each other, each alone is far less certain than their sum.
+# Factor of a parameter's bound over that of the sum above which the two count as exchangeable.
 _TRADING = 2.0
 
 _COLUMNS = (
@@ -37,7 +37,7 @@ _CAPTION = (
 
 @dataclass(frozen=True)
 class CaseSettings:
-    """A sample that the paper reports on, and what its bounds depend on."""
+    """A sample that the paper reports on, with assumptions and noise for its bounds."""
 
     truth: Truth
     problem: CaseProblem
@@ -45,13 +45,13 @@ class CaseSettings:
 
 
 def settings(study: Study) -> dict[str, CaseSettings]:
-    """Choose the cases, by name."""
+    """Return the cases that the paper reports on, by name."""
     cases = {name: study.cases[name] for name in study.published}
     return {n: CaseSettings(c.truth, c.problem, c.noise) for n, c in cases.items()}
 
 
 def sampling_evidence(settings: Mapping[str, CaseSettings]) -> Table:
-    """Compare what the paper identifies with bounds."""
+    """Compare errors of the paper with bounds at several sampling rates."""
     rows: list[tuple[Cell, ...]] = []
     for name, case in settings.items():
         rows += _case_rows(name, case)
@@ -63,7 +63,7 @@ def sampling_evidence(settings: Mapping[str, CaseSettings]) -> Table:
 
 
 def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
-    """Rows of what the trace determines at some of the rates and the paper has a value of."""
+    """Return a row per quantity that is determined at some rate and that the paper reports."""
     truth, identified = case.truth.parameters, case.truth.published.identified
     problem, noise = case.problem, case.noise
     names = list(problem.searched.names)
@@ -86,7 +86,7 @@ def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
 
 
 def _told_apart(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
-    """Leave out the sum of what is told apart, and else what it is made of."""
+    """Leave out sums whose members are determined, and members that only the sum determines."""
     sums = [(q, percent) for q, percent in bounds if q.form == "sum"]
     left_out = []
     for total, percent in sums:

@@ -1,4 +1,4 @@
-"""How many experiments it takes until a cell is known: one after another, each way, simulated."""
+"""Number of experiments until parameters of simulated cells are known, by way of planning."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +22,7 @@ IN_WORDS: Mapping[str, str] = {
     BEFOREHAND: "designed for the ranges, repeated",
     TRUTH: "designed for the true cell, repeated",
 }
-"""Ways of going on, in print."""
+"""Ways of planning, in print."""
 
 ALL = "all"
 
@@ -42,20 +42,20 @@ _COLUMNS = (
 
 
 def settings(study: Study) -> dict[str, tuple[int, float]]:
-    """Choose how many cells the cases have, and the confidence of their limits."""
+    """Return the number of cells and the confidence level of each case."""
     cases = {name: study.cases[name] for name in sequenced(study)}
     return {name: (cells_of(case), case.confidence) for name, case in cases.items()}
 
 
 def sequential(settings: Mapping[str, tuple[int, float]], rows: list[Path]) -> Table:
-    """Count how well cells are known after how many experiments.
+    """Compute how well cells are known after each number of experiments.
 
     Parameters
     ----------
     settings
-        Cells of each case, and confidence.
+        Number of cells and confidence level of each case.
     rows
-        What is known of each cell, CSV, case after case.
+        Estimates and limits for each cell, CSV, case after case.
     """
     found = pd.concat([SEQUENCES.read(file) for file in rows])
     lines = [line for case in settings for line in _lines(case, found[found["case"] == case])]
@@ -68,19 +68,19 @@ def sequential(settings: Mapping[str, tuple[int, float]], rows: list[Path]) -> T
         "for the true values, again and again. A quantity counts as known where its interval of "
         f"{confidence} %, from the profile likelihood, has two ends and is no wider than "
         f"{100 * WELL:g} % to each side; all are where each of them is. Intervals with one end "
-        "count, too, among those that hold the truth. A best fit is missed if one from the truth "
-        "goes deeper."
+        "count, too, among those that hold the truth. A best fit is missed if a fit from the "
+        "truth has a lower chi-squared."
     )
     return Table(caption, _COLUMNS, lines)
 
 
 def half_widths(found: pd.DataFrame) -> "pd.Series[float]":
-    """Half of each interval's length as a share of its middle; infinite with an open end."""
+    """Return half of each interval as a share of its middle; infinite with an open end."""
     return (0.5 * np.log(found["high"] / found["low"])).fillna(np.inf).map(np.expm1)
 
 
 def known_well(found: pd.DataFrame) -> BoolArray:
-    """Whether each row's quantity counts as determined."""
+    """Return whether each row's interval is narrow enough to count as determined."""
     well: BoolArray = (half_widths(found) <= WELL).to_numpy()
     return well
 
@@ -113,7 +113,7 @@ def _percent(share: float) -> Cell:
 
 
 def files_of(plan: Plan, case: str) -> list[str]:
-    """Name the files of a case's cells."""
+    """Return the files of a case's cells."""
     cells = range(cells_of(plan.study.cases[case]))
     return [SEQUENCES.path.format(case=case, seed=cell) for cell in cells]
 
@@ -126,8 +126,8 @@ SEQUENTIAL = table(
     sequential,
     name="sequential",
     item="sequential experiments",
-    caption="How many experiments it takes until simulated cells are known: the study's again and "
-    "again, or each designed from what those before told.",
+    caption="Accuracy of simulated cells' parameters over the number of experiments: the study's "
+    "experiment repeated, or each experiment designed from all earlier traces.",
     settings=settings,
     reads={"rows": Reads(_every_file)},
     when=lambda study: bool(sequenced(study)),

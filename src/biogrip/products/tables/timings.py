@@ -1,4 +1,4 @@
-"""What the identifiers cost on the machine that ran them."""
+"""Processor time of the methods on the machine that ran them."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ _COLUMNS = (
 
 
 def timings(settings: None, times: list[Path]) -> Table:
-    """Processor time per identification, by case and method, from those of the seeds, CSV."""
+    """Summarise processor time per identification by case and method, from CSV."""
     spent = pd.concat([TIMINGS.read(path) for path in times])
     rows: list[tuple[Cell, ...]] = [
         (
@@ -35,7 +35,7 @@ def timings(settings: None, times: list[Path]) -> Table:
     return Table("Processor time of the identifications on this machine.", _COLUMNS, rows)
 
 
-# Outside tables/, for times are not the same on every machine.
+# Not in tables/, since times are not reproducible.
 TIMES = table(
     timings,
     name="timings",

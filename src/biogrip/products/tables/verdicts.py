@@ -1,4 +1,4 @@
-"""What one trace of a case tells, quantity by quantity."""
+"""Verdicts on one trace of a case, quantity by quantity."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class Settings:
-    """A case, its name in print, and its true parameters, none if they are unknown."""
+    """Name, title and true parameters of a case; parameters are empty if unknown."""
 
     case: str
     title: str
@@ -37,7 +37,7 @@ class Settings:
 
 
 def settings(study: Study, case: Case) -> Settings:
-    """Choose what the table of a case depends on."""
+    """Return the settings that the table of a case depends on."""
     return Settings(case.name, case.title, case.parameters)
 
 
@@ -49,9 +49,9 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
     settings
         The case.
     measured
-        Verdicts on its trace, JSON.
+        Verdicts on the judged trace, JSON.
     expected
-        What its traces should tell, JSON, if the truth is known.
+        Verdicts on the trace without noise, JSON, if the truth is known.
     """
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
@@ -81,19 +81,18 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
         for trade in found["trades"]
     )
     caption = (
-        f"{settings.title}: what the trace of one seed tells, from profile likelihoods.{trades} "
-        "Limits are the ends of an interval with two; one that stands alone holds with "
-        f"{50 * (1 + found['confidence']):g} %."
+        f"{settings.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
+        f"One-sided limits hold with {50 * (1 + found['confidence']):g} % confidence."
     )
     if others:
-        caption += " Expected: the same of the trace without noise, held against its noise."
+        caption += " Expected: the same for the trace without noise, judged at the noise level."
     percent = f"{100 * found['confidence']:g} %"
     columns = tuple(replace(c, heading=c.heading.format(percent=percent)) for c in _COLUMNS)
     return Table(caption, columns, rows)
 
 
 def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
-    """Return the true value of a parameter or a sum of some, None where it is unknown."""
+    """Return the true value of a parameter or a sum, None if unknown."""
     names = quantity.split(" + ")
     return sum(parameters[name] for name in names) if set(names) <= set(parameters) else None
 
@@ -102,8 +101,8 @@ VERDICTS = table(
     verdicts,
     name="verdicts",
     item="verdicts",
-    caption="What the trace of one seed of this case tells: a verdict on every quantity from its "
-    "profile likelihood, with confidence limits, beside what to expect by the trace without noise.",
+    caption="Verdicts on every quantity from profile likelihoods of one seed's trace, with "
+    "confidence limits, beside those expected from the trace without noise.",
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,
