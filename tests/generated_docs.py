@@ -6,13 +6,13 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
-from functools import partial
 from io import StringIO
 from pathlib import Path
 from pkgutil import iter_modules
 from tempfile import TemporaryDirectory
 from unittest import mock
 
+import numpy as np
 import pandas as pd
 
 import biogrip.products.files
@@ -28,10 +28,33 @@ from tests.published_numbers import renewed_numbers
 ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
+VERDICTS = PUBLISHED / "tables"
 NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
+SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
+ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
+SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
 CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
+_CASES = {
+    "endothelial_cell": "the cell",
+    "liquid_drop_1": "drop 1",
+    "liquid_drop_2": "drop 2",
+}
+_JUDGED_IN_NOISE = (
+    (("liquid_drop_1", "liquid_drop_2"), "c + c_p"),
+    (("liquid_drop_2",), "k"),
+    (("liquid_drop_1",), "k"),
+    (("endothelial_cell",), "k"),
+    (("endothelial_cell",), "k_p"),
+)
+_WAYS = {
+    "the study's, repeated": "the paper's, repeated",
+    "each designed after those before": "the paper's, then each designed after those before",
+    "designed for the ranges, repeated": "one designed for all these cells, repeated",
+    "designed for the true cell, repeated": "one designed for the true cell, repeated",
+}
+_ANSWERED = ("k", "c", "k_p", "c_p", "c + c_p")
 _RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
 
@@ -63,6 +86,23 @@ def paper_against_study() -> str:
     return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
 
 
+def answer() -> str:
+    """In how many of the paper's samples a trace determines which quantity."""
+    verdicts = pd.concat(pd.read_csv(file) for file in sorted(VERDICTS.glob("verdicts_*.csv")))
+    told = (verdicts["verdict"] == "determined").groupby(verdicts["quantity"]).sum()
+    samples = verdicts["case"].nunique()
+    always = [name for name in _ANSWERED if told[name] == samples]
+    never = [name for name in _ANSWERED if told[name] == 0]
+    sometimes = [
+        f"{name} in {told[name]}" for name in _ANSWERED if name not in always and name not in never
+    ]
+    return (
+        f"**A trace of the paper's experiment always determines {' and '.join(always)}, never "
+        f"{' and '.join(never)}, and the rest sometimes**: {', '.join(sometimes)} of the {samples} "
+        "samples."
+    )
+
+
 def _percent(text: str) -> str:
     try:
         return f"{float(f'{float(text):.2g}') + 0.0:g} %"
@@ -82,19 +122,103 @@ def cells_needed_table() -> str:
 
 
 def simulated_noise() -> str:
-    """How often intervals held the truth in noise of several kinds, and what was said of it."""
+    """How often intervals held the truth in noise of several kinds, over the quantities."""
+    noise = pd.read_csv(NOISE)
     return _table(
         {
-            "noise": row["noise"],
-            "sample": row["case"].replace("_", " "),
-            "quantity": row["quantity"],
-            "flagged": f"{row['flagged_percent']:.1f} %",
-            "held, taken for white": f"{row['white_coverage_percent']:.1f} %",
-            "held, allowed for": f"{row['coverage_percent']:.1f} %",
-            "times as wide": f"{row['times_wider']:.2g}",
+            "noise": kind,
+            "sample": str(case).replace("_", " "),
+            "flagged": f"{rows['flagged_percent'].max():.1f} %",
+            "truth inside, white noise assumed": _range(
+                rows["white_coverage_percent"], ".1f", " %"
+            ),
+            "truth inside, coloured noise assumed": _range(rows["coverage_percent"], ".1f", " %"),
+            "times as wide": _range(rows["times_wider"], ".2g"),
         }
-        for row in pd.read_csv(NOISE).to_dict("records")
+        for (kind, case), rows in noise.groupby(["noise", "case"], sort=False)
     )
+
+
+def errors_by_noise() -> str:
+    """What the genetic algorithm errs by, and the bound, at several levels of noise."""
+    table = pd.read_csv(ROBUSTNESS)
+    rows = []
+    for cases, quantity in _JUDGED_IN_NOISE:
+        ours = table[table["case"].isin(cases) & (table["quantity"] == quantity)]
+        levels = [(level, ours[ours["row"] == level]) for level in (2, 10, 40)]
+        name = _CASES[cases[0]] if len(cases) == 1 else "both drops"
+        rows.append(
+            {"quantity": f"{quantity} of {name}"}
+            | {
+                f"{level:g} % noise": f"{_range(of['error_genetic'], '.2g', ' %')} "
+                f"({_range(of['bound_percent'], '.2g', ' %')})"
+                for level, of in levels
+            }
+            | {
+                "runs near a noise of 2 %": _range(
+                    100 * levels[0][1]["near_noise_genetic"], ".0f", " %"
+                )
+            }
+        )
+    return _table(iter(rows))
+
+
+def methods_compared() -> str:
+    """How often each method reaches the optimum, and with how many responses."""
+    table = pd.read_csv(VERDICTS / "methods.csv")
+    return _table(
+        {"method": method}
+        | {
+            f"optimum, {_CASES[row['case']]}": f"{100 * row['optimum_share']:.0f} %"
+            for row in rows.to_dict("records")
+        }
+        | {
+            "near the noise": _range(100 * rows["near_noise_share"], ".0f", " %"),
+            "median responses": _range(rows["median_evaluations"], ".0f"),
+        }
+        for method, rows in table.groupby("method", sort=False)
+    )
+
+
+def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
+    if np.isinf(values.max()):
+        return "none"
+    low, high = format(values.min(), how), format(values.max(), how)
+    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+
+
+def experiments_needed() -> str:
+    """In how many cells all parameters are known after some experiments, way by way."""
+    table = pd.read_csv(SEQUENTIAL).query("quantity == 'all'")
+    return _table(
+        {"all four determined, % of cells, after": _WAYS[way]}
+        | {
+            f"{row['experiments']} experiment{'s' * (row['experiments'] > 1)}": (
+                f"{row['determined_percent']:.0f}"
+            )
+            for row in rows.to_dict("records")
+        }
+        for way, rows in table.groupby("way", sort=False)
+    )
+
+
+def bounds_by_shape() -> str:
+    """What steps, sinusoids and ramps tell."""
+    table = pd.read_csv(SHAPES)
+    return _table(
+        {"torques": shape if shape != "ramps" else f"ramps of {shortest:g} ms and more"}
+        | {
+            f"{quantity} of {_CASES[case]} (%)": _bound(row["bound_percent"])
+            for row in rows.to_dict("records")
+            for case, quantity in [(row["case"], row["quantity"])]
+            if case == "endothelial_cell" or quantity == "c_p"
+        }
+        for (shape, shortest), rows in table.groupby(["shape", "shortest_ms"], sort=False)
+    )
+
+
+def _bound(percent: float) -> str:
+    return "none" if math.isnan(percent) else f"{float(f'{percent:.2g}'):g}"
 
 
 def simulated_dishes() -> str:
@@ -114,16 +238,6 @@ def simulated_dishes() -> str:
         }
         for row in pd.read_csv(DISHES).to_dict("records")
     )
-
-
-def published_table(name: str) -> str:
-    """A published table, caption and all; until it is published, its name."""
-    files = sorted(PUBLISHED.rglob(f"{name}.md"))
-    if not files:
-        return (
-            f"(Table `{name}`: in `results/tables/` after a run, not yet among the published ones.)"
-        )
-    return files[0].read_text(encoding="utf-8").strip()
 
 
 def posterior_calibration() -> str:
@@ -224,19 +338,18 @@ def _table(rows: Iterator[dict[str, str]]) -> str:
 
 PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "config" / "README.md": {"keys": config_keys},
-    ROOT / "README.md": {"results": paper_against_study, "example": identified_example},
+    ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
-    ROOT / "docs" / "identifiability.md": {"noise": simulated_noise},
+    ROOT / "docs" / "identifiability.md": {
+        "noise": simulated_noise,
+        "methods": methods_compared,
+    },
+    ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
     ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
-    ROOT / "docs" / "posterior.md": {
-        "posterior": partial(published_table, "posterior"),
-        "posterior_models": partial(published_table, "posterior_models"),
-        "calibration": posterior_calibration,
-    },
-    ROOT / "docs" / "model.md": {
-        name: partial(published_table, name) for name in ("contact_loss", "mechanics", "left_out")
-    },
+    ROOT / "docs" / "design.md": {"sequential": experiments_needed, "shapes": bounds_by_shape},
+    ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
+    ROOT / "docs" / "reproduction.md": {"results": paper_against_study},
 }
 """Parts of documents that are written, by what."""
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 import pytest
+import yaml
 
 from tests.helpers import loaded
 from tests.helpers.places import ROOT
@@ -39,6 +40,11 @@ LEFT = {
         "results/tables/robustness_levels.md",
     ],
     "howto/crate.md": ["study.zip"],
+    "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
+    "howto/fork.md": ["published/SHA256SUMS", "published/tables/errors_my_cell.csv"],
+    "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
+    # These change the copy's code.
+    "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
     "howto/figure.md": ["results/figures/heights.png"],
 }
 LOOKED_AT = {
@@ -82,24 +88,41 @@ def test_what_is_said_can_be_done(
     (place.root / "short.yaml").write_text(TINY_FIT + SHORT)
     blocks = BLOCK.findall(text)
     # Else the copy's code is the repository's, which is loaded already.
-    own_code = any(title.endswith(".py") for _, title, _ in blocks)
+    own_code = any(title.endswith((".py", ".diff")) for _, title, _ in blocks)
     environment = place.environment if own_code else {**os.environ, loaded.COARSE: "1"}
     for language, title, content in blocks:
         if title:
             of_a_fit = re.search(f"identify .*--config {title}", text)
+            (place.root / title).parent.mkdir(parents=True, exist_ok=True)
             (place.root / title).write_text(content + (TINY_FIT if of_a_fit else ""))
         elif language == "sh":
             for line in content.splitlines():
-                _call(_typed(shlex.split(line, comments=True)), place.root, environment)
+                program, *arguments = shlex.split(line, comments=True)
+                if program == "biogrip":
+                    arguments = _typed(arguments)
+                _call(program, arguments, place.root, environment)
         elif language == "python":
             _run(content, place)
     assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
 
 
-def _typed(words: list[str]) -> list[str]:
-    """Arguments of a command, such that a run is small."""
-    command, *arguments = words
-    assert command == "biogrip"
+@pytest.mark.parametrize("document", ["howto/fork.md"])
+def test_what_a_workflow_of_github_runs_is_typed_above(document: str) -> None:
+    """Its file cannot be run here; its commands are those of the page, and have been."""
+    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
+    blocks = BLOCK.findall(text)
+    typed = {line for language, _, code in blocks if language == "sh" for line in code.splitlines()}
+    (workflow,) = (yaml.safe_load(code) for _, title, code in blocks if ".github" in title)
+    steps = [step for job in workflow["jobs"].values() for step in job["steps"]]
+    commands = [step["run"] for step in steps if "run" in step]
+    assert {command for command in commands if command.startswith("biogrip")} <= typed
+    locks = re.findall(r"-r (\S+)", " ".join(commands))
+    assert [lock for lock in locks if not (ROOT / lock).is_file()] == []
+    assert all("uses" in step or "run" in step for step in steps)
+
+
+def _typed(arguments: list[str]) -> list[str]:
+    """Arguments of biogrip, such that a run is small."""
     if arguments[0] == "run":
         return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
     if arguments[0] == "identify" and "--config" not in arguments:
@@ -108,9 +131,13 @@ def _typed(words: list[str]) -> list[str]:
     return arguments
 
 
-def _call(arguments: list[str], folder: Path, environment: dict[str, str]) -> None:
+def _call(program: str, arguments: list[str], folder: Path, environment: dict[str, str]) -> None:
     with TemporaryFile("w+") as said:
-        status = loaded.call("biogrip", arguments, folder, environment, (said, said))
+        if program in ("biogrip", "snakemake"):
+            status = loaded.call(program, arguments, folder, environment, (said, said))
+        else:
+            command = [program, *arguments]
+            status = subprocess.run(command, cwd=folder, stdout=said, stderr=said).returncode
         said.seek(0)
         assert status == 0, said.read()
 

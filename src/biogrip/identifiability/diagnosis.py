@@ -110,8 +110,8 @@ def _pulling(grip: Grip, last_s: float) -> Iterator[str]:
     """Yield a doubt if, with the best fit, the jaws would have to pull at the sample."""
     if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
         yield (
-            f"With the best fit {grip.words()}. Unless it sticks to the jaws, they lost contact "
-            "then: identify the sample from the part of the trace before that."
+            f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
+            "there: fit only the samples before that."
         )
 
 

@@ -74,10 +74,10 @@ class TraceFit:
         if colour.relaxing >= _WORTH_SAYING:
             parts.append(f"{_percent(colour.relaxing)} correlated over some {colour.time_s:.2g} s")
         if colour.flicker >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.flicker)} of spectrum 1/f")
+            parts.append(f"{_percent(colour.flicker)} 1/f")
         said = [
-            f"Noise model: of the variance, {', '.join(parts)}. An offset and a drift of the "
-            "instrument are fitted, too, and the intervals allow for all of it."
+            f"Noise model: of the variance {', '.join(parts)}; an offset and a drift of the "
+            "instrument are fitted along, and the intervals allow for all of it."
         ]
         if left_out:
             samples = counted(left_out, "sample")
