@@ -16,6 +16,7 @@ import biogrip
 _PACKAGE = Path(biogrip.__file__).parent
 _SAYING = (
     "biogrip.study",
+    "biogrip.identify.methods",
     *(f"biogrip.products.{name}" for name in ("product", "plan", "digest")),
     *(f"biogrip.products.{folder}.declared" for folder in ("tables", "figures")),
 )

@@ -12,6 +12,7 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
+from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables import verdicts as verdicts_table
 from biogrip.products.tables.layout import Table
@@ -31,7 +32,9 @@ def rows(table: Table) -> list[dict[str, Any]]:
 def settings(parameters: dict[str, float], samples: int) -> Settings:
     """Of one case, a drop."""
     truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
-    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, near_noise_tolerance=0.02)
+    return Settings(
+        {"drop": (truth, samples)}, METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02
+    )
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -141,5 +144,5 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
 def test_timings_are_summed(tmp_path: Path) -> None:
     path = tmp_path / "times.csv"
     path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = rows(timings(None, [path]))
+    (row,) = rows(timings(METHODS, [path]))
     assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

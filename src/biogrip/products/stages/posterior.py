@@ -17,7 +17,8 @@ from biogrip.files import write_text
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.answer import Progress, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.identifier import best_fit
+from biogrip.identify.methods import METHODS
 from biogrip.identify.model_choice import ranked
 from biogrip.identify.problem import Problem
 from biogrip.products.files.posterior import (
