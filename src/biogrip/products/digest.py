@@ -8,6 +8,7 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -50,14 +51,16 @@ def _plain(value: object, code: set[str]) -> Any:
     if isinstance(value, float | complex):
         return f"{value:.{_DIGITS}g}"
     if is_dataclass(value) and not isinstance(value, type):
-        told = [
+        own = [
             [field.name, _plain(getattr(value, field.name), code)]
             for field in fields(value)
             if field.init
         ]
         if isinstance(value, Sample) and value.candidate in CANDIDATES:
-            told.append(["model", _plain(value.model, code)])
-        return told
+            model, modules = _of_model(value)
+            code |= modules
+            own.append(["model", model])
+        return own
     if isinstance(value, Mapping):
         return [[str(key), _plain(inner, code)] for key, inner in value.items()]
     if isinstance(value, list | tuple):
@@ -70,3 +73,9 @@ def _plain(value: object, code: set[str]) -> Any:
             code.add(module)
         return None
     raise TypeError(f"settings cannot hold {value!r}")
+
+
+@cache
+def _of_model(sample: Sample) -> tuple[Any, set[str]]:
+    code: set[str] = set()
+    return _plain(sample.model, code), code
