@@ -19,8 +19,8 @@ from benchmarks.timing import clocked, time_to_success
 from biogrip.arrays import Array
 from biogrip.experiment.noise import rms
 from biogrip.identify.answer import silent
+from biogrip.identify.identifier import identifier
 from biogrip.identify.methods import METHODS as OURS
-from biogrip.identify.methods import identifier
 
 Method = Callable[[Problem, np.random.Generator], Array]
 """Finds parameters of low misfit, from the trace on."""

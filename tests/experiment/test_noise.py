@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter, periodogram
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.noise import KINDS, Noise, add_noise, rms
 from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing, remembering
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
@@ -16,12 +16,14 @@ def noise_of(kind: str, reference: str) -> np.ndarray:
     return add_noise(CLEAN, Noise(kind, 0.1, reference), rng) - CLEAN
 
 
-@pytest.mark.parametrize("kind", ["gaussian", "uniform"])
+@pytest.mark.parametrize("kind", KINDS)
 def test_level_is_the_standard_deviation_over_the_peak(kind: str) -> None:
     noise = noise_of(kind, "peak")
     # 2e5 samples: the standard deviation is known to 0.2 %, three times that is allowed.
     assert rms(noise) == pytest.approx(0.2, rel=6e-3)
     assert rms(noise[:100_000]) == pytest.approx(rms(noise[100_000:]), rel=2e-2)
+    # Of the mean, to 0.0004; four times that is allowed.
+    assert abs(noise.mean()) < 2e-3
 
 
 def test_proportional_noise_vanishes_with_the_signal() -> None:

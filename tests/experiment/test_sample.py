@@ -7,15 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from biogrip.experiment.maxwell_models import generalized_maxwell, liquid_drop
 from biogrip.experiment.protocol import TorqueHistory, held, torque_history
-from biogrip.experiment.sample import (
-    MODELS,
-    Network,
-    generalized_maxwell,
-    liquid_drop,
-    model_named,
-    with_fixed,
-)
+from biogrip.experiment.sample import MODELS, Network, model_named, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, sample_polynomials, step_response
 
@@ -100,6 +94,10 @@ def impedance(network: Network, s: complex) -> complex:
     """The library's sample, P/Q, at a complex frequency."""
     p, q = sample_polynomials(network)
     return complex(np.polyval(p[::-1, 0], s) / np.polyval(q[::-1, 0], s))
+
+
+def test_every_model_without_a_springpot_is_drawn_by_hand() -> None:
+    assert set(SPRING_OR_DAMPER) == {name for name, model in MODELS.items() if not model.power_law}
 
 
 @pytest.mark.parametrize("name", SPRING_OR_DAMPER)

@@ -17,7 +17,7 @@ from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
-from biogrip.identify.methods import identifier
+from biogrip.identify.identifier import identifier
 from biogrip.identify.problem import Problem
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along

@@ -121,7 +121,7 @@ def _load() -> None:
 
     from biogrip.products.catalogue import products
     from biogrip.products.figures.style import figure, styled
-    from biogrip.running.source_files import fingerprint
+    from biogrip.products.source_files import fingerprint
 
     # What either imports only when it is needed.
     get_argument_parser()

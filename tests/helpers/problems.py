@@ -11,7 +11,7 @@ from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_hist
 from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.identify import least_squares
 from biogrip.identify.answer import Identification, silent
-from biogrip.identify.methods import identifier
+from biogrip.identify.identifier import identifier
 from biogrip.identify.problem import Problem, problem_of
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed

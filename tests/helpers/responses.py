@@ -18,7 +18,7 @@ from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held
-from biogrip.experiment.sample import SampleModel
+from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.instrument.gripper import Gripper
 
 SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
@@ -31,18 +31,7 @@ PROTOCOLS = {
     ),
     "arms driven differently": (held(200.0, 1.6e-9, 1.0e-9), held(200.0, 0.3e-9, 0.5e-9)),
 }
-MODEL_PARAMETERS: dict[str, list[float]] = {
-    "generalized_maxwell": [9.5, 0.3, 10.0, 0.7],
-    "liquid_drop": [9.5, 0.3, 10.0],
-    "damper": [10.0],
-    "kelvin_voigt": [0.3, 10.0],
-    "maxwell": [2.0, 50.0],
-    "zener_maxwell": [2.0, 1.0, 50.0],
-    "zener_kelvin": [3.0, 2.0, 40.0],
-    "burgers": [3.0, 200.0, 2.0, 40.0],
-    "fractional_kelvin_voigt": [0.3, 10.0, 0.4],
-    "fractional_maxwell": [10.0, 0.3, 300.0],
-}
+MODEL_PARAMETERS = {name: list(model.example) for name, model in MODELS.items()}
 # Logarithms between which parameters of each kind are searched for, about.
 LOG_RANGES = {
     "stiffness": (-9.1, 18.4),

@@ -12,8 +12,9 @@ from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.profiles import profiles_of
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
+from biogrip.identify.identifier import identifier
 from biogrip.identify.local_fits import FINE
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.methods import METHODS
 from biogrip.identify.problem import Problem
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import STUDY, study_of

@@ -8,8 +8,9 @@ import pandas as pd
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import held, torque_history
-from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.at_truth import headlines
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.products.figures import robustness as figure

@@ -3,8 +3,8 @@ import math
 import numpy as np
 import pytest
 
+from biogrip.experiment.maxwell_models import damper, generalized_maxwell, kelvin_voigt
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
-from biogrip.experiment.sample import damper, generalized_maxwell, kelvin_voigt
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.grip import grip_of
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
+from biogrip.experiment.maxwell_models import damper, generalized_maxwell, maxwell
 from biogrip.experiment.protocol import TorqueHistory, held, torque_at, torque_history
-from biogrip.experiment.sample import damper, generalized_maxwell, maxwell
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
 from biogrip.response.linear import rotation, step_response

@@ -5,8 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import TorqueHistory, held, torque_history
-from biogrip.experiment.sample import Network, generalized_maxwell
+from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.responses import random_samples, rotation_50_digits

@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
-from biogrip.experiment.sample import generalized_maxwell
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.instrument.linkage import rotation_of_tip
 from biogrip.response.linear import RIGHT, rotation, step_response

@@ -9,9 +9,10 @@ from mpmath import gamma
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.network import Network
 from biogrip.experiment.protocol import TorqueHistory, held, torque_history
-from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.experiment.sample import MODELS
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response

@@ -10,6 +10,7 @@ from mpmath import mp, mpf
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import (
     Harmonic,
     Load,
@@ -18,7 +19,7 @@ from biogrip.experiment.protocol import (
     torque_at,
     torque_history,
 )
-from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.experiment.sample import MODELS
 from biogrip.instrument.actuator import torque as torque_of_voltage
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.inertia import ringing_s

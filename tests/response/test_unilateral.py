@@ -8,6 +8,13 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
+from biogrip.experiment.maxwell_models import (
+    damper,
+    generalized_maxwell,
+    kelvin_voigt,
+    liquid_drop,
+    maxwell,
+)
 from biogrip.experiment.protocol import (
     Harmonic,
     Load,
@@ -17,14 +24,7 @@ from biogrip.experiment.protocol import (
     torque_at,
     torque_history,
 )
-from biogrip.experiment.sample import (
-    MODELS,
-    damper,
-    generalized_maxwell,
-    kelvin_voigt,
-    liquid_drop,
-    maxwell,
-)
+from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.free_recovery import smooth_pieces
 from biogrip.response.jaw_force import jaw_force

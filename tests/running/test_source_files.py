@@ -1,3 +1,4 @@
+import ast
 import re
 import shutil
 import subprocess
@@ -6,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.running.source_files import fingerprint, source_files
+import biogrip.products
+from biogrip.products.source_files import _SAYING, fingerprint, source_files
 from tests.helpers.places import EXAMPLE
 
 
@@ -28,7 +30,7 @@ def test_a_stage_names_what_it_imports_and_nothing_else() -> None:
 STUBS = """
 import importlib, importlib.abc, importlib.machinery, sys, types
 from unittest.mock import MagicMock
-from biogrip.running.source_files import _SAYING
+from biogrip.products.source_files import _SAYING
 
 class Stub(types.ModuleType):
     __path__ = []
@@ -119,7 +121,7 @@ def test_an_import_is_found_wherever_it_stands(
     for name in {*named, "never"}:
         (tmp_path / f"{name}.py").write_text("")
     (tmp_path / "whole.py").write_text(EVERYWHERE)
-    monkeypatch.setattr("biogrip.running.source_files._PACKAGE", tmp_path)
+    monkeypatch.setattr("biogrip.products.source_files._PACKAGE", tmp_path)
     files = source_files("biogrip.whole")
     assert len(named) == 12
     assert {Path(file).stem for file in files} == {*named, "whole"}
@@ -154,9 +156,39 @@ def test_a_fingerprint_changes_with_what_a_module_imports(
         package = package.parent
     shutil.copytree(package, tmp_path / "biogrip")
     of_original = fingerprint.__wrapped__(module)
-    monkeypatch.setattr("biogrip.running.source_files._PACKAGE", tmp_path / "biogrip")
+    monkeypatch.setattr("biogrip.products.source_files._PACKAGE", tmp_path / "biogrip")
     assert fingerprint.__wrapped__(module) == of_original
     for file, same in (("identify/genetic.py", True), ("products/files/traces.py", False)):
         edited = tmp_path / "biogrip" / file
         edited.write_text(edited.read_text() + "# edited\n")
         assert (fingerprint.__wrapped__(module) == of_original) is same
+
+
+LISTS = {"METHODS": "biogrip.identify.methods", "MODELS": "biogrip.experiment.models"}
+# Candidates are the models with numbers of branches; their module holds more, and is followed.
+LISTED = {*LISTS, "CANDIDATES"}
+
+
+def test_what_products_use_of_methods_and_models_is_in_their_settings() -> None:
+    """No digest follows the lists of them; so settings are chosen from these, and nothing else."""
+    assert set(LISTS.values()) <= set(_SAYING)
+    (folder,) = map(Path, biogrip.products.__path__)
+    uses = 0
+    for file in folder.rglob("*.py"):
+        if file.name == "digest.py":
+            continue
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        chosen = [node for node in ast.walk(tree) if _chooses(node)]
+        allowed = {id(inner) for node in chosen for inner in ast.walk(node)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name) and node.id in LISTED:
+                uses += 1
+                assert id(node) in allowed, f"{file.name}, line {node.lineno}"
+    assert uses >= 5
+
+
+def _chooses(node: ast.AST) -> bool:
+    """Whether this is a function of the study, or one that names modules of a job."""
+    if isinstance(node, ast.FunctionDef):
+        return any(argument.arg == "study" for argument in node.args.args)
+    return isinstance(node, ast.Lambda)

@@ -6,6 +6,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import (
     Harmonic,
@@ -16,7 +17,7 @@ from biogrip.experiment.protocol import (
     sample_times,
     torque_history,
 )
-from biogrip.experiment.sample import MODELS, generalized_maxwell
+from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nuisance import nuisance_basis

@@ -10,8 +10,10 @@ import pytest
 
 from biogrip.cli import main
 from biogrip.products.catalogue import products
-from biogrip.running.source_files import source_files
-from tests.helpers.runs import biogrip, built_once, results_of
+from biogrip.products.digest import modules_in
+from biogrip.products.source_files import source_files
+from tests.helpers.default import study_of
+from tests.helpers.runs import TINY, biogrip, built_once, results_of
 
 CASE = ("--case", "liquid_drop_2")
 BATCH = (*CASE, "--batch", "seeds_1-1")
@@ -253,7 +255,9 @@ def test_no_code_that_makes_a_product_is_missing_from_its_digest(
 ) -> None:
     """What is called is the independent count; what only says what to do is in the settings."""
     product = products()[name]
-    known = source_files(product.module, *product.modules(wildcards_of(JOBS[name])))
+    job = wildcards_of(JOBS[name])
+    in_settings = modules_in(product.settings(study_of(TINY), job))
+    known = source_files(product.module, *product.modules(job), *in_settings)
     # How a product is written down when it is made, not what: see `_SAYING`.
     wrappers = {file for file in called[name] if file.endswith("/declared.py")}
     assert sys.modules[product.module].__file__ in called[name]

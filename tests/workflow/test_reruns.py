@@ -188,11 +188,58 @@ def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree
     assert not untouched & set(jobs)
 
 
+ONE_METHOD_MORE = """
+METHODS["another"] = Method("another", "another one", {}, "step", "amber", ":")
+"""
+ONE_MODEL_MORE = """
+from dataclasses import replace
+MODELS["another"] = replace(LIQUID_DROP, name="another")
+"""
+
+
+def test_a_method_and_a_model_more_rerun_nothing(tree: Tree) -> None:
+    package = tree.root / "src" / "biogrip"
+    with (
+        edited(package / "identify" / "methods.py", ONE_METHOD_MORE),
+        edited(package / "experiment" / "models.py", ONE_MODEL_MORE),
+    ):
+        run = tree.run("-n", config=TINY)
+    assert run.status == 0, run.output
+    assert "Nothing to be done" in run.output
+
+
+def test_a_method_said_otherwise_reruns_what_says_it(tree: Tree) -> None:
+    """Least squares is drawn and listed, but not what it found."""
+    said = '\nMETHODS["least_squares"] = replace(METHODS["least_squares"], title="fits")\n'
+    file = tree.root / "src/biogrip/identify/methods.py"
+    with edited(file, f"\nfrom dataclasses import replace\n{said}"):
+        run = tree.run("-n", config=TINY)
+    assert run.all_jobs() == {"tables": 1, "study_figures": 1, "case_figures": 1, "report": 1}
+
+
+def test_an_edited_model_reruns_what_it_is_used_in(tree: Tree) -> None:
+    """The study's are of one family; a fluid that it does not name is of another."""
+    package = tree.root / "src" / "biogrip" / "experiment"
+    for file in ("burgers.py", "fractional.py"):
+        with edited(package / file):
+            run = tree.run("-n", config=TINY)
+        assert "Nothing to be done" in run.output
+    with edited(package / "maxwell_models.py"):
+        run = tree.run("-n", config=TINY)
+    used_in = {"target", "identification", "model_fits", "intervals", "judgement"}
+    assert used_in | {"model_difference", "report"} <= set(run.all_jobs())
+    with edited(package / "burgers.py"):
+        named = replaced(TINY, "damper, maxwell", "damper, burgers")
+        jobs = tree.run("-n", config=named).all_jobs()
+    assert "model_fits" in jobs
+    assert not {"target", "identification", "intervals", "judgement"} & set(jobs)
+
+
 @contextmanager
-def edited(file: Path) -> Iterator[None]:
+def edited(file: Path, line: str = "\n# edited\n") -> Iterator[None]:
     """Add a line to a file for a while, and put its time back with its content."""
     content, times = file.read_text(), file.stat()
-    file.write_text(content + "\n# edited\n")
+    file.write_text(content + line)
     yield
     file.write_text(content)
     os.utime(file, ns=(times.st_atime_ns, times.st_mtime_ns))

@@ -9,8 +9,8 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.image import imread
 
+from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.protocol import held, torque_history
-from biogrip.experiment.sample import generalized_maxwell
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.catalogue import products
 from biogrip.products.figures.style import COLUMN_IN

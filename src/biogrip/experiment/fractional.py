@@ -5,10 +5,13 @@ exponent alpha. Both models are represented by Maxwell branches, as a `Network` 
 models.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from biogrip.experiment.network import Network, columns_of
+from biogrip.experiment.sample_model import K_P, C, Parameter, SampleModel
 from biogrip.experiment.springpot import BRANCH_RATES_PER_S, ladder
 from biogrip.interlacing import interlaced_zeros
 
@@ -74,3 +77,24 @@ def fractional_maxwell(parameters: ArrayLike) -> Network:
         k=k.T,
         c=(k / zeros.values).T,
     )
+
+
+_K_ALPHA = Parameter("k_alpha", "springpot", "springpot, modulus at 1 rad/s", "k")
+_ALPHA = Parameter("alpha", "exponent", "exponent of the springpot", "alpha", below=1.0)
+
+FRACTIONAL_KELVIN_VOIGT = SampleModel(
+    "fractional_kelvin_voigt",
+    "fractional Kelvin-Voigt solid",
+    (replace(K_P, meaning="parallel spring"), _K_ALPHA, _ALPHA),
+    fractional_kelvin_voigt,
+    example=(0.3, 10.0, 0.4),
+    contains={"kelvin_voigt": lambda k_p, c_p: (k_p, c_p, 1.0)},
+)
+FRACTIONAL_MAXWELL = SampleModel(
+    "fractional_maxwell",
+    "fractional Maxwell liquid",
+    (_K_ALPHA, _ALPHA, replace(C, meaning="series damper")),
+    fractional_maxwell,
+    example=(10.0, 0.3, 300.0),
+    contains={"maxwell": lambda k, c: (k, 0.0, c)},
+)

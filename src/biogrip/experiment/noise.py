@@ -1,6 +1,6 @@
 """Noise that is added to simulated rotations."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -17,12 +17,20 @@ from biogrip.experiment.noise_parts import (
 )
 from biogrip.keys import Key, Problem
 
+_HALF_WIDTH = np.sqrt(3.0)
+
+KINDS: dict[str, Callable[[np.random.Generator, int], Array]] = {
+    "gaussian": lambda rng, count: rng.standard_normal(count),
+    "uniform": lambda rng, count: rng.uniform(-_HALF_WIDTH, _HALF_WIDTH, count),
+}
+"""Distributions of white noise: functions that draw numbers of unit variance."""
+
 
 @dataclass(frozen=True)
 class Noise:
     """Noise added to the noise-free rotation; components beside white noise can be combined."""
 
-    kind: Annotated[str, Key("Distribution of white noise.", choices=("gaussian", "uniform"))]
+    kind: Annotated[str, Key("Distribution of what is white of the noise.", choices=tuple(KINDS))]
     level: Annotated[
         float,
         Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
@@ -97,11 +105,7 @@ def add_noise(
     ValueError
         If the times are required and missing.
     """
-    if noise.kind == "uniform":
-        half_width = np.sqrt(3.0)
-        unit = rng.uniform(-half_width, half_width, size=len(rotation_rad))
-    else:
-        unit = rng.standard_normal(len(rotation_rad))
+    unit = KINDS[noise.kind](rng, len(rotation_rad))
     if not noise.white:
         if time_s is None:
             raise ValueError("noise with parts that are not white needs the sampling times")

@@ -1,25 +1,18 @@
-"""Registry of the identification methods.
+"""The identifiers that there are: what is said of each, and nothing of how it works.
 
 Each method is a module of this package, named like the method. It has the class of its settings,
 whose fields are the keys of its config block (`biogrip.keys.Key`), and a function
-``identify_many(problems, settings, rngs, progress)`` that returns an `Identification` of each
-trace, independent of the other traces to the last bit. Each trace's generator is its only source
-of randomness. Search ranges belong to the problems, the budget of each trace to the settings.
+``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
+trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
+in the settings, its generator is its only source of randomness, and progress is told of all.
+
+What is made holds the `Method` that it shows in its settings: this module is in no job's digest,
+so that one more method makes nothing again.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
-
-import numpy as np
-
-from biogrip.identify.answer import Identification, Progress
-from biogrip.identify.problem import Problem
-
-Identify = Callable[
-    [Sequence[Problem], Sequence[np.random.Generator], Progress], list[Identification]
-]
-"""The ``identify_many`` of a method with its settings already given."""
 
 
 @dataclass(frozen=True)
@@ -33,16 +26,27 @@ class Method:
     blocks
         Names of its config blocks, and of the settings class of each in its module.
     step
-        Unit of work after which its history has a row.
+        What a row of its history follows.
+    color, dashes
+        Its lines in figures, as no other method's: a colour by its name in
+        `biogrip.products.figures.style.COLORS`, and Matplotlib's dashes.
     settings
-        Name of the class in its module that combines several blocks, in their order.
+        Class in its module that puts several blocks together, in their order.
+    exact
+        Whether it promises all digits of the optimum where it ends; tests hold it to that.
+    sure
+        Whether it promises the global optimum of (nearly) every trace; likewise.
     """
 
     name: str
     title: str
     blocks: Mapping[str, str]
     step: str
+    color: str
+    dashes: str
     settings: str = ""
+    exact: bool = False
+    sure: bool = False
 
     @property
     def module(self) -> str:
@@ -63,25 +67,38 @@ METHODS: dict[str, Method] = {
             "genetic algorithm",
             {"genetic_algorithm": "GeneticSettings"},
             "generation",
+            "grey",
+            "-",
         ),
         Method(
             "genetic_refined",
             "genetic, polished",
             {"genetic_algorithm": "GeneticSettings", "genetic_refined": "Polishing"},
             "generation, then local fit",
+            "vermilion",
+            "-",
             "RefinedSettings",
+            exact=True,
+            sure=True,
         ),
         Method(
             "least_squares",
             "multi-start least squares",
             {"least_squares": "LeastSquaresSettings"},
             "local fit",
+            "blue",
+            "--",
+            exact=True,
+            sure=True,
         ),
         Method(
             "differential_evolution",
             "differential evolution",
             {"differential_evolution": "DifferentialEvolutionSettings"},
             "generation",
+            "purple",
+            "-.",
+            exact=True,
         ),
     )
 }
@@ -91,33 +108,3 @@ def block_class(block: str) -> type:
     """Import the settings class of a config block of any method."""
     method = next(method for method in METHODS.values() if block in method.blocks)
     return method.named(method.blocks[block])
-
-
-def identifier(name: str, settings: object) -> Identify:
-    """Return the function that identifies traces by a method with given settings.
-
-    Parameters
-    ----------
-    name
-        One of `METHODS`.
-    settings
-        Instance of the method's settings class.
-    """
-    module = import_module(METHODS[name].module)
-
-    def identify(
-        problems: Sequence[Problem], rngs: Sequence[np.random.Generator], progress: Progress
-    ) -> list[Identification]:
-        answers = module.identify_many(problems, settings, rngs, progress)
-        pairs = zip(problems, answers, strict=True)
-        return [answer.in_order(problem.residuals.model) for problem, answer in pairs]
-
-    return identify
-
-
-def best_fit(
-    problem: Problem, least_squares: object, rng: np.random.Generator, progress: Progress
-) -> Identification:
-    """Identify one trace by multi-start least squares, the method of all further analyses."""
-    (found,) = identifier("least_squares", least_squares)([problem], [rng], progress)
-    return found

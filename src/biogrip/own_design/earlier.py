@@ -9,7 +9,7 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.groups.replicates import joint_problem
 from biogrip.identify.answer import Identification, silent
-from biogrip.identify.methods import best_fit
+from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.study.asked_design import plausible_ends

@@ -29,7 +29,7 @@ from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.groups.membership import Cell, read_cells
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identify.answer import Identification
-from biogrip.identify.methods import best_fit
+from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import Wanted, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output

@@ -10,7 +10,7 @@ from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Progress
-from biogrip.identify.methods import best_fit
+from biogrip.identify.identifier import best_fit
 from biogrip.identify.multi_start import fit_from
 from biogrip.products.files.traces import Measurements
 from biogrip.study.study import Case, Study

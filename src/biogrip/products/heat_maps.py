@@ -8,6 +8,7 @@ import pandas as pd
 
 from biogrip.errors import BiogripError
 from biogrip.identifiability.at_truth import headlines
+from biogrip.identify.methods import Method
 from biogrip.products.product import Reads
 from biogrip.products.stages.sweep_points import POINTS
 from biogrip.study.study import Study
@@ -49,7 +50,7 @@ class HeatMaps:
     cases
         Titles of the cases, by name.
     methods
-        Names of the methods.
+        Identifiers by name.
     rows, columns
         Axes of the grid.
     near_noise_tolerance
@@ -60,7 +61,7 @@ class HeatMaps:
 
     title: str
     cases: Mapping[str, str]
-    methods: tuple[str, ...]
+    methods: Mapping[str, Method]
     rows: ShownAxis
     columns: ShownAxis
     near_noise_tolerance: float
@@ -73,7 +74,7 @@ def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
     return HeatMaps(
         sweep.title,
         titles,
-        tuple(study.methods),
+        study.identifiers,
         _shown(study, sweep.rows),
         _shown(study, sweep.columns),
         study.near_noise_tolerance,

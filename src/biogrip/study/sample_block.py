@@ -54,7 +54,7 @@ class SampleBlock:
 
     def problems(self) -> Iterator[Problem]:
         """Find parameters that the model does not have, or whose values it does not allow."""
-        if self.branches != 1 and self.model != "generalized_maxwell":
+        if self.branches != 1 and MODELS[self.model].branched is None:
             yield ("branches",), "only generalized_maxwell has a number of branches."
             return
         model = self.sample.model

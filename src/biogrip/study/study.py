@@ -14,6 +14,7 @@ from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
+from biogrip.identify.methods import METHODS, Method
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
@@ -281,6 +282,11 @@ class Study:
     def methods(self) -> list[str]:
         """Identification methods; tables and figures of a single method show the first."""
         return list(self.config.methods)
+
+    @property
+    def identifiers(self) -> dict[str, Method]:
+        """Declarations of the methods, by name."""
+        return {name: METHODS[name] for name in self.methods}
 
     @property
     def shown(self) -> str:

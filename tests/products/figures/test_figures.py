@@ -13,10 +13,12 @@ import pytest
 from fontTools import subset
 from fontTools.ttLib import TTFont
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
+from biogrip.identify.methods import METHODS
 from biogrip.products.figures import comb, convergence, linkage, torque
 from biogrip.products.figures.results import scale_of
-from biogrip.products.figures.style import ALL_SEEDS, FITTED, figure, save, styled
+from biogrip.products.figures.style import ALL_SEEDS, COLORS, FITTED, figure, line_of, save, styled
 from biogrip.products.product import Product
 from tests.helpers.default import STUDY
 
@@ -95,7 +97,7 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit_rad"] = np.repeat(misfit, 2)
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
-    settings = convergence.Settings("A cell", "genetic", 20, near_noise_tolerance=0.02)
+    settings = convergence.Settings("A cell", METHODS["genetic"], 20, near_noise_tolerance=0.02)
     files = (tmp_path / "found.csv", tmp_path / "history.parquet")
     axes = convergence.draw(settings, *files).axes
     filled = [line for line in axes[0].lines if len(np.asarray(line.get_xdata()))]
@@ -163,3 +165,14 @@ def decompressed(stream: bytes) -> bytes:
     with suppress(zlib.error):
         return zlib.decompress(stream)
     return b""
+
+
+def test_every_method_is_drawn_as_no_other_and_in_colours_for_all_eyes() -> None:
+    lines = [tuple(line_of(method).values()) for method in METHODS.values()]
+    assert len(set(lines)) == len(lines)
+    for method in METHODS.values():
+        Line2D([], [], **line_of(method))
+    # Okabe and Ito's, but for their yellow, which is not seen on white; and a grey.
+    assert set(COLORS.values()) == {
+        *("#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00", "#CC79A7", "#999999"),
+    }

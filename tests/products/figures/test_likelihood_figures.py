@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from matplotlib.patches import Rectangle
 
+from biogrip.identify.methods import METHODS
 from biogrip.products.figures import overview, profiles, valley
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.style import figure, lay_out, styled
@@ -106,7 +107,7 @@ def drawn_valley(
         frame[column] = 1
     frame.to_csv(folder / "found.csv", index=False)
     settings = valley.Settings(
-        "A drop", "least_squares", known.get("truth", {}), known.get("paper", {})
+        "A drop", METHODS["least_squares"], known.get("truth", {}), known.get("paper", {})
     )
     with styled():
         return valley.draw(settings, path, folder / "found.csv").axes[0]

@@ -12,12 +12,14 @@ import pytest
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
+from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables import verdicts as verdicts_table
 from biogrip.products.tables.layout import Table
 from biogrip.products.tables.methods import Settings, methods
+from biogrip.products.tables.models import Settings as Models
 from biogrip.products.tables.models import models
-from biogrip.products.tables.models import settings as made_by
+from biogrip.products.tables.models import settings as compared
 from biogrip.products.tables.timings import timings
 from biogrip.products.tables.verdicts import verdicts
 from tests.helpers.default import study_of
@@ -31,7 +33,9 @@ def rows(table: Table) -> list[dict[str, Any]]:
 def settings(parameters: dict[str, float], samples: int) -> Settings:
     """Of one case, a drop."""
     truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
-    return Settings({"drop": (truth, samples)}, optimum_tolerance=1.0, near_noise_tolerance=0.02)
+    return Settings(
+        {"drop": (truth, samples)}, METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02
+    )
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -78,7 +82,8 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
             fits.append(["drop", model, seed, count, n, misfit])
     names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
-    damper, maxwell = rows(models({"drop": "maxwell"}, [path]))
+    tried = {name: Sample(name) for name in ("damper", "maxwell")}
+    damper, maxwell = rows(models(Models({"drop": "maxwell"}, tried), [path]))
     # A parameter costs 2 by AIC, ln 1000 = 6.9 by BIC.
     assert (damper["chosen_by_aic"], maxwell["chosen_by_aic"]) == (1, 2)
     assert (damper["chosen_by_bic"], maxwell["chosen_by_bic"]) == (2, 1)
@@ -100,7 +105,8 @@ cases:
     fits = [["two", name, 0, 4, 1000, 1.0] for name in tried]
     names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
-    found = rows(models({"two": made_by(study)["two"]}, [path]))
+    shown = replace(compared(study), made_by={"two": "generalized_maxwell_2"})
+    found = rows(models(shown, [path]))
     marked = [row["model"] for row in found if "made the traces" in row["model"]]
     assert marked == ["generalized Maxwell-Wiechert model, 2 branches (made the traces)"]
     assert [row["parameters"] for row in found] == [1, 4, 6]
@@ -141,5 +147,5 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
 def test_timings_are_summed(tmp_path: Path) -> None:
     path = tmp_path / "times.csv"
     path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = rows(timings(None, [path]))
+    (row,) = rows(timings(METHODS, [path]))
     assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
@@ -36,16 +36,17 @@ class Settings:
     """
 
     title: str
-    method: str
+    method: Method
     mutation_start: int | None
     near_noise_tolerance: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the convergence of a case depends on."""
-    mutates = "genetic_algorithm" in METHODS[study.shown].blocks
+    method = study.identifiers[study.shown]
+    mutates = "genetic_algorithm" in method.blocks
     start = case.mutation_start if mutates else None
-    return Settings(case.title, study.shown, start, study.near_noise_tolerance)
+    return Settings(case.title, method, start, study.near_noise_tolerance)
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
@@ -58,12 +59,12 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     identifications, histories
         Files of the case, CSV and Parquet.
     """
-    found = read_identifications(identifications, settings.method)
+    found = read_identifications(identifications, settings.method.name)
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
     shown = int(typical(found)["seed"])
-    history = read_history(histories, settings.method, shown)
+    history = read_history(histories, settings.method.name, shown)
     reached = near_noise(found, settings.near_noise_tolerance)
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
@@ -87,7 +88,7 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(0, last)
-    axes.set_xlabel(METHODS[settings.method].step)
+    axes.set_xlabel(settings.method.step)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
         words = near_noise_words(settings.near_noise_tolerance)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
 from biogrip.experiment.truth import Truth
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.identify.success import typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
@@ -23,12 +23,12 @@ class Settings:
     """The sample, and the method whose histories are drawn."""
 
     truth: Truth
-    method: str
+    method: Method
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the evolution of a case depends on."""
-    return Settings(case.truth, study.shown)
+    return Settings(case.truth, study.identifiers[study.shown])
 
 
 def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
@@ -41,12 +41,12 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     identifications, histories
         Files of the case, CSV and Parquet.
     """
-    truth, step = settings.truth, METHODS[settings.method].step
-    found = read_identifications(identifications, settings.method)
+    truth, step = settings.truth, settings.method.step
+    found = read_identifications(identifications, settings.method.name)
     shown = int(typical(found)["seed"])
     parameters = truth.model.parameters
     columns = [parameter.column for parameter in parameters]
-    history = read_history(histories, settings.method, shown, columns)
+    history = read_history(histories, settings.method.name, shown, columns)
     identified = truth.published.identified
     drawn = figure(PAGE_IN, 3.9)
     grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()

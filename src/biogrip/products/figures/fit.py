@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import Fit, scale_of, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
@@ -25,13 +25,14 @@ class Settings:
 
     title: str
     problem: CaseProblem
-    method: str
+    method: Method
     axis_rad: tuple[float, ...]
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the fit of a case depends on."""
-    return Settings(case.title, case.problem, study.shown, case.published.axis_rad)
+    method = study.identifiers[study.shown]
+    return Settings(case.title, case.problem, method, case.published.axis_rad)
 
 
 def draw(
@@ -47,9 +48,8 @@ def draw(
         Files of the case: CSV, Parquet, and YAML if its gripper was calibrated.
     """
     problem = settings.problem.calibrated(calibrated)
-    fit = typical_fit(problem, settings.method, identifications, measurements)
-    step = METHODS[settings.method].step
-    ended = f"{step} {fit.generations}"
+    fit = typical_fit(problem, settings.method.name, identifications, measurements)
+    ended = f"{settings.method.step} {fit.generations}"
     recorded = fit.target_rad is None
     label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
     return draw_fit(fit, label, settings.title, settings.axis_rad)

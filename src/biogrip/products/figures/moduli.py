@@ -13,7 +13,7 @@ from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.experiment.sample import Network, SampleModel
 from biogrip.experiment.truth import Truth
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.identify.success import near_noise
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.overview import shown_cases
@@ -23,13 +23,13 @@ from biogrip.products.figures.style import (
     BLUE,
     GREEN,
     GREY,
-    METHOD_STYLES,
     ORANGE,
     PAGE_IN,
     PURPLE,
     SHADE,
     SKY,
     figure,
+    line_of,
     panel,
 )
 from biogrip.products.files.identifications import PATH, read_identifications
@@ -62,7 +62,7 @@ class Settings:
     """Drawn samples, methods whose fits are drawn, and tolerance of the noise."""
 
     cases: tuple[ShownCase, ...]
-    methods: tuple[str, ...]
+    methods: tuple[Method, ...]
     near_noise_tolerance: float
 
 
@@ -72,7 +72,7 @@ def settings(study: Study) -> Settings:
     methods = [study.shown, *(["least_squares"] if "least_squares" in study.methods else [])]
     return Settings(
         tuple(ShownCase(case.truth, case.problem, case.noise) for case in cases),
-        tuple(dict.fromkeys(methods)),
+        tuple(study.identifiers[name] for name in dict.fromkeys(methods)),
         study.near_noise_tolerance,
     )
 
@@ -121,13 +121,13 @@ def _moduli(
     model = case.problem.model
     near = []
     for method in settings.methods:
-        found = first_seeds(read_identifications(identified, method))
+        found = first_seeds(read_identifications(identified, method.name))
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
         near.append(moduli[near_noise(found, settings.near_noise_tolerance)])
-        style = METHOD_STYLES[method] | {"linewidth": 0.4, "alpha": 0.45}
+        style = line_of(method) | {"linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
-            label = METHODS[method].title if index == 0 else None
+            label = method.title if index == 0 else None
             for part, dashed in ((modulus.real, "-"), (modulus.imag, "--")):
                 axes.plot(omega, part, **style | {"linestyle": dashed}, label=label)
                 label = None

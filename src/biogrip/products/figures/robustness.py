@@ -11,7 +11,6 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.identify.methods import METHODS
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
 from biogrip.products.heat_maps import (
@@ -71,7 +70,7 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
             )
     drawn.supylabel(maps.rows.title, fontsize=8)
     drawn.supxlabel(maps.columns.title, fontsize=8)
-    first, *others = (METHODS[method].title for method in maps.methods)
+    first, *others = (method.title for method in maps.methods.values())
     bar = drawn.colorbar(ScalarMappable(_SHARE, "cividis"), ax=list(grid[0]), pad=0.01)
     lines = ["seeds in the true basin (%)", first, *(f"({other})" for other in others[:1])]
     bar.set_label("\n".join(lines), fontsize=7)
@@ -87,14 +86,14 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
 def _shares(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) -> None:
     shares = [
         100 * _grid(maps, points[points["method"] == method], "basin_share")
-        for method in maps.methods[:2]
+        for method in list(maps.methods)[:2]
     ]
     _heat_map(axes, maps, shares[0], _SHARE, "cividis")
     _write(axes, shares, _SHARE(shares[0]), "cividis", height_in)
 
 
 def _errors(axes: Axes, maps: HeatMaps, points: pd.DataFrame, height_in: float) -> None:
-    first = points[points["method"] == maps.methods[0]]
+    first = points[points["method"] == next(iter(maps.methods))]
     error = _grid(maps, first, "basin_error_percent")
     bound = _grid(maps, first, "bound_percent")
     # Clip, since an error of zero has no logarithm.

@@ -19,14 +19,14 @@ from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.products.figures.style import (
-    METHOD_STYLES,
     PAPER,
     SHADE,
     TARGET,
+    line_of,
     panel,
     row_of_panels,
 )
@@ -49,13 +49,14 @@ class Settings:
 
     truth: Truth
     problem: CaseProblem
+    methods: Mapping[str, Method]
     noise: Noise
     confidence: float
 
 
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the scatter of a case depends on."""
-    return Settings(case.truth, case.problem, case.noise, case.confidence)
+    return Settings(case.truth, case.problem, study.identifiers, case.noise, case.confidence)
 
 
 def draw(
@@ -100,7 +101,7 @@ def draw(
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
-        _quantity(axes, found["method"], ratios.to_numpy(float), known, settings.confidence)
+        _quantity(axes, settings, found["method"], ratios.to_numpy(float), known)
         _paper(axes, truth.published.identified, [p.name for p in names], value)
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
@@ -110,7 +111,7 @@ def draw(
 
 
 def _quantity(
-    axes: Axes, methods: "pd.Series[str]", ratios: Array, limit: float, confidence: float
+    axes: Axes, settings: Settings, methods: "pd.Series[str]", ratios: Array, limit: float
 ) -> None:
     """Draw one column of points per method, with points beyond the axis at its edge."""
     loose = limit > _LOOSE
@@ -122,10 +123,9 @@ def _quantity(
         shown = mine[:SHOWN_SEEDS]
         # A fixed sideways scatter keeps points apart.
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
-        style = METHOD_STYLES[name]
         inside = (shown > bottom) & (shown < top)
         dots: dict[str, Any] = {
-            "color": style["color"],
+            "color": line_of(settings.methods[name])["color"],
             "linestyle": "",
             "markeredgewidth": 0,
             "alpha": 0.55,
@@ -141,8 +141,8 @@ def _quantity(
         axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
     if np.isfinite(limit):
-        reach = NormalDist().inv_cdf((1 + confidence) / 2) * limit
-        # Limits of the logarithm; linearised on a linear axis.
+        reach = NormalDist().inv_cdf((1 + settings.confidence) / 2) * limit
+        # Of the logarithm, straight where the axis is.
         low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
         axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
     axes.axhline(1, color=TARGET, linewidth=0.6)
@@ -173,9 +173,10 @@ def _legend(drawn: Figure, settings: Settings, methods: list[str], seeds: int) -
     handles: list[Any] = []
     axes = drawn.axes[0]
     for name in methods:
-        color = METHOD_STYLES[name]["color"]
+        method = settings.methods[name]
+        color = line_of(method)["color"]
         handles += axes.plot(
-            [], [], "o", color=color, markersize=4, label=METHODS[name].title, markeredgewidth=0
+            [], [], "o", color=color, markersize=4, label=method.title, markeredgewidth=0
         )
     handles += axes.plot(
         [], [], "^", color=TARGET, markersize=4, label="beyond the axis", markeredgewidth=0

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.files import written_whole
+from biogrip.identify.methods import Method
 from biogrip.products.figures.decades import label_plainly
 
 COLUMN_IN = 3.5
@@ -25,12 +26,16 @@ SHADE = "#DCE6EE"
 # Colours have the same meaning in all figures.
 TARGET, MEASURED, FITTED, PAPER, ALL_SEEDS = BLACK, SKY, ORANGE, GREEN, GREY
 
-METHOD_STYLES: dict[str, dict[str, Any]] = {
-    "genetic": {"color": GREY, "linestyle": "-"},
-    "genetic_refined": {"color": ORANGE, "linestyle": "-"},
-    "least_squares": {"color": BLUE, "linestyle": "--"},
-    "differential_evolution": {"color": PURPLE, "linestyle": "-."},
+COLORS = {
+    "grey": GREY,
+    "blue": BLUE,
+    "vermilion": ORANGE,
+    "green": GREEN,
+    "sky": SKY,
+    "purple": PURPLE,
+    "amber": "#E69F00",
 }
+"""By the names that methods say them by (`biogrip.identify.methods`)."""
 
 # Most panels that are legible in one row.
 _MOST_SIDE_BY_SIDE, _LEGEND_IN = 5, 0.4
@@ -56,6 +61,11 @@ _STYLE: dict[Any, Any] = {
     "savefig.dpi": 200,
     "pdf.fonttype": 42,
 }
+
+
+def line_of(method: Method) -> dict[str, Any]:
+    """Style of a method's lines for Matplotlib."""
+    return {"color": COLORS[method.color], "linestyle": method.dashes}
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import first_seeds, seeds_in_words
 from biogrip.products.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
@@ -58,7 +58,7 @@ class Settings:
     """
 
     title: str
-    method: str
+    method: Method
     parameters: Mapping[str, float]
     identified: Mapping[str, float]
 
@@ -66,7 +66,9 @@ class Settings:
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the valley of a case depends on."""
     method = "least_squares" if "least_squares" in study.methods else study.shown
-    return Settings(case.title, method, case.parameters, case.published.identified)
+    return Settings(
+        case.title, study.identifiers[method], case.parameters, case.published.identified
+    )
 
 
 def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
@@ -82,7 +84,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     found = read_verdicts(measured)
     valley = found["valley"]
     x, y = valley["x"], valley["y"]
-    identified = read_identifications(identifications, settings.method)
+    identified = read_identifications(identifications, settings.method.name)
     drawn = figure(COLUMN_IN, 3.1)
     axes = drawn.subplots()
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
@@ -105,7 +107,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     drawn_seeds = seeds_in_words(len(identified))
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
     points = first_seeds(identified)[columns].to_numpy(float)
-    label = f"{METHODS[settings.method].title}, {drawn_seeds}"
+    label = f"{settings.method.title}, {drawn_seeds}"
     known = [
         (np.array([[place[x["name"]], place[y["name"]]]]), style, name)
         for place, style, name in (

@@ -1,5 +1,6 @@
 """Waterfall plot: sorted increase of chi-squared over the global optimum, by method."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,10 +8,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.identify.success import chi_square_rise, near_noise_words
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.style import COLUMN_IN, METHOD_STYLES, TARGET, figure
+from biogrip.products.figures.style import COLUMN_IN, TARGET, figure, line_of
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import the
 from biogrip.study.study import Case, Study
@@ -25,7 +26,9 @@ class Settings:
     Parameters
     ----------
     title
-        Title of the case.
+        The case in print.
+    methods
+        By what its traces were identified.
     samples
         Number of samples in a trace.
     optimum_tolerance, near_noise_tolerance
@@ -33,6 +36,7 @@ class Settings:
     """
 
     title: str
+    methods: Mapping[str, Method]
     samples: int
     optimum_tolerance: float
     near_noise_tolerance: float
@@ -41,7 +45,7 @@ class Settings:
 def settings(study: Study, case: Case) -> Settings:
     """Return the settings that the waterfall of a case depends on."""
     tolerances = study.optimum_tolerance, study.near_noise_tolerance
-    return Settings(case.title, case.samples, *tolerances)
+    return Settings(case.title, study.identifiers, case.samples, *tolerances)
 
 
 def draw(settings: Settings, identifications: Path) -> Figure:
@@ -61,13 +65,14 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     axes = drawn.subplots()
     methods = found["method"].unique()
     curves = []
-    # Decreasing widths keep coinciding curves visible.
-    for method, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
-        mine = np.sort(rise[found["method"] == method])
+    # Where curves coincide each is seen beside the thinner ones on top of it.
+    for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
+        method = settings.methods[name]
+        mine = np.sort(rise[found["method"] == name])
         share = 100 * np.mean(mine <= tolerance)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
-        label = f"{METHODS[method].title}: {share:.0f} %"
-        curves += axes.plot(place, mine, label=label, linewidth=width, **METHOD_STYLES[method])
+        label = f"{method.title}: {share:.0f} %"
+        curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
     near = settings.samples * ((1 + settings.near_noise_tolerance) ** 2 - 1)
     # Limits are named in the legend, since a curve may cover any place along them.
     words = near_noise_words(settings.near_noise_tolerance)

@@ -13,7 +13,7 @@ from biogrip.digits import rounded
 from biogrip.experiment.noise import Noise, standard_deviation
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.products.figures.results import read_history
 from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.traces import read_measurements, seeds_in
@@ -74,7 +74,7 @@ class CaseFiles:
 
 
 def explorer_data(
-    cases: Sequence[ExploredCase], files: Sequence[CaseFiles], methods: Sequence[str]
+    cases: Sequence[ExploredCase], files: Sequence[CaseFiles], methods: Sequence[Method]
 ) -> list[dict[str, Any]]:
     """Return the data for the explorer.
 
@@ -95,7 +95,7 @@ def explorer_data(
 
 
 def _case(
-    case: ExploredCase, files: CaseFiles, methods: Sequence[str], most_bytes: int
+    case: ExploredCase, files: CaseFiles, methods: Sequence[Method], most_bytes: int
 ) -> dict[str, Any]:
     problem = case.problem.calibrated(files.calibrated)
     model = problem.model
@@ -139,7 +139,7 @@ def _case(
         "target_rad": None if target is None else _packed(target[::stride]),
         "seeds": seeds,
         "traces_rad": [_packed(traces[seed][::stride]) for seed in seeds],
-        "methods": [_method(name, model, files, seeds) for name in methods],
+        "methods": [_method(method, model, files, seeds) for method in methods],
         "threshold": read_verdicts(files.verdicts)["threshold"],
     }
 
@@ -180,15 +180,15 @@ def _network(model: SampleModel, parameters: Mapping[str, Any]) -> dict[str, Any
 
 
 def _method(
-    name: str, model: SampleModel, files: CaseFiles, seeds: Sequence[int]
+    method: Method, model: SampleModel, files: CaseFiles, seeds: Sequence[int]
 ) -> dict[str, Any]:
-    found = read_identifications(files.identifications, name)
+    found = read_identifications(files.identifications, method.name)
     rows = found[found["seed"].isin(seeds)].sort_values("seed").to_dict("records")
-    history = read_history(files.histories, name, seeds[0])
+    history = read_history(files.histories, method.name, seeds[0])
     by_seed = dict(iter(history.groupby("seed"))) if len(history) else {}
     return {
-        "name": name,
-        "title": METHODS[name].title,
+        "name": method.name,
+        "title": method.title,
         "fits": [
             {
                 "seed": int(row["seed"]),

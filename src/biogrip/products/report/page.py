@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from biogrip.errors import BiogripError
 from biogrip.files import written_whole
+from biogrip.identify.methods import Method
 from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
@@ -89,7 +90,7 @@ class Settings:
     """
 
     cases: tuple[ExploredCase, ...]
-    methods: tuple[str, ...]
+    methods: tuple[Method, ...]
     figures: tuple[Entry, ...]
     tables: tuple[Entry, ...]
     config: str
@@ -100,6 +101,7 @@ def settings(study: Study, _: Wildcards) -> Settings:
     """Return the content of the report, except results."""
     plan = Plan(study, Path("results"))
     rules = _rules(plan)
+    shown, *others = study.identifiers.values()
     return Settings(
         tuple(
             ExploredCase(
@@ -112,7 +114,7 @@ def settings(study: Study, _: Wildcards) -> Settings:
             )
             for case in study.cases.values()
         ),
-        (study.shown, *(method for method in study.methods if method != study.shown)),
+        (shown, *others),
         tuple(_entries(plan, _FIGURES, rules)),
         tuple(_entries(plan, _TABLES, rules)),
         yaml.safe_dump(plain(study.config), allow_unicode=True),

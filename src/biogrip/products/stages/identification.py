@@ -8,7 +8,8 @@ from pathlib import Path
 from biogrip.experiment.noise import rms
 from biogrip.experiment.random_streams import stream
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, identifier
+from biogrip.identify.identifier import identifier
+from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import (
     BATCHES,
     HISTORY_BATCHES,

@@ -18,7 +18,8 @@ from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, best_fit, identifier
+from biogrip.identify.identifier import best_fit, identifier
+from biogrip.identify.methods import METHODS
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit

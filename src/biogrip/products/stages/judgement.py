@@ -15,7 +15,8 @@ from biogrip.identifiability.likelihood import MISSED
 from biogrip.identifiability.valley import valley_and_deeper
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.identifier import best_fit
+from biogrip.identify.methods import METHODS
 from biogrip.identify.multi_start import fit_from, identify_from
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import TraceFit, trace_fit

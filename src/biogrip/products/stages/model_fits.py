@@ -1,12 +1,13 @@
 """Stage 4: fits of every sample model to every trace, for model selection."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from biogrip.experiment.nesting import Way, contained
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES
+from biogrip.experiment.sample import CANDIDATES, Sample
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.least_squares import LeastSquaresSettings
 from biogrip.identify.methods import METHODS
@@ -32,14 +33,17 @@ class Settings:
     problem, least_squares
         Assumptions of the identification except the model, and settings of the fits.
     models
-        Names of the models, see `CANDIDATES`.
+        The models by name, see `CANDIDATES`.
+    contained
+        Of each, those of the others that it contains: fits of it begin at theirs, too.
     """
 
     study_seed: int
     case: str
     problem: CaseProblem
     least_squares: LeastSquaresSettings
-    models: tuple[str, ...]
+    models: Mapping[str, Sample]
+    contained: Mapping[str, Mapping[str, Way]]
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
@@ -48,7 +52,12 @@ def settings(study: Study, job: Wildcards) -> Settings:
     fits, models = case.method("least_squares"), study.models_of(case)
     assert isinstance(fits, LeastSquaresSettings)
     problem = case.problem.to_identify(*(CANDIDATES[name].model for name in models))
-    return Settings(study.study_seed, case.name, problem, fits, models)
+    inner = {
+        name: {other: way for other, way in contained(name).items() if other in models}
+        for name in models
+    }
+    samples = {name: CANDIDATES[name] for name in models}
+    return Settings(study.study_seed, case.name, problem, fits, samples, inner)
 
 
 def fit(
@@ -86,7 +95,7 @@ def _rows(
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in settings.models}
     for group in groups(seeds):
         traces = [posed.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
-        models = {name: CANDIDATES[name].model for name in settings.models}
+        models = {name: sample.model for name, sample in settings.models.items()}
         found = fit_models(
             {
                 name: [posed.for_model(trace, model) for trace in traces]

@@ -1,7 +1,7 @@
 """Stage 4: posterior samples of one trace of a case, and evidence of sample models."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,12 +12,13 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES, SampleModel
+from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel
 from biogrip.files import write_text
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.answer import Progress, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.identifier import best_fit
+from biogrip.identify.methods import METHODS
 from biogrip.identify.model_choice import ranked
 from biogrip.identify.problem import Problem
 from biogrip.products.files.posterior import (
@@ -52,11 +53,11 @@ class Settings(judgement.Settings):
     posterior
         Prior, walkers and steps.
     models
-        Models whose evidence is compared, see `CANDIDATES`; empty for none.
+        Those whose evidence is compared, by name, see `CANDIDATES`; none without.
     """
 
     posterior: PosteriorSettings
-    models: tuple[str, ...]
+    models: Mapping[str, Sample]
 
 
 def settings_of(study: Study, case: Case) -> Settings:
@@ -66,7 +67,7 @@ def settings_of(study: Study, case: Case) -> Settings:
     return Settings(
         **vars(judgement.settings_of(study, case)),
         posterior=case.posterior,
-        models=study.models_of(case) if compared else (),
+        models={name: CANDIDATES[name] for name in study.models_of(case)} if compared else {},
     )
 
 
@@ -185,8 +186,8 @@ def _evidence(
     from biogrip.identifiability.sampling import sampled
 
     rows, misfits, samples = [], [], 0
-    for name in settings.models:
-        problem = of_model(CANDIDATES[name].model)
+    for name, candidate in settings.models.items():
+        problem = of_model(candidate.model)
         samples = problem.residuals.samples
         fits = stream(settings.study_seed, settings.case, TRACE, f"model {name}")
         misfits.append(best_fit(problem, settings.least_squares, fits, silent).misfit_rad)
@@ -196,7 +197,7 @@ def _evidence(
         own = evidence_of(posterior, found, rng)
         rows.append((own, found.convergence.reached))
     highest = max(own.log for own, _ in rows)
-    tried = ranked(settings.models, misfits, samples)
+    tried = ranked(list(settings.models), misfits, samples)
     return [
         {
             "model": each.candidate,

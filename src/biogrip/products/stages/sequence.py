@@ -21,7 +21,8 @@ from biogrip.identifiability.limits import limits_and_deeper
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import METHODS, best_fit
+from biogrip.identify.identifier import best_fit
+from biogrip.identify.methods import METHODS
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 from biogrip.products.files.sequences import SEQUENCES

@@ -9,7 +9,7 @@ import pandas as pd
 
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.identify.success import chi_square_rise, near_noise, near_noise_words
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import of_cases
@@ -36,12 +36,15 @@ class Settings:
     Parameters
     ----------
     cases
-        True values, and number of samples in a trace, by case.
+        The samples, and how many samples their traces have, by name.
+    methods
+        By what their traces were identified, by name.
     optimum_tolerance, near_noise_tolerance
         Tolerances of the global optimum and of the noise.
     """
 
     cases: Mapping[str, tuple[Truth, int]]
+    methods: Mapping[str, Method]
     optimum_tolerance: float
     near_noise_tolerance: float
 
@@ -51,6 +54,7 @@ def settings(study: Study) -> Settings:
     cases = {name: study.cases[name] for name in study.simulated}
     return Settings(
         {name: (case.truth, case.samples) for name, case in cases.items()},
+        study.identifiers,
         study.optimum_tolerance,
         study.near_noise_tolerance,
     )
@@ -81,7 +85,7 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
             rows.append(
                 (
                     name,
-                    METHODS[method].title,
+                    settings.methods[method].title,
                     int(mine.sum()),
                     float(np.mean(rise[mine] <= settings.optimum_tolerance)),
                     float(np.mean(reached)),

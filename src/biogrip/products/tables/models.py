@@ -1,11 +1,12 @@
 """Model selection by AIC and BIC, counted over seeds."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from biogrip.experiment.sample import CANDIDATES
+from biogrip.experiment.sample import CANDIDATES, Sample
 from biogrip.identify.model_choice import aic_and_bic
 from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.product import of_cases
@@ -25,20 +26,39 @@ _COLUMNS = (
 )
 
 
-def settings(study: Study) -> dict[str, str | None]:
-    """Return the sample model that simulated the traces, by case; None for recorded traces."""
-    return {
-        name: None if case.recorded else case.sample.candidate for name, case in study.cases.items()
-    }
-
-
-def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
-    """Count over seeds how often each model has the lowest AIC and BIC, see `aic_and_bic`.
+@dataclass(frozen=True)
+class Settings:
+    """Sample models that are compared.
 
     Parameters
     ----------
     made_by
-        Sample model that simulated the traces, by case; None for recorded traces.
+        Those that made the traces, by case; None of a recorded one.
+    tried
+        All that traces were fitted with, by name.
+    """
+
+    made_by: Mapping[str, str | None]
+    tried: Mapping[str, Sample]
+
+
+def settings(study: Study) -> Settings:
+    """Choose which sample models are compared."""
+    cases = study.cases
+    made_by = {
+        name: None if case.recorded else case.sample.candidate for name, case in cases.items()
+    }
+    tried = {name: CANDIDATES[name] for case in cases.values() for name in study.models_of(case)}
+    return Settings(made_by, tried)
+
+
+def models(settings: Settings, fits: list[Path]) -> Table:
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`.
+
+    Parameters
+    ----------
+    settings
+        Which.
     fits
         Fits of all models, CSV.
     """
@@ -47,7 +67,7 @@ def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
         found["misfit_rad"], found["samples"], found["parameters"]
     )
     rows: list[tuple[Cell, ...]] = []
-    for case, maker in made_by.items():
+    for case, maker in settings.made_by.items():
         of_case = found[found["case"] == case]
         delta = {}
         for criterion in ("aic", "bic"):
@@ -58,7 +78,7 @@ def models(made_by: Mapping[str, str | None], fits: list[Path]) -> Table:
         for name in of_case["model"].unique():
             medians = [float(table[name].median()) for table in delta.values()]
             chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
-            model = CANDIDATES[name].model
+            model = settings.tried[name].model
             title = model.title + (" (made the traces)" if name == maker else "")
             rows.append((case, title, len(model.names), *medians, *chosen, len(delta["aic"])))
     caption = (

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from biogrip.identify.methods import METHODS
 from biogrip.identify.success import near_noise_words
 from biogrip.products.heat_maps import (
     CAPTION,
@@ -52,7 +51,7 @@ def robustness(maps: HeatMaps, points: list[Path]) -> Table:
                     )
                 )
     words = near_noise_words(maps.near_noise_tolerance)
-    titles = {method: METHODS[method].title for method in maps.methods}
+    titles = {name: method.title for name, method in maps.methods.items()}
     columns = (
         Column("case", "Case"),
         Column("row", _capital(maps.rows.title)),

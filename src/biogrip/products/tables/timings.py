@@ -1,10 +1,11 @@
 """Processor time of the methods on the machine that ran them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import Method
 from biogrip.products.files.identifications import TIMINGS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -19,13 +20,13 @@ _COLUMNS = (
 )
 
 
-def timings(settings: None, times: list[Path]) -> Table:
+def timings(methods: Mapping[str, Method], times: list[Path]) -> Table:
     """Summarise processor time per identification by case and method, from CSV."""
     spent = pd.concat([TIMINGS.read(path) for path in times])
     rows: list[tuple[Cell, ...]] = [
         (
             case,
-            METHODS[method].title,
+            methods[method].title,
             len(mine),
             float(mine["cpu_s"].median()),
             float(mine["cpu_s"].sum()),
@@ -43,6 +44,6 @@ TIMES = table(
     item="processor times",
     caption="Processor time of the identifications on the machine that made this report.",
     sheet="tables",
-    settings=lambda study: None,
+    settings=lambda study: study.identifiers,
     reads={"times": of_cases(TIMINGS.path, lambda study: study.cases)},
 )

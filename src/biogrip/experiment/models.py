@@ -1,0 +1,34 @@
+"""The sample models that there are, by name.
+
+Each is declared, beside its network, in a module here. What is made holds its `Sample`, and a
+job's digest the code of that: this module is in none, so that one more model makes nothing again.
+"""
+
+from biogrip.experiment.burgers import BURGERS
+from biogrip.experiment.fractional import FRACTIONAL_KELVIN_VOIGT, FRACTIONAL_MAXWELL
+from biogrip.experiment.maxwell_models import (
+    DAMPER,
+    GENERALIZED_MAXWELL,
+    KELVIN_VOIGT,
+    LIQUID_DROP,
+    MAXWELL,
+    ZENER_KELVIN,
+    ZENER_MAXWELL,
+)
+from biogrip.experiment.sample_model import SampleModel
+
+MODELS: dict[str, SampleModel] = {
+    model.name: model
+    for model in (
+        GENERALIZED_MAXWELL,
+        LIQUID_DROP,
+        DAMPER,
+        KELVIN_VOIGT,
+        MAXWELL,
+        ZENER_MAXWELL,
+        ZENER_KELVIN,
+        BURGERS,
+        FRACTIONAL_KELVIN_VOIGT,
+        FRACTIONAL_MAXWELL,
+    )
+}

@@ -1,0 +1,215 @@
+"""Sample models and their parameters, and the parameters that several models share."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from math import inf
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from biogrip.arrays import Array, IntArray
+from biogrip.experiment.network import Network
+
+_UNITS = {"stiffness": "N/m", "damping": "N s/m", "springpot": "N/m", "exponent": ""}
+_SUFFIXES = {
+    "stiffness": "_N_per_m",
+    "damping": "_Ns_per_m",
+    "springpot": "_N_per_m",
+    "exponent": "",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a sample model.
+
+    Parameters
+    ----------
+    name
+        Identifier in config, columns and code.
+    kind
+        ``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or
+        ``"exponent"``; decides the unit.
+    meaning
+        A few words for tables.
+    range_name
+        Which entry of the search range holds for it.
+    may_vanish
+        Whether zero is a possible value: the element is then not there.
+    below
+        What all its values are below, if anything.
+    """
+
+    name: str
+    kind: str
+    meaning: str
+    range_name: str
+    may_vanish: bool = False
+    below: float = inf
+
+    @property
+    def unit(self) -> str:
+        """SI unit; empty if it has none."""
+        return _UNITS[self.kind]
+
+    @property
+    def column(self) -> str:
+        """Name of the parameter's column in result files."""
+        return self.name + _SUFFIXES[self.kind]
+
+    @property
+    def symbol(self) -> str:
+        """The symbol as mathtext."""
+        letter, _, index = self.name.replace("alpha", r"\alpha").partition("_")
+        return f"${letter}_{{{index}}}$" if index else f"${letter}$"
+
+
+Turned: TypeAlias = Callable[..., tuple[Array | float, ...]]
+"""Of the simpler model's parameters, one by one, those of the richer one."""
+
+
+@dataclass(frozen=True)
+class SampleModel:
+    """A named constitutive model.
+
+    Parameters
+    ----------
+    name, title
+        Name in the config; name in print.
+    parameters
+        What there is to identify, in the order of the columns of a population.
+    network
+        Turns parameters of shape (n, n_parameters) into a `Network`.
+    exchangeable
+        Parameters whose sum deserves a row of its own in tables, because stiff
+        branches make them trade against each other.
+    branches
+        Spring and damper of each Maxwell branch, by name; with several, the fastest first.
+    example
+        Parameters of some sample, which tests are about.
+    contains
+        Models that it becomes where elements vanish, by candidate, and how their parameters are
+        turned into its own (`biogrip.experiment.nesting`).
+    within
+        Likewise, candidates that become it, and how its parameters are turned into theirs.
+    branched
+        Makes the model with a number of Maxwell branches, if there is such.
+    """
+
+    name: str
+    title: str
+    parameters: tuple[Parameter, ...]
+    network: Callable[[ArrayLike], Network]
+    example: tuple[float, ...]
+    exchangeable: tuple[str, ...] = ()
+    branches: tuple[tuple[str, str], ...] = ()
+    contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    within: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    branched: "Callable[[int], SampleModel] | None" = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameter names in column order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def power_law(self) -> bool:
+        """True if it has a springpot, which stands for branches of all relaxation times."""
+        return any(parameter.kind == "springpot" for parameter in self.parameters)
+
+    @property
+    def quantities(self) -> list[list[Parameter]]:
+        """Rows of tables: every parameter, and the sum of the exchangeable ones."""
+        together = [p for p in self.parameters if p.name in self.exchangeable]
+        return [[p] for p in self.parameters] + ([together] if together else [])
+
+    @property
+    def free_branches(self) -> tuple[tuple[int, int], ...]:
+        """Indices of spring and damper of each branch of which both are to be identified."""
+        places = {name: index for index, name in enumerate(self.names)}
+        return tuple(
+            (places[spring], places[damper])
+            for spring, damper in self.branches
+            if spring in places and damper in places
+        )
+
+    def in_order(self, parameters: Array) -> IntArray:
+        """Order in which branches relax one after the other, the fastest first.
+
+        A trace is the same whichever branch is called which; so that samples and fits
+        can be compared, branches are counted by their relaxation times c/k.
+
+        Parameters
+        ----------
+        parameters : (n, n_parameters)
+            Of n samples.
+
+        Returns
+        -------
+        (n, n_parameters)
+            For every column the one that belongs there, as of `numpy.take_along_axis`.
+        """
+        order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
+        if len(self.free_branches) > 1:
+            springs, dampers = np.array(self.free_branches).T
+            times = parameters[:, dampers] / parameters[:, springs]
+            ranks = np.argsort(times, axis=1, kind="stable")
+            order[:, springs], order[:, dampers] = springs[ranks], dampers[ranks]
+        return order
+
+    def named_in_order(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Return a sample's parameters, by name, with its branches in their order."""
+        values = np.array([[parameters[name] for name in self.names]])
+        order = self.in_order(values)[0]
+        return {**parameters, **dict(zip(self.names, values[0, order].tolist(), strict=True))}
+
+    def sample(self, parameters: Mapping[str, float]) -> Network:
+        """Return the elements of the one sample that has these parameters, by name."""
+        return self.network([[parameters[name] for name in self.names]])
+
+
+@dataclass(frozen=True)
+class _Filled:
+    """A model's network with some parameters at known values; columns are the others."""
+
+    model: SampleModel
+    fixed: tuple[tuple[str, float], ...]
+
+    def __call__(self, parameters: ArrayLike) -> Network:
+        fixed = dict(self.fixed)
+        given = np.atleast_2d(np.asarray(parameters) * 1.0)
+        free = (name for name in self.model.names if name not in fixed)
+        columns = dict(zip(free, given.T, strict=True))
+        filled = [
+            columns.get(name, np.full(len(given), fixed.get(name, np.nan)))
+            for name in self.model.names
+        ]
+        return self.model.network(np.stack(filled, axis=1))
+
+
+def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
+    """Return the model with some parameters at known values, and only the others to identify."""
+    if not fixed:
+        return model
+    free = [index for index, name in enumerate(model.names) if name not in fixed]
+    return replace(
+        model,
+        parameters=tuple(model.parameters[index] for index in free),
+        network=_Filled(model, tuple(fixed.items())),
+        example=tuple(model.example[index] for index in free),
+    )
+
+
+K = Parameter("k", "stiffness", "Maxwell spring", "k")
+K_P = Parameter("k_p", "stiffness", "parallel (membrane) spring", "k_p", may_vanish=True)
+C = Parameter("c", "damping", "Maxwell damper", "c")
+C_P = Parameter("c_p", "damping", "parallel damper", "c_p", may_vanish=True)
+
+SINGLE_BRANCH: tuple[Parameter, ...] = (K, K_P, C, C_P)
+"""The paper's parameters, which every file of identifications has columns for."""
+
+K_S = Parameter("k_s", "stiffness", "series spring", "k")
+C_S = Parameter("c_s", "damping", "series damper", "c")
+K_V = Parameter("k_v", "stiffness", "spring of the Kelvin-Voigt element", "k")
+C_V = Parameter("c_v", "damping", "damper of the Kelvin-Voigt element", "c")
