@@ -29,8 +29,11 @@ def clean(results: Path) -> str:
     """
     if results.is_symlink():
         raise BiogripError(f"{results}: is a link, and nothing is removed through links.")
+    folder = results.absolute()
+    if folder == Path.cwd():
+        raise BiogripError(f"{results}: is the folder that you are in; clean it from outside.")
     manifest = Manifest(results)
-    snakemake = results.absolute().parent / ".snakemake"
+    snakemake = folder.parent / ".snakemake"
     release_dead_locks(snakemake)
     if is_locked(snakemake) or manifest.is_written_to:
         raise BiogripError(

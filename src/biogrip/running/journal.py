@@ -9,7 +9,7 @@ import os
 import re
 import time
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from biogrip.files import watched
@@ -18,9 +18,11 @@ from biogrip.running.records import Record
 JOURNALS = ".manifest"
 """Folder of the journals, inside the results folder."""
 
-_NAME = re.compile(r"(?P<host>.+)--(?P<process>\d+)--\d+\.jsonl")
+_NAME = re.compile(r"(?P<host>.+)--(?P<process>\d+)--(?P<begun>\d+)\.jsonl")
 _DAY_S = 86_400.0
 _PROCESSES = 2**31
+# Clocks of processes and of files may differ by so much.
+_CLOCK_S = 2.0
 
 
 class Journal:
@@ -62,22 +64,25 @@ class Journal:
 
     def note_begun(self, paths: Iterable[Path]) -> None:
         """Record that logs or scratch files are about to be written."""
+        self._append(None)
         for path in paths:
             whole = path.absolute()
             if whole.is_relative_to(self._results):
                 name = whole.relative_to(self._results).as_posix()
                 self._append(Record(name, 0, "", 0, time.time_ns()))
 
-    def _append(self, record: Record) -> None:
+    def _append(self, record: Record | None) -> None:
         self._file.parent.mkdir(parents=True, exist_ok=True)
         with self._file.open("a", encoding="utf-8") as stream:
-            stream.write(record.line)
+            stream.write(record.line if record else "")
 
 
 @contextmanager
 def recorded_in(results: Path, settings: str = "", inputs: str = "") -> Iterator[None]:
     """Record every file written atomically below a results folder within a context."""
     journal = Journal(results, settings, inputs)
+    # While it is there, results are being written.
+    journal.note_begun([])
     with watched(journal.note, lambda scratch: journal.note_begun([scratch])):
         yield
 
@@ -88,12 +93,23 @@ def journals_in(results: Path) -> list[Path]:
 
 
 def is_running(journal: Path) -> bool:
-    """Return whether the journal's process is another one on this computer and still runs."""
+    """Return whether another process on this host may still write to the journal."""
     import psutil
 
-    host, process = _writer(journal)
-    living = process < _PROCESSES and psutil.pid_exists(process)
-    return host == os.uname().nodename and process != os.getpid() and living
+    host, process, begun_ns = _writer(journal)
+    if host != os.uname().nodename or process == os.getpid() or process >= _PROCESSES:
+        return False
+    with suppress(psutil.Error):
+        # A later process may have got the same number.
+        return psutil.Process(process).create_time() <= begun_ns / 1e9 + _CLOCK_S
+    return False
+
+
+def is_gone(process: str) -> bool:
+    """Return whether no process on this host has a number."""
+    import psutil
+
+    return process.isdigit() and int(process) < _PROCESSES and not psutil.pid_exists(int(process))
 
 
 def is_closed(journal: Path) -> bool:
@@ -103,11 +119,11 @@ def is_closed(journal: Path) -> bool:
     return time.time() - journal.stat().st_mtime > _DAY_S
 
 
-def _writer(journal: Path) -> tuple[str, int]:
+def _writer(journal: Path) -> tuple[str, int, int]:
     """Return host and process id of a journal."""
     name = _NAME.fullmatch(journal.name)
     assert name is not None
-    return name["host"], int(name["process"])
+    return name["host"], int(name["process"]), int(name["begun"])
 
 
 def sha256_of(path: Path) -> str:

@@ -34,11 +34,13 @@ def is_locked(snakemake_folder: Path) -> bool:
 
 def release_dead_locks(snakemake_folder: Path) -> None:
     """Remove locks in a ``.snakemake`` folder that belong to a run that has ended."""
+    if not (snakemake_folder / "run.json").is_file():
+        return
     try:
         run = json.loads((snakemake_folder / "run.json").read_text())
         dead = _is_dead(run)
         signed = dict(run["locks"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return
     if dead:
         for name, changed in _locks(snakemake_folder).items():

@@ -7,8 +7,9 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.products.catalogue import chosen, products
 from biogrip.products.plan import Plan
 from biogrip.products.product import Product
-from biogrip.running.journal import digest_of_files, recorded_in, sha256_of
-from biogrip.running.resolved import read_study
+from biogrip.running.journal import JOURNALS, digest_of_files, recorded_in, sha256_of
+from biogrip.running.places import refuse_files_as_folders, refuse_links
+from biogrip.running.resolved import NAME, read_study
 from biogrip.running.sheet import Sheet, inputs_of, sheets_of
 
 
@@ -38,7 +39,13 @@ def make(
     for product in asked:
         _check(Sheet(product.name, (product,), plan), job)
     if made_for is not None:
-        _make(Sheet("", tuple(asked), plan), asked, job, made_for)
+        sheet = Sheet("", tuple(asked), plan)
+        if sheet.digest_of_settings(job) != made_for.split("-")[0]:
+            raise BiogripError(
+                f"{results / NAME}: has changed since this run was planned: another run was begun "
+                "beside it. Run again."
+            )
+        _make(sheet, asked, job, made_for)
         return
     sheets = sheets_of(products().values(), plan)
     for product in asked:
@@ -47,11 +54,15 @@ def make(
 
 
 def _make(sheet: Sheet, asked: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
+    results = sheet.plan.results
+    outputs = [Path(file) for product in asked for file in product.outputs(job).values()]
+    refuse_links(results, [*outputs, results / JOURNALS])
+    refuse_files_as_folders(results, [*outputs, results / JOURNALS / "a journal"])
     files = [Path(file) for file in inputs_of(sheet, job)]
     # If an input is missing, the product that reads it reports that.
     there = all(file.is_file() for file in files)
     inputs = digest_of_files(map(sha256_of, files)) if there else ""
-    with recorded_in(sheet.plan.results, made_for, inputs):
+    with recorded_in(results, made_for, inputs):
         for product in asked:
             product.run(sheet.plan, job)
 

@@ -12,12 +12,20 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_of
-from biogrip.running.journal import JOURNALS, Journal, is_closed, is_running, journals_in, sha256_of
+from biogrip.running.journal import (
+    JOURNALS,
+    Journal,
+    is_closed,
+    is_gone,
+    is_running,
+    journals_in,
+    sha256_of,
+)
+from biogrip.running.places import refuse_links, refuse_other_than_folder
 from biogrip.running.records import (
     Record,
     read_journal,
     read_manifest,
-    refuse_links,
     sum_of_lines,
 )
 
@@ -49,6 +57,8 @@ class Manifest:
     def __init__(self, results: Path) -> None:
         self._results = results
         self._records: dict[str, list[Record]] = {}
+        if not results.is_symlink():
+            refuse_other_than_folder(results)
         refuse_other_than_folder(results / JOURNALS)
         journals = journals_in(results)
         # Find closed journals before reading them: one that closes later may have unread lines.
@@ -72,7 +82,9 @@ class Manifest:
                 scratch += [record.path for record in records if record.is_scratch]
         self.is_written_to = any(map(is_running, journals))
         self._leftovers = [results / path for path in scratch]
-        refuse_links(results, [*self.paths, *scratch])
+        above = {(results / path).parent for path in (*self.paths, *scratch)} - {results}
+        if not results.is_symlink():
+            refuse_links(results, above)
 
     def _add(self, records: Iterable[Record]) -> None:
         for record in records:
@@ -161,7 +173,13 @@ class Manifest:
 
     def discard_leftovers(self) -> None:
         """Remove scratch files of jobs that were killed."""
-        for file in self._leftovers:
+        killed = [
+            file
+            for copy in self._copies
+            for file in copy.parent.glob(f".{NAME}.*.part")
+            if is_gone(file.name.split(".")[-2])
+        ]
+        for file in (*self._leftovers, *killed):
             if file.is_file() and not file.is_symlink():
                 file.unlink()
 
@@ -191,22 +209,6 @@ class Manifest:
     def _discard_journals(self) -> None:
         for journal in self._closed:
             journal.unlink(missing_ok=True)
-
-
-def refuse_other_than_folder(place: Path) -> None:
-    """Refuse a link or file in the place of a folder.
-
-    Raises
-    ------
-    BiogripError
-        If there is a link, or anything but a folder.
-    """
-    found = "a link" if place.is_symlink() else "a file"
-    if os.path.lexists(place) and (place.is_symlink() or not place.is_dir()):
-        raise BiogripError(
-            f"{place}: found {found}, allowed is a folder or nothing. Nothing was touched. "
-            "Move it away and try again."
-        )
 
 
 def set_aside(path: Path) -> Path:

@@ -1,5 +1,6 @@
 """Detection of results that are out of date: other settings, code or inputs than the study's."""
 
+from collections import defaultdict
 from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path, PurePosixPath
@@ -28,7 +29,7 @@ class Provenance:
     """
 
     def __init__(self, results: Path, manifest: Manifest) -> None:
-        self._results = results
+        self._results = results.absolute()
         self._manifest = manifest
         self._hashes: dict[str, str | None] = {}
 
@@ -45,11 +46,44 @@ class Provenance:
         list of str
             Existing recorded files, relative to the results folder.
         """
-        return [name for sheet in sheets for job in sheet.jobs for name in self._of_job(sheet, job)]
+        return [
+            name
+            for sheet in sheets
+            for job in sheet.jobs
+            for name in self._of_job(sheet, job)
+            if (self._results / name).exists()
+        ]
+
+    def outdated(self, sheets: Iterable[Sheet]) -> set[str]:
+        """Return recorded results that were made otherwise, or from any that were.
+
+        Parameters
+        ----------
+        sheets
+            All products and jobs of the study.
+
+        Returns
+        -------
+        set of str
+            Relative to the results folder. A result that is gone counts, too, if it was
+            made otherwise: others may have been made from it.
+        """
+        jobs = [(sheet, job) for sheet in sheets for job in sheet.jobs]
+        found = {name for sheet, job in jobs for name in self._of_job(sheet, job)}
+        followers: dict[str, set[str]] = defaultdict(set)
+        for sheet, job in jobs:
+            outputs = set(_outputs(sheet, job))
+            for file in filter(is_result, inputs_of(sheet, job)):
+                followers[name_of(file)] |= outputs
+        waiting = list(found)
+        while waiting:
+            new = followers[waiting.pop()] - found
+            found |= new
+            waiting += new
+        return found
 
     def _of_job(self, sheet: Sheet, job: Wildcards) -> list[str]:
-        outputs = [file for product in sheet.products for file in product.outputs(job).values()]
-        recorded = [name for name in map(name_of, outputs) if self._is_there(name)]
+        recorded = [name for name in _outputs(sheet, job) if self._manifest.knows(name)]
         if not recorded:
             return []
         settings, inputs = sheet.digest(job), self._digest_of_inputs(sheet, job)
@@ -59,9 +93,6 @@ class Provenance:
             if (last := self._manifest.last(name)).settings != settings
             or (inputs is not None and last.inputs != inputs)
         ]
-
-    def _is_there(self, name: str) -> bool:
-        return self._manifest.knows(name) and (self._results / name).exists()
 
     def _digest_of_inputs(self, sheet: Sheet, job: Wildcards) -> str | None:
         """Return a digest of a job's recorded inputs, or None if an input is unknown."""
@@ -77,6 +108,11 @@ class Provenance:
                 place = self._results.parent / file
                 self._hashes[file] = sha256_of(place) if place.is_file() else None
         return self._hashes[file]
+
+
+def _outputs(sheet: Sheet, job: Wildcards) -> list[str]:
+    """Return the files of a job, relative to the results folder."""
+    return [name_of(file) for product in sheet.products for file in product.outputs(job).values()]
 
 
 def is_result(file: str) -> bool:
@@ -133,8 +169,9 @@ def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
                 f"{results / name}: is not what was written (edited, or damaged). "
                 "The next run makes it again."
             )
-    for name in Provenance(results, manifest).made_otherwise(sheets):
-        if fnmatch(PurePosixPath(name).stem, only):
+    outdated = Provenance(results, manifest).outdated(sheets)
+    for name in names:
+        if name in outdated:
             raise BiogripError(
                 f"{results / name}: was made for other settings, by other code or of other files "
                 f"than {results / STUDY} says. The next run makes it again."

@@ -11,9 +11,11 @@ from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.products.product import FIGURE_KINDS, PUBLISHED_TABLE_KINDS
 from biogrip.running.journal import sha256_of
-from biogrip.running.manifest import Manifest, refuse_other_than_folder, set_aside
+from biogrip.running.manifest import Manifest, set_aside
+from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.running.provenance import finished
-from biogrip.running.records import read_sums, refuse_links
+from biogrip.running.records import read_sums
+from biogrip.stopping import uninterrupted
 
 SUMS = "SHA256SUMS"
 """File with names and hashes of all published files, in the format of ``sha256sum --check``."""
@@ -57,15 +59,19 @@ def publish(results: Path, published: Path, only: str = "*") -> str:
         raise BiogripError(f"{results}: holds no tables and figures to publish.")
     old = read_sums(published / SUMS)
     _check_places(published, [*new, *old], old)
+    for name in old:
+        # A publication that was killed may have left them.
+        _beside(published / name).unlink(missing_ok=True)
     _copy(results, published, [*new])
     # Old and new hashes are recorded together, so that after a kill publishing can be repeated.
     both = [(name, digest) for name, digests in old.items() for digest in digests]
     _write_sums(published, [*both, *(item for item in new.items() if item not in both)])
-    for name, digests in old.items():
-        _clear(published / name, [*digests, new.get(name, "")], replaced=name in new)
-    for name in new:
-        os.replace(_beside(published / name), published / name)
-    _write_sums(published, new.items())
+    with uninterrupted():
+        for name, digests in old.items():
+            _clear(published / name, [*digests, new.get(name, "")], replaced=name in new)
+        for name in new:
+            os.replace(_beside(published / name), published / name)
+        _write_sums(published, new.items())
     return f"{counted(len(new), 'file')} published in {published}."
 
 
@@ -77,16 +83,15 @@ def _check_places(published: Path, names: list[str], old: Container[str]) -> Non
     BiogripError
         Names the first such path.
     """
-    refuse_other_than_folder(published)
-    refuse_links(published, names)
+    places = [published / name for name in names]
+    refuse_links(published, [place.parent for place in places])
+    refuse_files_as_folders(published, places)
     for name in names:
-        for parent in (published / name).parents:
-            if parent != published and published in parent.parents:
-                refuse_other_than_folder(parent)
         file = published / name
-        if os.path.lexists(file) and (name not in old or file.is_dir()):
+        other = os.path.lexists(file) and not (file.is_file() or file.is_symlink())
+        if other or (os.path.lexists(file) and name not in old):
             raise BiogripError(
-                f"{file}: in the way, and not in {SUMS}. Move it away and try again."
+                f"{file}: in the way, and not published by biogrip. Move it away and try again."
             )
 
 

@@ -23,6 +23,8 @@ _SHA256 = re.compile(r"[0-9a-f]{64}")
 _SCRATCH = re.compile(r"\..+\.\d+\.part")
 _SHOWN = 120
 _MOST = 2**63
+# As the usual file systems have it, in bytes.
+_LONGEST_NAME, _LONGEST_PATH = 255, 4095
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,9 @@ class Record:
         for field in fields(self):
             value = getattr(self, field.name)
             if type(value) is not field.type or (field.type is int and not 0 <= value < _MOST):
-                raise ValueError(f"{field.name} is {value!r}")
+                raise ValueError(f"{field.name} is {str(value)[:_SHOWN]!r}")
         if self.sha256 and not _SHA256.fullmatch(self.sha256):
-            raise ValueError(f"sha256 is {self.sha256!r}")
+            raise ValueError(f"sha256 is {self.sha256[:_SHOWN]!r}")
         refuse_outside(self.path)
 
     @property
@@ -87,28 +89,16 @@ def refuse_outside(path: str) -> None:
     ValueError
         Names the path and what is allowed.
     """
-    path.encode()
+    if len(path.encode()) > _LONGEST_PATH:
+        raise ValueError(f"path is {path[:_SHOWN]!r}..., allowed are {_LONGEST_PATH} bytes")
     parts = PurePosixPath(path).parts
     plain = parts and PurePosixPath(path).as_posix() == path and "\0" not in path
-    if not plain or ".." in parts or path.startswith("/"):
-        raise ValueError(f"path is {path!r}, allowed is a relative one that stays inside")
+    if not plain or ".." in parts or path.startswith("/") or _too_long(parts):
+        raise ValueError(f"path is {path[:_SHOWN]!r}, allowed is a relative one that stays inside")
 
 
-def refuse_links(folder: Path, paths: Iterable[str]) -> None:
-    """Refuse paths relative to a folder that pass through a link.
-
-    Raises
-    ------
-    BiogripError
-        Names the first link.
-    """
-    above = {parent for path in paths for parent in PurePosixPath(path).parents}
-    for place in sorted(folder / parent for parent in above if parent.parts):
-        if place.is_symlink():
-            raise BiogripError(
-                f"{place}: is a link, and nothing is written, replaced or removed through links. "
-                "Put a folder or nothing in its place."
-            )
+def _too_long(parts: Iterable[str]) -> bool:
+    return any(len(part.encode()) > _LONGEST_NAME for part in parts)
 
 
 def read_journal(file: Path) -> list[Record]:

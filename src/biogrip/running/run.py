@@ -77,7 +77,7 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
 
 def _check_folder(folder: Path) -> None:
     """Refuse a working directory that Snakemake could not use; a missing one is created."""
-    from biogrip.running.manifest import refuse_other_than_folder
+    from biogrip.running.places import refuse_other_than_folder
 
     try:
         found = None if stat.S_ISDIR(folder.stat().st_mode) else "found a file"
@@ -166,6 +166,10 @@ class _Signals:
         if self.first is not None:
             self._pass_on(self._child)
         status = self._child.wait()
+        if status < 0:
+            # Its jobs would go on, and write what the next run does not expect.
+            with suppress(ProcessLookupError):
+                os.killpg(self._child.pid, signal.SIGTERM)
         if status < 0 and self.first is None:
             ended = f"Snakemake was ended by signal {-status}"
             with suppress(ValueError):
@@ -202,10 +206,17 @@ def _to_open(folder: Path, arguments: list[str]) -> str:
     results = folder / "results"
     pages: list[Path] = []
     # Snakemake may have been called for something other than a run.
-    with suppress(BiogripError):
+    with suppress(BiogripError, OSError):
         pages = [results / "summaries" / f"{case}.html" for case in read_study(results).cases]
-    asked = [folder / word for word in arguments]
-    there = _files(asked) or _files([results / "report.html", *pages])
+        begun_ns = (results / "study.json").stat().st_mtime_ns
+        # Pages that are older were made for the study before, and were not asked for now.
+        pages = [
+            page
+            for page in (results / "report.html", *pages)
+            if page.is_file() and page.stat().st_mtime_ns >= begun_ns
+        ]
+    asked = [folder / word for word in arguments if word.startswith("results/")]
+    there = _files(asked) or _files(pages)
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""
     return f"biogrip: done. Open {', '.join(there[:_SHOWN])}{more}." if there else "biogrip: done."
 

@@ -77,13 +77,16 @@ class Sheet:
 
     def digest(self, job: Wildcards) -> str:
         """Return a digest of the settings and the code that a job uses."""
-        settings = [product.settings(self.plan.study, job) for product in self.products]
         modules = {
             module
             for product in self.products
             for module in (product.module, *product.modules(job))
         }
-        return f"{digest(settings)}-{fingerprint(*sorted(modules))}"
+        return f"{self.digest_of_settings(job)}-{fingerprint(*sorted(modules))}"
+
+    def digest_of_settings(self, job: Wildcards) -> str:
+        """Return a digest of the settings alone."""
+        return digest([product.settings(self.plan.study, job) for product in self.products])
 
     def command(self, job: Wildcards) -> str:
         """Return the arguments of `biogrip make` for a job."""

@@ -44,7 +44,8 @@ def verify(results: Path) -> str:
         problems = [
             f"{results / name}: was made for other settings, by other code or of other files "
             f"than {results / STUDY} says."
-            for name in Provenance(results, manifest).made_otherwise(sheets)
+            for name in sorted(Provenance(results, manifest).outdated(sheets))
+            if manifest.knows(name)
         ]
         others = len(manifest.others([*map(name_of, files_of(sheets)), *OF_NO_RULE]))
     if problems:

@@ -4,15 +4,16 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.running.journal import Journal
-from biogrip.running.locks import release_dead_locks
-from biogrip.running.manifest import OF_NO_RULE, Manifest, refuse_other_than_folder, set_aside
+from biogrip.running.locks import is_locked, release_dead_locks
+from biogrip.running.manifest import OF_NO_RULE, Manifest, set_aside
+from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.terminal import visible, visible_lines
 
 _SHOWN = 6
@@ -53,10 +54,13 @@ def hold_against_record(
         kind = kwargs["executor_plugin"].common_settings
         if not kind.touch_exec:
             with _said_and_ended():
-                check_results(results, asked(), may_make, changing=not kind.dryrun_exec)
                 if not kind.dryrun_exec:
                     release_dead_locks(Path(".snakemake"))
-                    begin()
+                # Beside another run nothing is changed: Snakemake says so, and ends.
+                if kind.dryrun_exec or not is_locked(Path(".snakemake")):
+                    check_results(results, asked(), may_make, changing=not kind.dryrun_exec)
+                    if not kind.dryrun_exec:
+                        begin()
         ended = execute(*args, **kwargs)
         if not kind.dryrun_exec:
             _say_what_else_is_there(results, asked())
@@ -91,7 +95,7 @@ def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
     if others:
         print(
             f"biogrip: {results} also holds results of other studies ({len(others)}, the first "
-            f"{others[0]}). To keep studies apart: --directory FOLDER.",
+            f"{visible(others[0])}). To keep studies apart: --directory FOLDER.",
             file=sys.stderr,
         )
 
@@ -125,8 +129,13 @@ def check_results(
     refuse_links(results, wanted)
     refuse_files_as_folders(results, wanted)
     if changing:
-        _check_writable(results)
+        _check_writable(results, wanted)
     manifest = Manifest(results)
+    if changing and manifest.is_written_to:
+        raise BiogripError(
+            f"{results}: jobs of a run that was killed still write there; allowed is to run after "
+            "their end."
+        )
     refuse_others(manifest, results, wanted)
     gone = []
     for path in manifest.files:
@@ -214,47 +223,12 @@ def refuse_others(manifest: Manifest, results: Path, files: Iterable[Path]) -> N
         )
 
 
-def refuse_links(results: Path, files: Iterable[Path]) -> None:
-    """Refuse paths that pass through a link, at or below the results folder.
-
-    Raises
-    ------
-    BiogripError
-        Names the first link.
-    """
-    seen = {results}
-    for file in files:
-        seen.update((file, *file.parents))
-    for place in sorted(seen):
-        if place.is_symlink() and (place == results or results in place.parents):
-            raise BiogripError(
-                f"{place}: is a link, and nothing is written through links. Put a folder or "
-                "nothing in its place; a study elsewhere is run with --directory."
-            )
-
-
-def refuse_files_as_folders(results: Path, files: Iterable[Path]) -> None:
-    """Refuse a file in the place of a folder that files are written to.
-
-    Raises
-    ------
-    BiogripError
-        Names the first such file.
-    """
-    folders = {parent for file in files for parent in file.parents}
-    for folder in sorted(f for f in folders if f == results or results in f.parents):
-        refuse_other_than_folder(folder)
-
-
-def _check_writable(results: Path) -> None:
-    """Create the results folder, and check that it and its subfolders are writable."""
-    folders = [results]
-    try:
+def _check_writable(results: Path, files: Iterable[Path]) -> None:
+    """Create the results folder, and check that it and what files are written to are writable."""
+    with suppress(OSError):
         results.mkdir(parents=True, exist_ok=True)
-        folders += [p for p in results.iterdir() if p.is_dir() and not p.is_symlink()]
-    except OSError:
-        pass
-    for place in folders:
+    folders = {file.parent for file in files}
+    for place in [results, *sorted(folder for folder in folders if folder.is_dir())]:
         try:
             # Jobs of a cluster may do this concurrently, so use unique temporary names.
             with TemporaryFile(dir=place) as probe:
