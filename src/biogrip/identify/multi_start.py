@@ -73,6 +73,8 @@ def _best_of_alike(
         starts, before = _started_quietly(problems, starts, before)
     fits, traces = LocalFits(problems), np.arange(len(problems))
     rough, trace, fine, trace_of_fine = _finished(fits, starts)
+    if problems[0].residuals.inertia:
+        fine, trace_of_fine = _beside_the_best(fits, fine, trace_of_fine)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
     best = settled(fits, fine[winners], traces)
     answers = []
@@ -94,9 +96,28 @@ def _finished(
     trace = np.repeat(np.arange(len(starts)), [len(own_starts) for own_starts in starts])
     rough = fits.fitted(np.concatenate(starts), trace, ROUGH)
     # Rough fits show which basins are deepest; only the best are continued to the optimum.
-    best = [_best(rough, trace == own, FINISHED) for own in range(len(starts))]
+    residuals = fits.problems[0].residuals
+    # Of the many basins of a ring the best few may all be one.
+    most = len(starts[0]) if residuals.inertia and not residuals.model.power_law else FINISHED
+    best = [_best(rough, trace == own, most) for own in range(len(starts))]
     finalists = np.concatenate(best)
     return rough, trace, fits.fitted(rough.x[finalists], trace[finalists]), trace[finalists]
+
+
+def _beside_the_best(
+    fits: LocalFits, fine: Minima, trace_of_fine: IntArray
+) -> tuple[Minima, IntArray]:
+    """Add fits with springs a little stiffer and softer than those of the best of each trace."""
+    model = fits.problems[0].residuals.model
+    springs = np.array([parameter.kind == "stiffness" for parameter in model.parameters])
+    if model.power_law:
+        return fine, trace_of_fine
+    traces = np.unique(trace_of_fine)
+    best = [fine.x[_best(fine, trace_of_fine == own, 1)] for own in traces]
+    starts = np.concatenate([x + _BESIDE[:, None] * springs for x in best])
+    trace = np.repeat(traces, len(_BESIDE))
+    again = fits.fitted(starts, trace)
+    return Minima.joined([fine, again]), np.concatenate((trace_of_fine, trace))
 
 
 def _started_quietly(
