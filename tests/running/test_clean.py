@@ -99,6 +99,21 @@ def test_it_waits_for_jobs_that_outlive_their_run(results: Path) -> None:
     assert clean(results) == "2 files of results removed."
 
 
+def test_it_does_not_wait_for_a_number_that_another_process_has_got(results: Path) -> None:
+    """Process 1 has been there since the computer was started, and later than this journal."""
+    name = f"{os.uname().nodename}--1--1000000000000000000.jsonl"
+    (results / JOURNALS / name).write_text("")
+    assert clean(results) == "2 files of results removed."
+    assert not results.exists()
+
+
+def test_it_is_not_cleaned_from_inside(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(results)
+    with pytest.raises(BiogripError, match="clean it from outside"):
+        clean(Path())
+    assert Path("tables/a.csv").exists()
+
+
 def test_nothing_is_removed_through_a_link(results: Path) -> None:
     results.rename("big_disk")
     results.symlink_to("big_disk")

@@ -10,7 +10,10 @@ import pytest
 from biogrip.cli import main
 from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
+from biogrip.running.manifest import Manifest
 from tests.helpers.runs import RECORDED, TINY, results_of, snakemake
+
+SEEDED = f"study_seed: 2\n{TINY}"
 
 
 @pytest.fixture
@@ -101,3 +104,67 @@ def test_what_a_person_made_is_known_as_what_a_job_made(
     Path("results/tables/errors.csv").unlink()
     assert main(["make", "all_errors"]) == 0
     assert main(["verify"]) == 0
+
+
+def test_a_job_of_a_study_that_has_changed_is_refused(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another run was begun beside its own: what it reads is not what it was planned with."""
+    monkeypatch.chdir(copied)
+    study = json.loads(Path("results/study.json").read_text())
+    job = ["make", "target", "--case", "liquid_drop_2"]
+    digest = Manifest(Path("results")).last("targets/liquid_drop_2.csv").settings
+    before = Path("results/targets/liquid_drop_2.csv").read_bytes()
+    study["cases"]["liquid_drop_2"]["sample"]["k"] = 21.0
+    Path("results/study.json").write_text(json.dumps(study))
+    Path("results/targets/liquid_drop_2.csv").unlink()
+    assert main([*job, "--made-for", digest]) == 1
+    assert "study.json: has changed since this run was planned" in capsys.readouterr().err
+    assert not Path("results/targets/liquid_drop_2.csv").exists()
+    study["cases"]["liquid_drop_2"]["sample"]["k"] = 1.0
+    Path("results/study.json").write_text(json.dumps(study))
+    assert main([*job, "--made-for", digest]) == 0
+    assert Path("results/targets/liquid_drop_2.csv").read_bytes() == before
+
+
+def test_a_second_run_changes_nothing(tiny_copy: Path) -> None:
+    """Not even what the study is: the first run's jobs read it."""
+    locks = tiny_copy / ".snakemake" / "locks"
+    locks.mkdir(exist_ok=True)
+    (locks / "0.output.lock").write_text("results/targets/liquid_drop_2.csv\n")
+    (tiny_copy / "results" / "tables" / "errors.csv").write_text("being written")
+    before = results_of(tiny_copy)
+    run = snakemake(tiny_copy, config=f"{TINY}  liquid_drop_2: {{sample: {{k: 21.0}}}}\n")
+    assert run.status == 1
+    assert results_of(tiny_copy) == before
+
+
+def test_what_is_made_of_outdated_results_is_outdated(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its own settings may be the same: a table of errors knows of no noise."""
+    run = snakemake(copied, "results/measurements/liquid_drop_2/seeds_0-0.parquet", config=SEEDED)
+    assert run.status == 0, run.output
+    monkeypatch.chdir(copied)
+    for only in ("errors*", "verdicts*"):
+        assert main(["publish", "results", "published", "--only", only]) == 1
+    monkeypatch.chdir("results")
+    assert main(["verify", "."]) == 1
+    assert "tables/errors.csv: was made for other settings" in capsys.readouterr().err
+
+
+def test_nothing_is_made_by_hand_through_a_link(
+    copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(copied)
+    for name in ("results/tables", "results/.manifest", "results"):
+        Path(name).rename("elsewhere")
+        Path(name).symlink_to(Path("elsewhere").absolute())
+        before = {path: path.read_bytes() for path in sorted(Path("elsewhere").rglob("*.csv"))}
+        assert main(["make", "errors", "--case", "liquid_drop_2"]) == 1
+        assert f"{name}: " in capsys.readouterr().err
+        assert {
+            path: path.read_bytes() for path in sorted(Path("elsewhere").rglob("*.csv"))
+        } == before
+        Path(name).unlink()
+        Path("elsewhere").rename(name)
