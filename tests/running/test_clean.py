@@ -107,11 +107,11 @@ def test_it_does_not_wait_for_a_number_that_another_process_has_got(results: Pat
     assert not results.exists()
 
 
-def test_it_is_not_cleaned_from_inside(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_may_be_cleaned_from_inside(results: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The folder that one is in stays."""
     monkeypatch.chdir(results)
-    with pytest.raises(BiogripError, match="clean it from outside"):
-        clean(Path())
-    assert Path("tables/a.csv").exists()
+    assert clean(Path()) == "2 files of . removed."
+    assert list(Path().iterdir()) == []
 
 
 def test_nothing_is_removed_through_a_link(results: Path) -> None:

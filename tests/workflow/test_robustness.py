@@ -58,7 +58,7 @@ def test_a_sweep_has_its_results(study: Path) -> None:
 def test_all_asks_for_heat_maps_but_for_no_figure_of_a_point(study: Path) -> None:
     run = snakemake(study, "-n", config=SWEEP)
     assert run.status == 0, run.output
-    assert run.jobs("case_figures") == run.jobs("case_tables") == 1
+    assert run.jobs("case_figures") == run.jobs("verdicts") == 1
     assert run.jobs("identification") == 2
     fresh = snakemake(study, "-n", "--forceall", config=SWEEP)
     assert fresh.jobs("robustness_map") == fresh.jobs("robustness") == 1

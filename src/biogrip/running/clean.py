@@ -30,8 +30,6 @@ def clean(results: Path) -> str:
     if results.is_symlink():
         raise BiogripError(f"{results}: is a link, and nothing is removed through links.")
     folder = results.absolute()
-    if folder == Path.cwd():
-        raise BiogripError(f"{results}: is the folder that you are in; clean it from outside.")
     manifest = Manifest(results)
     snakemake = folder.parent / ".snakemake"
     release_dead_locks(snakemake)
@@ -51,8 +49,8 @@ def clean(results: Path) -> str:
     manifest.discard()
     folders = {parent for path in manifest.paths for parent in (results / path).parents}
     folders &= {results, *(folder for folder in folders if results in folder.parents)}
-    for folder in sorted({*folders, results / JOURNALS}, key=lambda f: -len(f.parts)):
-        if folder.is_dir() and not any(folder.iterdir()):
-            folder.rmdir()
+    for place in sorted({*folders, results / JOURNALS}, key=lambda f: -len(f.parts)):
+        if place.absolute() != Path.cwd() and place.is_dir() and not any(place.iterdir()):
+            place.rmdir()
     kept = f" Kept, as they were edited: {', '.join(map(str, left))}." if left else ""
     return f"{counted(len(written), 'file')} of {results} removed.{kept}"

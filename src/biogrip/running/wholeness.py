@@ -131,11 +131,6 @@ def check_results(
     if changing:
         _check_writable(results, wanted)
     manifest = Manifest(results)
-    if changing and manifest.is_written_to:
-        raise BiogripError(
-            f"{results}: jobs of a run that was killed still write there; allowed is to run after "
-            "their end."
-        )
     refuse_others(manifest, results, wanted)
     gone = []
     for path in manifest.files:
