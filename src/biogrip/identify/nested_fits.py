@@ -7,7 +7,6 @@ range, its optimum is the richer model's result, with elements that have vanishe
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import product
 
 import numpy as np
 
@@ -105,10 +104,19 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         for inner in contained_in(name, found)
         if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
     ]
-    for inner, (trace, problem) in product(fewer, enumerate(problems)):
-        parameters = as_richer(name, inner, found[inner][trace].parameters)
-        for start in _with_a_branch_more(parameters, np.array(branches)):
-            again = found[name][trace].at(fit_from([problem], _within(start, problem)))
+    for inner in fewer:
+        pairs = [
+            (trace, _within(start, problem))
+            for trace, problem in enumerate(problems)
+            for start in _with_a_branch_more(
+                as_richer(name, inner, found[inner][trace].parameters), np.array(branches)
+            )
+        ]
+        if not pairs:
+            continue
+        fits = fit_from([problems[trace] for trace, _ in pairs], np.array([x for _, x in pairs]))
+        for row, (trace, _) in enumerate(pairs):
+            again = found[name][trace].at(fits[np.array([row])])
             if _digits(again) < _digits(found[name][trace]):
                 found[name][trace] = again
 
