@@ -153,12 +153,12 @@ def identify_from(problem: Problem, start: Array) -> Identification:
 
 
 def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
-    """Fit every trace from one start, and refine the optima to their last digits.
+    """Fit every trace from one starting point, and refine the optima by Newton steps.
 
     Parameters
     ----------
     problems
-        One problem per trace.
+        One problem a trace.
     starts : (n_parameters,) or (n_traces, n_parameters)
         Log-parameters.
 
@@ -167,11 +167,25 @@ def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
     Minima
         The optimum of every trace.
     """
+    return _fit_alike(problems, starts, settled)
+
+
+def descend_from(problems: Sequence[Problem], starts: Array) -> Minima:
+    """Fit as `fit_from` does, without the Newton steps: enough to compare basins."""
+    return _fit_alike(problems, starts, lambda _, minima, __: minima)
+
+
+def _fit_alike(
+    problems: Sequence[Problem],
+    starts: Array,
+    finish: Callable[[LocalFits, Minima, IntArray], Minima],
+) -> Minima:
+    """Fit problems with the same responses together; each fit is then finished."""
     starts = np.broadcast_to(starts, (len(problems), len(problems[0].low)))
     groups, found = alike(problems), list[Minima]()
     for group in groups:
         fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
-        found.append(settled(fits, fits.fitted(starts[group], traces), traces))
+        found.append(finish(fits, fits.fitted(starts[group], traces), traces))
     return Minima.joined(found)[np.argsort(np.concatenate(groups))]
 
 

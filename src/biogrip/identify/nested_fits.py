@@ -11,11 +11,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.experiment.nesting import as_richer, contained_in, different_in
+from biogrip.experiment.nesting import as_richer, contained, contained_in, different_in
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.identify.multi_start import fit_from
+from biogrip.identify.multi_start import descend_from, fit_from
 from biogrip.identify.problem import Problem
 
 # Factors by which an element that has vanished exceeds a usual one, or falls short of it, at a
@@ -23,6 +23,8 @@ from biogrip.identify.problem import Problem
 _AWAY, _SHARE = (3.0, 100.0), 0.1
 # Relaxation times at which an additional branch starts, over the usual one.
 _FURTHER = 0.03, 1.0, 30.0
+# A decrease of chi^2 that is worth a fit, far below the 1 that a standard error changes it by.
+_NOTICEABLE = 0.01
 # Models that are equivalent in other parameters may improve one another in turn.
 _MOST_ROUNDS = 3
 
@@ -104,7 +106,10 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         for inner in contained_in(name, found)
         if 0 < len(CANDIDATES[inner].model.free_branches) == len(branches) - 1
     ]
-    for inner in fewer:
+    # A fit of the richest has what those of the models in it have.
+    for inner in [
+        inner for inner in fewer if not any(inner in contained(other) for other in fewer)
+    ]:
         pairs = [
             (trace, _within(start, problem))
             for trace, problem in enumerate(problems)
@@ -114,11 +119,11 @@ def _add_branches(name: str, problems: Sequence[Problem], found: dict[str, Answe
         ]
         if not pairs:
             continue
-        fits = fit_from([problems[trace] for trace, _ in pairs], np.array([x for _, x in pairs]))
-        for row, (trace, _) in enumerate(pairs):
-            again = found[name][trace].at(fits[np.array([row])])
-            if _digits(again) < _digits(found[name][trace]):
-                found[name][trace] = again
+        traces = [trace for trace, _ in pairs]
+        ends = descend_from([problems[t] for t in traces], np.array([x for _, x in pairs]))
+        for trace, x, misfit_rad in zip(traces, ends.x, ends.misfit_rad.tolist(), strict=True):
+            if _is_noticeably_lower(misfit_rad, found[name][trace].misfit_rad, problems[trace]):
+                found[name][trace] = _better_from(found[name][trace], problems[trace], x)
 
 
 def _with_a_branch_more(parameters: Array, branches: IntArray) -> Iterator[Array]:
@@ -152,9 +157,9 @@ def _fit_again(problems: Mapping[str, Sequence[Problem]], found: dict[str, Answe
             problem = problems[name][trace]
             parameters = as_richer(name, inner, found[inner][trace].parameters)
             if is_within(parameters, problem):
-                again = found[name][trace].at(fit_from([problem], _within(parameters, problem)))
-                if _digits(again) < _digits(found[name][trace]):
-                    found[name][trace], news = again, True
+                before = found[name][trace]
+                found[name][trace] = _better_from(before, problem, _within(parameters, problem))
+                news |= found[name][trace] is not before
         if not news:
             break
 
@@ -176,13 +181,25 @@ def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
         for inner in contained_in(name, found):
             pairs = zip(found[name], found[inner], strict=True)
             for trace, (answer, simpler) in enumerate(pairs):
-                if _digits(simpler) < _digits(answer):
+                if _digits(simpler.misfit_rad) < _digits(answer.misfit_rad):
                     yield name, inner, trace
 
 
-def _digits(answer: Identification) -> float:
+def _is_noticeably_lower(misfit_rad: float, than_rad: float, problem: Problem) -> bool:
+    """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
+    gain = (than_rad / misfit_rad) ** 2 - 1 if misfit_rad else float(than_rad > 0) * np.inf
+    return bool(problem.residuals.samples * gain > _NOTICEABLE)
+
+
+def _better_from(answer: Identification, problem: Problem, start: Array) -> Identification:
+    """Return the fit from a start if its misfit is lower, or else the answer itself."""
+    again = answer.at(fit_from([problem], start))
+    return again if _digits(again.misfit_rad) < _digits(answer.misfit_rad) else answer
+
+
+def _digits(misfit_rad: float) -> float:
     """Round a misfit to nine digits, below which processors differ."""
-    return float(f"{answer.misfit_rad:.8e}")
+    return float(f"{misfit_rad:.8e}")
 
 
 def _within(parameters: Array, problem: Problem) -> Array:
