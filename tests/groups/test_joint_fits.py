@@ -193,7 +193,7 @@ def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> N
     assert joint.misfit(np.exp(x))[0] == pytest.approx(misfit, rel=1e-9)
     assert joint.residuals.condensed_misfit(np.exp(x))[0] == pytest.approx(misfit, rel=1e-9)
     np.testing.assert_array_equal(joint.residuals.left(x[0]), residual)
-    gradient, root_mean_square = joint.residuals.gradient(x[0])
+    (gradient,), (root_mean_square,) = joint.residuals.gradients(x, [joint.residuals])
     assert gradient == pytest.approx(slopes @ residual, rel=1e-9)
     assert root_mean_square == pytest.approx(misfit, rel=1e-12)
     normal = LocalFits([joint]).normal(x, np.array([0]))

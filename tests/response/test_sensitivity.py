@@ -180,6 +180,6 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
     np.testing.assert_array_equal(residuals.left(x), residual)
     for at_once in (1000, 90):
         monkeypatch.setattr(of_residuals, "_SAMPLES_AT_ONCE", at_once)
-        gradient, misfit_rad = residuals.gradient(x)
+        (gradient,), (misfit_rad,) = residuals.gradients(x[None], [residuals])
         np.testing.assert_allclose(gradient, slopes @ residual, rtol=1e-11)
         assert misfit_rad == pytest.approx(np.sqrt(np.mean(residual**2)), rel=1e-12)

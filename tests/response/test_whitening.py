@@ -84,7 +84,8 @@ def test_few_rows_stand_for_all_whitened_samples(rate_Hz: float) -> None:
     x = np.log([sample[name] for name in MODEL.names])
     residual, slopes = plain(x)
     residual, slopes = whitening(residual), whitening(slopes)
-    response, sensitivity = plain._simulated(x, condensed.time_s)
+    simulated = plain._simulated(x[None], condensed.time_s)[0]
+    response, sensitivity = simulated[0], simulated[1:]
     rows = response @ condensed.to_rows - condensed.of_trace(whitening(trace))
     of_slopes = sensitivity @ condensed.to_rows
     assert rows @ rows == pytest.approx(residual @ residual, rel=1e-10)

@@ -65,13 +65,14 @@ class JointResiduals(Residuals):
         """Return residuals (n_samples,) and derivatives (n_parameters, n_samples) of all traces."""
         return self._stacked([part(log_parameters) for part in self._parts])
 
-    def gradient(self, log_parameters: Array) -> tuple[Array, float]:
-        """Return the gradient of half the sum of squares, (n_parameters,), and the RMS in rad."""
-        found = [part.gradient(log_parameters) for part in self._parts]
+    def gradients(self, log_parameters: Array, others: Sequence[Residuals]) -> tuple[Array, Array]:
+        """Return gradients of half the sums of squares, (n, n_parameters), and RMS in rad."""
+        count = len(others)
+        found = [part.gradients(log_parameters, [part] * count) for part in self._parts]
         counted = zip(self.weights, self._parts, found, strict=True)
-        squares = (w**2 * part.samples * rms**2 for w, part, (_, rms) in counted)
+        squares = [w**2 * part.samples * rms**2 for w, part, (_, rms) in counted]
         gradients = [w**2 * own for w, (own, _) in zip(self.weights, found, strict=True)]
-        return np.sum(gradients, axis=0), sqrt(fsum(squares) / self.samples)
+        return np.sum(gradients, axis=0), np.sqrt(np.sum(squares, axis=0) / self.samples)
 
     def left(self, log_parameters: Array) -> Array:
         """Return residuals only, trace after trace, (n_samples,) in rad."""

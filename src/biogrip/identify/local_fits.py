@@ -123,17 +123,14 @@ class LocalFits:
 
     def on_all_samples(self, x: Array, trace: IntArray) -> Normal:
         """Return sums of squares and gradients from all readings, without the information."""
-        found = [
-            self.problems[own].residuals.gradient(point)
-            for point, own in zip(x, trace.tolist(), strict=True)
-        ]
-        gradients, misfits = zip(*found, strict=True)
-        misfit_rad, noise_rad = np.array(misfits), self._noise_rad[trace]
+        traces = [self.problems[own].residuals for own in trace.tolist()]
+        gradients, misfit_rad = self._residuals.gradients(x, traces)
+        noise_rad = self._noise_rad[trace]
         away = (x - self._middle) / PRIOR_WIDTH
         square_sum = self._residuals.samples * (misfit_rad / noise_rad) ** 2
         return Normal(
             np.where(np.isnan(misfit_rad), np.inf, square_sum + np.sum(away**2, axis=1)),
-            np.array(gradients) / noise_rad[:, None] ** 2 + away / PRIOR_WIDTH,
+            gradients / noise_rad[:, None] ** 2 + away / PRIOR_WIDTH,
             np.empty((*x.shape, 0)),
             misfit_rad,
         )

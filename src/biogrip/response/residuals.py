@@ -1,5 +1,6 @@
 """Residuals of a model against one trace, with exact derivatives by the log-parameters."""
 
+from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -18,7 +19,7 @@ from biogrip.response.sensitivity import (
     corrections,
     differences,
     linear_responses,
-    rotation_and_sensitivity,
+    rotations_and_sensitivities,
 )
 
 # Most numbers in the rows that are formed at once, and samples whose corrections are.
@@ -108,29 +109,52 @@ class Residuals:
         log_parameters : (n_parameters,)
             Natural logarithms of the parameters in SI units.
         """
-        rotation, sensitivity = self._simulated(log_parameters, self._time_s)
-        residual = self._condensed.cleared(rotation) - self._rotation_rad
-        return residual, self._condensed.cleared(sensitivity)
+        rows = self._simulated(log_parameters[None], self._time_s)[0]
+        residual = self._condensed.cleared(rows[0]) - self._rotation_rad
+        return residual, self._condensed.cleared(rows[1:])
 
-    def gradient(self, log_parameters: Array) -> tuple[Array, float]:
-        """Compute the gradient of half the sum of squares, and the misfit, to all digits.
+    def gradients(
+        self, log_parameters: Array, others: Sequence["Residuals"]
+    ) -> tuple[Array, Array]:
+        """Compute gradients of half the sums of squares, and misfits, to all digits.
+
+        Parameters
+        ----------
+        log_parameters : (n, n_parameters)
+            Natural logarithms of the parameters in SI units.
+        others
+            For each of these, residuals that share the responses, of the trace to compare with.
 
         Returns
         -------
-        gradient : (n_parameters,)
-            Of half the sum of squares, in rad^2.
-        misfit_rad
-            Root mean square.
+        gradients : (n, n_parameters)
+            Of half the sums of squares, in rad^2.
+        misfits_rad : (n,)
+            Root mean squares.
         """
+        n, parameters = log_parameters.shape
+        sums, numbers = np.empty((n, 1 + parameters)), self.samples * (1 + parameters)
+        for some in parts(n, max(1, _AT_ONCE // numbers)):
+            rows, rest = self._complete_rows(log_parameters[some], others[some])
+            # One product per sample: the order of its sums does not depend on their number.
+            sums[some] = (rows @ np.ascontiguousarray(rows[:, 0])[:, :, None])[:, :, 0]
+            sums[some, 0] += rest**2
+        return sums[:, 1:], np.sqrt(sums[:, 0] / self.samples)
+
+    def _complete_rows(
+        self, log_parameters: Array, others: Sequence["Residuals"]
+    ) -> tuple[Array, Array]:
+        """Return rows of residuals and derivatives, and norms of what no response reaches."""
+        condensed = self._condensed
         if self.samples <= _SAMPLES_AT_ONCE:
-            residual, sensitivity = self(log_parameters)
-            return sensitivity @ residual, self._rms(residual)
+            rows = condensed.cleared(self._simulated(log_parameters, self._time_s))
+            rows[:, 0] -= [other._rotation_rad for other in others]
+            return rows, np.zeros(len(rows))
         # So many readings are dense: their sums equal those of nodes up to rounding.
-        condensed, (seen, rest) = self._condensed, self._trace_at_nodes
-        rotation, sensitivity = self._simulated(log_parameters, condensed.dense.time_s)
-        rows = condensed.rows_of_nodes(np.vstack((rotation, sensitivity)))
-        residual = np.append(rows[0] - seen, rest)
-        return rows[1:] @ residual[:-1], self._rms(residual)
+        rows = condensed.rows_of_nodes(self._simulated(log_parameters, condensed.dense.time_s))
+        traces = [other._trace_at_nodes for other in others]
+        rows[:, 0] -= [seen for seen, _ in traces]
+        return rows, np.array([rest for _, rest in traces])
 
     @cached_property
     def _trace_at_nodes(self) -> tuple[Array, float]:
@@ -139,14 +163,11 @@ class Residuals:
     def left(self, log_parameters: Array) -> Array:
         """Return the residuals alone, (n_samples,) in rad."""
         simulated = (
-            self._simulated(log_parameters, self._time_s[some])[0]
+            self._simulated(log_parameters[None], self._time_s[some])[0, 0]
             for some in parts(self.samples, _SAMPLES_AT_ONCE)
         )
         rotation = np.concatenate(list(simulated))
         return self._condensed.cleared(rotation) - self._rotation_rad
-
-    def _rms(self, residual: Array) -> float:
-        return float(np.linalg.norm(residual)) / np.sqrt(self.samples)
 
     @property
     def freedom(self) -> float:
@@ -254,8 +275,8 @@ class Residuals:
         alike = type(self) is type(other) and self._condensed is other._condensed
         return alike and (self._gripper, self.model) == (other._gripper, other.model)
 
-    def _simulated(self, log_parameters: Array, time_s: Array) -> tuple[Array, Array]:
-        return rotation_and_sensitivity(
+    def _simulated(self, log_parameters: Array, time_s: Array) -> Array:
+        return rotations_and_sensitivities(
             self._gripper,
             self.model,
             self._torque,

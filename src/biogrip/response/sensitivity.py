@@ -86,15 +86,37 @@ def rotation_and_sensitivity(
     sensitivity : (n_parameters, n_times)
         In rad.
     """
-    sample = parameters[None]
-    rows = linear_responses(gripper, model, torque, time_s, sample, inertia=inertia)[0]
-    phi, slopes = rows[0], rows[1:]
+    rows = rotations_and_sensitivities(
+        gripper, model, torque, time_s, parameters[None], nonlinear=nonlinear, inertia=inertia
+    )[0]
+    return rows[0], rows[1:]
+
+
+def rotations_and_sensitivities(
+    gripper: Gripper,
+    model: SampleModel,
+    torque: TorqueHistory,
+    time_s: Array,
+    parameters: Array,
+    *,
+    nonlinear: bool,
+    inertia: bool,
+) -> Array:
+    """Compute what `rotation_and_sensitivity` does for many samples, (n, n_parameters).
+
+    Returns
+    -------
+    (n, 1 + n_parameters, n_times)
+        First the rotation in rad, then its derivatives.
+    """
+    rows = linear_responses(gripper, model, torque, time_s, parameters, inertia=inertia)
     if nonlinear:
-        found = corrections(gripper, model, torque, sample)
+        found = corrections(gripper, model, torque, parameters)
         values = np.where(found.converged[:, None], found.at(time_s), np.nan)
-        phi = phi + values[0]
-        slopes = slopes + np.nan_to_num(differences(values[None])[0, 1:])
-    return phi, slopes
+        added = differences(values.reshape(len(parameters), -1, len(time_s)))
+        added[:, 1:] = np.nan_to_num(added[:, 1:])
+        rows += added
+    return rows
 
 
 def corrections(
