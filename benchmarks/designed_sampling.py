@@ -14,7 +14,7 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.sampling import best_sampling
 from biogrip.design.schedule import SamplingProblem, sampling_problem
-from biogrip.study.asked_design import wanted_of
+from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.load import load_study, read_configs
 
 OURS, CLOSER = "biogrip, as it designs", "biogrip, to 0.01 %"
@@ -64,8 +64,8 @@ def designed_problem() -> tuple[SamplingProblem, int]:
     folder = CONFIG.parent
     files = [CONFIG, folder / "design.yaml", folder / "designed.yaml"]
     case = load_study(read_configs(files), files).cases[_CASE]
-    wanted = wanted_of(case)
-    return sampling_problem(wanted, case.phases), wanted.samples
+    inputs = make_design_inputs(case)
+    return sampling_problem(inputs, case.phases), inputs.samples
 
 
 def compared(problem: tuple[SamplingProblem, int], rounds: int) -> list[Row]:
@@ -79,18 +79,18 @@ def compared(problem: tuple[SamplingProblem, int], rounds: int) -> list[Row]:
         How often each is timed.
     """
     (cells, samples), rows = problem, []
-    told, capacity = cells.told[0], cells.capacity
+    sensitivity, capacity = cells.sensitivity[0], cells.capacity
     for name in CRITERIA:
-        criterion = Criterion(name, "worst", tuple(range(len(told))))
+        criterion = Criterion(name, "worst", tuple(range(len(sensitivity))))
         alone: list[float] = []
 
         def ours(gap: float, criterion: Criterion = criterion) -> Array:
             return best_sampling(
-                told[None], capacity, samples, criterion, gap=gap, most=_MOST
+                sensitivity[None], capacity, samples, criterion, gap=gap, most=_MOST
             ).samples
 
         def peer(name: str = name, alone: list[float] = alone) -> Array:
-            found, spent_s = by_cvxpy(told, capacity, samples, name)
+            found, spent_s = by_cvxpy(sensitivity, capacity, samples, name)
             alone.append(spent_s)
             return found
 
@@ -101,7 +101,7 @@ def compared(problem: tuple[SamplingProblem, int], rounds: int) -> list[Row]:
         }
         timed = alternate(ways, rounds)
         found = {way: feasible(solve(), capacity, samples) for way, solve in ways.items()}
-        bounds = {way: typical_bound(told, one, name) for way, one in found.items()}
+        bounds = {way: typical_bound(sensitivity, one, name) for way, one in found.items()}
         for way, one in found.items():
             rows.append(
                 {
@@ -111,7 +111,7 @@ def compared(problem: tuple[SamplingProblem, int], rounds: int) -> list[Row]:
                     **timed.against(way, OURS),
                     "times_closer": timed.against(way, CLOSER)["times_ours"],
                     "solver_ms": 1e3 * float(np.median(alone)) if way == CLARABEL else None,
-                    "gap": gap_of(told, capacity, one, name),
+                    "gap": gap_of(sensitivity, capacity, one, name),
                     "excess": bounds[way] / min(bounds.values()) - 1,
                 }
             )

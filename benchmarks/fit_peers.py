@@ -29,14 +29,14 @@ class Objective:
 
     Parameters
     ----------
-    posed
+    case_problem
         What is fitted.
     """
 
-    def __init__(self, posed: Posed) -> None:
-        self.low, self.high = posed.low, posed.high
-        self._residuals = posed.residuals
-        self._middle = 0.5 * (posed.low + posed.high)
+    def __init__(self, case_problem: Posed) -> None:
+        self.low, self.high = case_problem.low, case_problem.high
+        self._residuals = case_problem.residuals
+        self._middle = 0.5 * (case_problem.low + case_problem.high)
         self._prior = np.eye(len(self._middle)) / PRIOR_WIDTH
         self._last: tuple[Array, Array, Array, float] | None = None
 
@@ -66,8 +66,8 @@ class Objective:
 
 def by_scipy(trace: Started) -> Array:
     """Fit by SciPy's bounded trust region from every start; log-parameters of the best."""
-    posed, objective = trace.posed, Objective(trace.posed)
-    bounds = posed.low, posed.high
+    case_problem, objective = trace.case_problem, Objective(trace.case_problem)
+    bounds = case_problem.low, case_problem.high
     found = [
         least_squares(objective.rows, start, objective.jacobian, bounds) for start in trace.starts
     ]
@@ -77,7 +77,7 @@ def by_scipy(trace: Started) -> Array:
 
 def by_scipy_in_two_turns(trace: Started) -> Array:
     """Fit by the same roughly from every start, and only the best of these to the end."""
-    objective = Objective(trace.posed)
+    objective = Objective(trace.case_problem)
     rough = [_local_fit(objective, start, ROUGH) for start in trace.starts]
     rough.sort(key=objective.misfit_rad)
     fine = [_local_fit(objective, x, FINE) for x in rough[:FINISHED]]
@@ -100,26 +100,26 @@ def _local_fit(objective: Objective, start: Array, tolerance: float) -> Array:
 
 def by_lmfit(trace: Started) -> Array:
     """Fit by lmfit's Levenberg-Marquardt from every start; log-parameters of the best."""
-    found = [minimizer(trace.posed, start).minimize() for start in trace.starts]
+    found = [minimizer(trace.case_problem, start).minimize() for start in trace.starts]
     best = min(found, key=lambda fit: fit.chisqr)
     return np.array([parameter.value for parameter in best.params.values()])
 
 
 def by_pypesto(trace: Started) -> Array:
     """Fit by pyPESTO's multi-start of a trust region; log-parameters of the best."""
-    _, result = multi_start(trace.posed, trace.starts)
+    _, result = multi_start(trace.case_problem, trace.starts)
     best: Array = result.optimize_result.x[0]
     return best
 
 
-def minimizer(posed: Posed, start: Array) -> lmfit.Minimizer:
+def minimizer(case_problem: Posed, start: Array) -> lmfit.Minimizer:
     """Set lmfit up."""
-    objective = Objective(posed)
+    objective = Objective(case_problem)
     parameters = lmfit.create_params(
         **{
             f"x{index}": {"value": value, "min": low, "max": high}
             for index, (value, low, high) in enumerate(
-                zip(start, posed.low, posed.high, strict=True)
+                zip(start, case_problem.low, case_problem.high, strict=True)
             )
         }
     )
@@ -134,9 +134,9 @@ def minimizer(posed: Posed, start: Array) -> lmfit.Minimizer:
     return lmfit.Minimizer(rows, parameters, scale_covar=False, Dfun=slopes)
 
 
-def multi_start(posed: Posed, starts: Array) -> tuple[pypesto.Problem, pypesto.Result]:
+def multi_start(case_problem: Posed, starts: Array) -> tuple[pypesto.Problem, pypesto.Result]:
     """Set pyPESTO up, and fit."""
-    objective = Objective(posed)
+    objective = Objective(case_problem)
 
     def half_square_sum(x: Array) -> float:
         rows = objective.rows(x)
@@ -150,10 +150,10 @@ def multi_start(posed: Posed, starts: Array) -> tuple[pypesto.Problem, pypesto.R
             res=lambda x: objective.rows(x),
             sres=lambda x: objective.jacobian(x),
         ),
-        lb=posed.low,
-        ub=posed.high,
+        lb=case_problem.low,
+        ub=case_problem.high,
         x_guesses=starts,
-        x_scales=["log"] * len(posed.low),
+        x_scales=["log"] * len(case_problem.low),
     )
     result = optimize.minimize(
         problem, optimizer=_trust_region(), n_starts=len(starts), progress_bar=False

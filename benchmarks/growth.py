@@ -12,7 +12,7 @@ from matplotlib.ticker import FuncFormatter, NullLocator
 
 from benchmarks.misfit import vectorised
 from benchmarks.section import Row, Section, number
-from benchmarks.setup import POPULATION, Problem, evolved, problem
+from benchmarks.setup import POPULATION, Problem, evolve, problem
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array
 from biogrip.products.figures.style import BLUE, GREY, ORANGE, PAGE_IN, SKY, figure, panel
@@ -100,7 +100,7 @@ def _seeds() -> list[Row]:
 
     def identify(count: int) -> None:
         for seed, p in enumerate(problems[:count]):
-            evolved(p.misfit(), p.genome, p.genetic, np.random.default_rng(seed))
+            evolve(p.misfit(), p.genome, p.genetic, np.random.default_rng(seed))
 
     row = _row("seeds", _OURS, {count: partial(identify, count) for count in _SEEDS}, rounds=1)
     command = [sys.executable, "-c", "import biogrip.products.stages.identification"]

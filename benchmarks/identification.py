@@ -10,7 +10,7 @@ from benchmarks.batch import BATCH, in_batch
 from benchmarks.genetic_peers import Task, by_deap, by_pygad, by_pymoo
 from benchmarks.misfit import by_lsim
 from benchmarks.section import Row, Section, number, times_ours
-from benchmarks.setup import NEAR_NOISE, evolved, problem
+from benchmarks.setup import NEAR_NOISE, evolve, problem
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, IntArray
 
@@ -41,7 +41,7 @@ Identifier = Callable[[Task, int], tuple[IntArray | Array, float]]
 
 def by_biogrip(task: Task, seed: int) -> tuple[Array, float]:
     """Run this project's algorithm; parameters in place of a chromosome."""
-    answer = evolved(task.misfit, task.genome, task.settings, np.random.default_rng(seed))
+    answer = evolve(task.misfit, task.genome, task.settings, np.random.default_rng(seed))
     return answer.parameters, answer.misfit_rad
 
 

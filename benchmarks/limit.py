@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.batch import BATCH
 from benchmarks.section import Row, Section, number
-from benchmarks.setup import Problem, evolved, problem
+from benchmarks.setup import Problem, evolve, problem
 from benchmarks.starts import Started, fitted, started
 from benchmarks.timing import alternate, clocked
 from biogrip.arrays import Array, IntArray
@@ -60,7 +60,7 @@ class Watched(SeriesMisfit):
         return sums
 
 
-def watched(p: Problem) -> Watched:
+def watch_writes(p: Problem) -> Watched:
     """Return the misfit of a problem, watched."""
     misfit = Watched(p.gripper, p.model, p.steps, p.interval_s, p.trace_rad)
     misfit.projections  # noqa: B018 - makes the table
@@ -69,7 +69,7 @@ def watched(p: Problem) -> Watched:
 
 def watched_identification(p: Problem, seed: int) -> Watched:
     """Identify by the genetic algorithm; the misfit that watched it."""
-    misfit = watched(p)
+    misfit = watch_writes(p)
     evolve_many(misfit.of_each, p.genome, p.genetic, [np.random.default_rng(seed)])
     return misfit
 
@@ -126,7 +126,7 @@ def limit_section() -> Section:
     one_ms, children_ms = timed.median_ms("1"), timed.median_ms(str(children))
     another_ms = (timed.median_ms(str(_MANY)) - timed.median_ms(str(_FEW))) / (_MANY - _FEW)
     large_rate = 2e-6 * _LARGE**3 / timed.median_ms("large product")
-    operations, table_ms = 2 * watched(p).rates * len(p.time_s), timed.median_ms("table")
+    operations, table_ms = 2 * watch_writes(p).rates * len(p.time_s), timed.median_ms("table")
     rows = [
         *_shares(p),
         _row("making the table", table_ms, "ms"),
@@ -168,7 +168,7 @@ def _shares(p: Problem) -> list[Row]:
         misfit_s += misfit.misfit_s
     for seed in range(_NONLINEAR_SEEDS):
         rng = np.random.default_rng(seed)
-        nonlinear_s += clocked(partial(evolved, nonlinear_watched, p.genome, p.genetic, rng))[0]
+        nonlinear_s += clocked(partial(evolve, nonlinear_watched, p.genome, p.genetic, rng))[0]
     return [
         _row("identification", 1e3 * whole_s / _SEEDS, "ms"),
         _row("of which sums over the trace", 100 * sums_s / whole_s, "%"),

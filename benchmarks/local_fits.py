@@ -93,9 +93,9 @@ def _chi2_above_best(traces: Sequence[Started], found: Mapping[str, Array]) -> d
     """By library and trace; each entry of what was found is (n_traces, n_parameters)."""
     misfits = np.array(
         [
-            trace.posed.misfit(np.exp([each[index] for each in found.values()]))
+            trace.case_problem.misfit(np.exp([each[index] for each in found.values()]))
             for index, trace in enumerate(traces)
         ]
     ).T
-    samples = traces[0].posed.residuals.samples
+    samples = traces[0].case_problem.residuals.samples
     return dict(zip(found, samples * ((misfits / misfits.min(axis=0)) ** 2 - 1), strict=True))

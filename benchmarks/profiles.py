@@ -12,9 +12,9 @@ from benchmarks.setup import Problem, problem
 from benchmarks.starts import fitted, started
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
-from biogrip.identifiability.profiles import profiles_of
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
+from biogrip.identifiability.profiles import compute_profiles
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 
 _BATCH, _ROUNDS = 10, 5
@@ -54,17 +54,17 @@ def profiles_section() -> Section:
 def compared(problems: Sequence[Problem], rounds: int) -> list[Row]:
     """Find limits of the first trace by every library, and of all by ours side by side."""
     likelihoods = _likelihoods(problems)
-    likelihood, posed = likelihoods[0], likelihoods[0].problem
+    likelihood, case_problem = likelihoods[0], likelihoods[0].problem
     model = problems[0].model
     quantities = [q for q in parameters_and_sum(model) if q.label in _PARAMETERS]
     which = [model.names.index(name) for name in _PARAMETERS]
     deviations = [likelihood.deviation(quantity) for quantity in quantities]
-    fit = minimizer(posed, likelihood.best)
+    fit = minimizer(case_problem, likelihood.best)
     best = fit.minimize()
-    from_optimum = multi_start(posed, likelihood.best[None])
+    from_optimum = multi_start(case_problem, likelihood.best[None])
     ways: dict[str, Callable[[], Array]] = {
-        OURS: lambda: limits_and_deeper([likelihood], quantities)[0][0],
-        SIDE_BY_SIDE: lambda: limits_and_deeper(likelihoods, quantities)[0][0],
+        OURS: lambda: find_limits([likelihood], quantities)[0][0],
+        SIDE_BY_SIDE: lambda: find_limits(likelihoods, quantities)[0][0],
         WHOLE: partial(_whole, likelihood, quantities),
         LMFIT: partial(lmfit_limits, fit, best, which),
         PYPESTO: partial(pypesto_limits, *from_optimum, which),
@@ -112,7 +112,7 @@ def exact_limit(likelihood: Likelihood, index: int, step: float) -> float:
     objective, best = Objective(likelihood.problem), likelihood.best
     others = np.delete(np.arange(len(best)), index)
 
-    def rise(value: float) -> float:
+    def increase(value: float) -> float:
         """Rise of chi^2 above the threshold."""
 
         def at(x: Array) -> Array:
@@ -127,26 +127,26 @@ def exact_limit(likelihood: Likelihood, index: int, step: float) -> float:
             xtol=1e-15,
             gtol=1e-12,
         )
-        return likelihood.rise(objective.misfit_rad(at(found.x))) - likelihood.threshold
+        return likelihood.increase(objective.misfit_rad(at(found.x))) - likelihood.threshold
 
-    limit: float = brentq(rise, best[index], best[index] + 3 * step, rtol=1e-12)
+    limit: float = brentq(increase, best[index], best[index] + 3 * step, rtol=1e-12)
     return limit
 
 
 def _likelihoods(problems: Sequence[Problem]) -> list[Likelihood]:
     traces = started(problems)
     return [
-        likelihood_of(
-            trace.posed,
+        make_likelihood(
+            trace.case_problem,
             best,
-            float(trace.posed.misfit(np.exp(best)[None])[0]),
+            float(trace.case_problem.misfit(np.exp(best)[None])[0]),
             confidence=0.95,
-            noise_rad=trace.posed.residuals.noise_scale_rad,
+            noise_rad=trace.case_problem.residuals.noise_scale_rad,
         )
         for trace, best in zip(traces, fitted(traces), strict=True)
     ]
 
 
 def _whole(likelihood: Likelihood, quantities: Sequence[Quantity]) -> Array:
-    (profiles,) = profiles_of([likelihood], quantities)
+    (profiles,) = compute_profiles([likelihood], quantities)
     return np.array([[profile.low, profile.high] for profile in profiles], dtype=float)

@@ -20,7 +20,7 @@ from benchmarks.scale import scale_section
 from benchmarks.section import Section, markdown, number, renewed, written
 from benchmarks.study import study_section
 from benchmarks.timing import clocked
-from biogrip.files import write_text, written_whole
+from biogrip.files import atomic_write, write_text
 from biogrip.products.figures.style import styled
 
 RESULTS = Path(__file__).parent / "results"
@@ -127,5 +127,5 @@ def _aims(sections: Mapping[str, Section]) -> list[dict[str, str]]:
 def _draw(section: Section) -> None:
     if section.figure is None:
         return
-    with styled(), written_whole(RESULTS / f"{section.name}.png") as scratch:
+    with styled(), atomic_write(RESULTS / f"{section.name}.png") as scratch:
         section.figure().savefig(scratch, format="png", metadata={"Software": None})

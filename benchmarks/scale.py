@@ -82,7 +82,7 @@ def scale_section() -> Section:
     return Section("scale", "Many seeds, many cases", _TEXT, columns, rows)
 
 
-def watched(command: Sequence[str], folder: Path) -> dict[str, Seen]:
+def watch_writes(command: Sequence[str], folder: Path) -> dict[str, Seen]:
     """Run a command in a folder, and follow its processes; by kind, the most costly first.
 
     Raises
@@ -117,7 +117,7 @@ def _study(folder: Path, overlay: dict[str, Any], *options: str) -> tuple[float,
     command += ["--snakefile", str(ROOT / "Snakefile"), "--directory", str(folder)]
     command += ["--configfile", str(config)]
     start = time.monotonic()
-    seen = watched(command, folder)
+    seen = watch_writes(command, folder)
     return time.monotonic() - start, seen
 
 

@@ -14,13 +14,13 @@ from biogrip.experiment.sample import SampleModel, model_named
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic import evolve_many
 from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.identify.genome import GeneRange, Genome, make_genome
 from biogrip.identify.problem import Problem as Posed
-from biogrip.identify.problem import problem_of
+from biogrip.identify.problem import make_problem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import Misfit, misfit_of, together
+from biogrip.response.misfit import Misfit, combine_misfits, make_misfit
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
 from biogrip.study.load import load_study
@@ -75,16 +75,16 @@ class Problem:
         given = self.steps, self.time_s, self.trace_rad
         condensed = self.condensed(nonlinear=nonlinear)
         residuals = Residuals(self.gripper, self.model, *given, condensed)
-        return misfit_of(residuals, self.gripper, *given)
+        return make_misfit(residuals, self.gripper, *given)
 
     def condensed(self, *, nonlinear: bool = False) -> Condensed:
         """What stands for the samples of all traces of the case."""
         none = nuisance_basis(self.time_s, offset=False, drift=False)
         return Condensed(self.steps, self.time_s, none, nonlinear=nonlinear)
 
-    def posed(self, condensed: Condensed | None = None) -> Posed:
+    def case_problem(self, condensed: Condensed | None = None) -> Posed:
         """Pose the identification as the study does."""
-        return problem_of(
+        return make_problem(
             self.gripper,
             self.model,
             self.steps,
@@ -99,11 +99,11 @@ class Problem:
         return self.genome.decode(self.genome.draw(count, np.random.default_rng(1)))
 
 
-def evolved(
+def evolve(
     misfit: Misfit, genome: Genome, settings: GeneticSettings, rng: np.random.Generator
 ) -> Identification:
     """Run our genetic algorithm on any misfit of parameters of shape (n, n_parameters)."""
-    return evolve_many(together([misfit]), genome, settings, [rng])[0].identification
+    return evolve_many(combine_misfits([misfit]), genome, settings, [rng])[0].identification
 
 
 def problem(
@@ -144,7 +144,7 @@ def problem(
         trace,
         rms(trace - clean),
         ranges,
-        genome_of(model, ranges),
+        make_genome(model, ranges),
         genetic,
         chosen.block.of_methods,
     )
@@ -153,4 +153,4 @@ def problem(
 def posed_together(problems: Sequence[Problem], condensed: Condensed | None = None) -> list[Posed]:
     """Pose the identification of traces of one case, condensed once for all as in the study."""
     condensed = condensed or problems[0].condensed()
-    return [p.posed(condensed) for p in problems]
+    return [p.case_problem(condensed) for p in problems]

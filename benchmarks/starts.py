@@ -20,7 +20,7 @@ class Started:
 
     Parameters
     ----------
-    posed
+    case_problem
         What is fitted.
     starts : (n_starts, n_parameters)
         Log-parameters.
@@ -28,7 +28,7 @@ class Started:
         First row of the history, see `best_of_starts`.
     """
 
-    posed: Posed
+    case_problem: Posed
     starts: Array
     before: Row
 
@@ -37,19 +37,21 @@ def started(problems: Sequence[Problem], condensed: Condensed | None = None) -> 
     """Choose starting points as the study's least squares does, from the best of random ones."""
     found = []
     settings: Any = problems[0].settings.of("least_squares")
-    for seed, posed in enumerate(posed_together(problems, condensed)):
+    for seed, case_problem in enumerate(posed_together(problems, condensed)):
         rng = np.random.default_rng(seed)
-        shape = (settings.candidates, len(posed.low))
-        points, misfit = screened(posed.misfit, rng.uniform(posed.low, posed.high, shape))
+        shape = (settings.candidates, len(case_problem.low))
+        points, misfit = screened(
+            case_problem.misfit, rng.uniform(case_problem.low, case_problem.high, shape)
+        )
         before = np.exp(points[0]), float(misfit[0]), float(np.median(misfit)), len(points)
-        found.append(Started(posed, points[: settings.starts], before))
+        found.append(Started(case_problem, points[: settings.starts], before))
     return found
 
 
 def fitted(traces: Sequence[Started]) -> Array:
     """Fit traces side by side as the study does; log-parameters, (n_traces, n_parameters)."""
     answers = best_of_starts(
-        [trace.posed for trace in traces],
+        [trace.case_problem for trace in traces],
         [trace.starts for trace in traces],
         [trace.before for trace in traces],
         silent,

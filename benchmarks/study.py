@@ -18,7 +18,7 @@ from benchmarks.setup import CONFIG
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.running.resolved import write_study
-from biogrip.running.sheet import Sheet, files_of, sheets_of
+from biogrip.running.rules import Rule, files_of, make_rules
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
 
@@ -45,7 +45,7 @@ class Job:
         Of what.
     """
 
-    sheet: Sheet
+    sheet: Rule
     wildcards: Wildcards
 
     @property
@@ -94,7 +94,7 @@ def study_section() -> Section:
 
 def in_order(study: Study) -> list[Job]:
     """Jobs of a study, each after those that make what it reads."""
-    sheets = sheets_of(products().values(), Plan(study, Path("results")))
+    sheets = make_rules(products().values(), Plan(study, Path("results")))
     jobs = [Job(sheet, wildcards) for sheet in sheets for wildcards in sheet.jobs]
     maker = {file: index for index, job in enumerate(jobs) for file in job.outputs}
     assert set(maker) == set(files_of(sheets))

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.experiment.protocol import Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Phase, TorqueHistory, hold, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
@@ -63,7 +63,7 @@ def unequal_gripper() -> Gripper:
 @pytest.fixture(scope="session")
 def phases() -> tuple[Phase, ...]:
     """The paper's protocol, Figure 3."""
-    return (held(200.0, 1.6e-9), held(200.0, 0.32e-9))
+    return (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))
 
 
 @pytest.fixture(scope="session")

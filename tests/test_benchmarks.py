@@ -14,13 +14,13 @@ import pytest
 import yaml
 
 from benchmarks.batch import in_batch
-from benchmarks.limit import watched, watched_fits, watched_identification
+from benchmarks.limit import watch_writes, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, in_blocks, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
 from benchmarks.sampling_gap import feasible, gap_of, typical_bound
-from benchmarks.scale import watched as watched_processes
+from benchmarks.scale import watch_writes as watched_processes
 from benchmarks.section import Section, number, renewed
-from benchmarks.setup import CONFIG, Problem, evolved, problem
+from benchmarks.setup import CONFIG, Problem, evolve, problem
 from benchmarks.starts import fitted, started
 from benchmarks.study import by_rule, in_order, processor_s
 from benchmarks.timing import Timed, alternate, time_to_success
@@ -63,7 +63,7 @@ def test_radau_solves_the_nonlinear_model(noisy: Problem) -> None:
 
 
 def test_the_watched_misfit_is_the_misfit(noisy: Problem) -> None:
-    misfit, samples = watched(noisy), noisy.population(50)
+    misfit, samples = watch_writes(noisy), noisy.population(50)
     rates, sums_s = misfit.rates, misfit.sums_s
     assert rates > 100
     assert sums_s > 0
@@ -99,7 +99,7 @@ def test_the_watched_fits_are_the_fits(noisy: Problem) -> None:
     np.testing.assert_array_equal(fitted(traces), fitted(started([noisy])))
     assert rows.evaluations > len(traces[0].starts)
     # Two modes and four parameters: products of 5 x 12 with 12 x rows, and of 5 x rows with rows.
-    some_rows = traces[0].posed.residuals.condensed_trace.size
+    some_rows = traces[0].case_problem.residuals.condensed_trace.size
     assert rows.operations == 2 * rows.evaluations * 5 * (12 + 5) * some_rows
     assert rows.spent_s > 0
 
@@ -175,7 +175,7 @@ def test_traces_side_by_side_reach_what_they_reach_alone(noisy: Problem) -> None
     settings = replace(noisy.genetic, population=40, survivors=20, max_generations=8)
     problems = [noisy, problem(1)]
     alone = [
-        evolved(p.misfit(), p.genome, settings, np.random.default_rng(seed))
+        evolve(p.misfit(), p.genome, settings, np.random.default_rng(seed))
         for seed, p in enumerate(problems)
     ]
     assert in_batch(problems, settings) == [answer.misfit_rad for answer in alone]

@@ -12,7 +12,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import within_reach
-from biogrip.design.experiment import Wanted
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.schedule import presses
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
@@ -22,7 +22,7 @@ from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.asked_design import plausible, plausible_ends, wanted_of
+from biogrip.study.design_inputs import make_design_inputs, plausible, plausible_ends
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from tests.helpers.default import study_of
@@ -171,7 +171,7 @@ def test_a_slow_camera_is_asked_for_what_it_can_tell(
     times = case.sampling.over(case.problem.torque.end_s)
     assert len(times) == 2000
     assert np.diff(times).min() > 0.05 * (1 - 1e-9)
-    assert presses(wanted_of(case), case.phases)
+    assert presses(make_design_inputs(case), case.phases)
     lines = re.findall(r"^  (\w+) +(\S+) .*\| (\S+)", said.getvalue(), re.MULTILINE)
     promised = {name: percent for name, _, percent in lines}
     assert promised.pop("c_p") == "none"
@@ -187,7 +187,7 @@ def test_a_slow_camera_is_asked_for_what_it_can_tell(
 def test_steps_are_by_default_as_long_as_ten_readings_of_a_slow_camera() -> None:
     for rate_Hz, unit_s in ((1e5, 0.01), (1e3, 0.01), (100.0, 0.1), (20.0, 0.5)):
         case = study_of(SLOW.replace("fastest_Hz: 20", f"fastest_Hz: {rate_Hz}")).cases["cell"]
-        assert wanted_of(case).limits.shortest_s == pytest.approx(unit_s)
+        assert make_design_inputs(case).limits.shortest_s == pytest.approx(unit_s)
 
 
 def seldom_sampled() -> Case:
@@ -238,7 +238,7 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
 
     Read by the protocol that it was not recorded with, the same file is refused.
     """
-    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
     first = write_trace(seldom_sampled(), tmp_path / "first.csv")
     second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
     over = str(folder[0] / "out.yaml")
@@ -254,7 +254,7 @@ def test_after_a_trace_with_columns_and_units_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same rotations in another file lead to the same design; what was added is allowed for."""
-    monkeypatch.setattr(within_reach, "best_torques", lambda wanted, *_: [one_torque(wanted)])
+    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
     trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
     times, rotation = np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True)
     bounds_after(tmp_path, "--after", str(trace))
@@ -265,16 +265,16 @@ def test_after_a_trace_with_columns_and_units_of_its_own(
         np.savetxt(file, columns, "%.12g", ";", header="t;phi_urad", comments="")
         return str(file)
 
-    told = ["--time", "t", "--time-unit", "ms", "--rotation", "phi_urad"]
-    bounds_after(tmp_path, "--after", odd(rotation), *told)
+    sensitivity = ["--time", "t", "--time-unit", "ms", "--rotation", "phi_urad"]
+    bounds_after(tmp_path, "--after", odd(rotation), *sensitivity)
     assert (tmp_path / "out.yaml").read_bytes() == design_of_plain
     # Of an offset of 30 times the noise, and of a noise that is not the next experiment's.
     drifting = odd(rotation + 1e-4 + 1e-7 * times)
-    assert design(tmp_path, "--after", drifting, *told) == 1
-    bounds_after(tmp_path, "--after", drifting, *told, "--offset", "--drift")
+    assert design(tmp_path, "--after", drifting, *sensitivity) == 1
+    bounds_after(tmp_path, "--after", drifting, *sensitivity, "--offset", "--drift")
     noisy = odd(rotation + 1.2e-5 * np.random.default_rng(1).standard_normal(len(times)))
-    assert design(tmp_path, "--after", noisy, *told) == 1
-    bounds_after(tmp_path, "--after", noisy, *told, "--noise", "1.2e-5")
+    assert design(tmp_path, "--after", noisy, *sensitivity) == 1
+    bounds_after(tmp_path, "--after", noisy, *sensitivity, "--noise", "1.2e-5")
     assert "level_rad: 3.0e-06" in (tmp_path / "out.yaml").read_text()
 
 
@@ -305,9 +305,9 @@ def test_messages_on_traces_name_options_that_there_are(
     assert set(re.findall(r"--[a-z][a-z-]*", error)) <= set(options)
 
 
-def one_torque(wanted: Wanted) -> Torque:
+def one_torque(inputs: DesignInputs) -> Torque:
     """Any torque; a search takes seconds."""
-    return TorqueSearch(wanted, SHAPES["steps"]).torque(
+    return TorqueSearch(inputs, SHAPES["steps"]).torque(
         np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
     )
 
@@ -375,23 +375,23 @@ def test_what_is_asked_is_what_is_wanted() -> None:
     more = "largest_voltage_V: 20.0, quantities: [c_p, k], criterion: A, over: mean"
     text = ASKED.replace("largest_torque_Nm: 8.0e-9", more)
     case = study_of(text).cases["liquid_drop_2"]
-    wanted = wanted_of(case)
-    assert wanted.largest_Nm == pytest.approx(float(torque(case.actuator, 20.0)))
-    assert (wanted.criterion.name, wanted.criterion.over) == ("A", "mean")
-    assert wanted.criterion.asked == (3, 0)
-    assert wanted.stroke_rad == pytest.approx(np.radians(4.5))
+    inputs = make_design_inputs(case)
+    assert inputs.largest_Nm == pytest.approx(float(torque(case.actuator, 20.0)))
+    assert (inputs.criterion.name, inputs.criterion.over) == ("A", "mean")
+    assert inputs.criterion.targets == (3, 0)
+    assert inputs.stroke_rad == pytest.approx(np.radians(4.5))
     # A sample that is touched leaves less of the stroke.
     sized = study_of(f"{text}cases: {{liquid_drop_2: {{sample: {{size_m: 1.0e-4}}}}}}\n")
-    assert wanted_of(sized.cases["liquid_drop_2"]).stroke_rad < 0.9 * wanted.stroke_rad
+    assert make_design_inputs(sized.cases["liquid_drop_2"]).stroke_rad < 0.9 * inputs.stroke_rad
 
 
 def test_plausible_samples_fill_their_ranges() -> None:
     ranges = "{k: [1.0, 100.0], c: [10.0, 20.0]}"
     text = ASKED.replace("tried: 128", f"tried: 128, drawn: 20, ranges: {ranges}")
     case = study_of(text).cases["liquid_drop_2"]
-    asked = case.block.design
-    assert asked is not None
-    drawn = plausible(case, asked)
+    targets = case.block.design
+    assert targets is not None
+    drawn = plausible(case, targets)
     assert drawn.shape == (20, 4)
     np.testing.assert_allclose(drawn[:, 1], 1e-4)
     for column, low, high in ((0, 1.0, 100.0), (2, 10.0, 20.0)):

@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.whiteness import wandering
 from biogrip.identify.answer import silent
-from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
+from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.second_opinion import fall_of, second_opinion
 from biogrip.products.files.traces import Measurements
@@ -40,7 +40,9 @@ def suspected(
 ) -> tuple[Diagnosis, list[str]]:
     """What is said of a trace, and of an offset and a drift in it."""
     rotation = trace(seed, added)
-    study = study_of(Wanted(written(folder / "t.csv", rotation), "liquid_drop", declared, None))
+    study = study_of(
+        IdentifyOptions(written(folder / "t.csv", rotation), "liquid_drop", declared, None)
+    )
     (case,) = study.cases.values()
     problem = case.problem.of(TIMES, rotation)
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
@@ -114,6 +116,6 @@ def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
         "model_selection: {models: [damper]}\nleast_squares: {candidates: 100, starts: 4}\n"
     )
     for declared in (ReadAs(), ReadAs(offset=True, drift=True)):
-        wanted = Wanted(file, "liquid_drop", declared, few)
+        wanted = IdentifyOptions(file, "liquid_drop", declared, few)
         notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]
         assert any("--offset --drift" in note for note in notes) == (not declared.drift)

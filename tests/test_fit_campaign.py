@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.experiment.sample import CANDIDATES
-from biogrip.library import held, set_up, simulate
+from biogrip.library import hold, set_up, simulate
 from tests.helpers.fit_campaign import (
     ACCURACY,
     ACCURACY_OF_POWER_LAWS,
@@ -36,7 +36,7 @@ def test_rotations_are_those_of_the_library(model: str, interval_s: float) -> No
     samples = plausible(model, 8, interval_s, interval_s * SAMPLES, rng)
     found = StepResponses(interval_s, SAMPLES, STEPS, inertia=True)(model, samples)[0]
     lengths = interval_s * np.diff([*(start for start, _ in STEPS), SAMPLES - 1])
-    phases = tuple(map(held, lengths.tolist(), np.cumsum([jump for _, jump in STEPS]).tolist()))
+    phases = tuple(map(hold, lengths.tolist(), np.cumsum([jump for _, jump in STEPS]).tolist()))
     experiment = set_up(GRIPPER, phases, CANDIDATES[model])
     time_s = interval_s * np.arange(float(SAMPLES))
     for parameters, rotation in zip(samples.tolist(), found, strict=True):

@@ -32,7 +32,7 @@ def test_what_the_documentation_shows_runs(
 def test_what_is_simulated_by_the_nonlinear_model_is_not_what_the_linear_one_gives() -> None:
     """Against Radau without inertia; at ten times the paper's torque a cell shows 3e-4 of it."""
     gripper = library.Gripper(1.5e-3, 60.0, ARM, ARM)
-    protocol = (library.held(200.0, 1.6e-8), library.held(200.0, 3.2e-9))
+    protocol = (library.hold(200.0, 1.6e-8), library.hold(200.0, 3.2e-9))
     sample = {"k": 35.0, "k_p": 12.3, "c": 299.9, "c_p": 1e-3}
     linear, nonlinear = (
         library.simulate(

@@ -20,8 +20,8 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.own_traces.many_traces import Told, write_table
-from biogrip.own_traces.one_trace import Wanted, identify_trace
+from biogrip.own_traces.many_traces import Outcome, write_table
+from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import side_by_side
@@ -370,7 +370,7 @@ def test_a_path_that_no_system_allows_is_one_message(
 
 def test_what_is_said_has_all_digits_and_what_is_written_five(tmp_path: Path, few: str) -> None:
     output = tmp_path / "found.json"
-    said = identify_trace(Wanted(EXAMPLE, "maxwell", ReadAs(), Path(few)), output).data
+    said = identify_trace(IdentifyOptions(EXAMPLE, "maxwell", ReadAs(), Path(few)), output).data
     written = json.loads(output.read_text())
     for one, other in [
         (said, written),
@@ -388,7 +388,7 @@ def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
     quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
     quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
     rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
-    write_table(Told([{**found, **rest}], {}), table)
+    write_table(Outcome([{**found, **rest}], {}), table)
     check_output(table, force=False)
     table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
     with pytest.raises(BiogripError, match="biogrip did not write it"):

@@ -39,8 +39,8 @@ except BaseException:
     pass
 """,
     "a file being written": """
-from biogrip.files import written_whole
-with written_whole(Path("table.csv")) as scratch:
+from biogrip.files import atomic_write
+with atomic_write(Path("table.csv")) as scratch:
     scratch.write_text("a,b")
     stop()
 """,

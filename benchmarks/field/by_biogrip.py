@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.field.elements import Maxwell
 from benchmarks.field.fitted import Fitted, Limits, Method
 from benchmarks.field.traces import Trace
-from biogrip.identifiability.likelihood import likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.library import Identification, identify_sample
 
@@ -30,11 +30,11 @@ def fit(trace: Trace) -> Fitted:
 def _limits(trace: Trace, found: Identification) -> Limits:
     model, branches = trace.experiment.searched, trace.experiment.model.branches
     problem = trace.experiment.of(trace.recorded_s, trace.rotation_rad)
-    likelihood = likelihood_of(
+    likelihood = make_likelihood(
         problem, np.log(found.parameters), found.misfit_rad, confidence=CONFIDENCE
     )
     quantities = [q for q in parameters_and_sum(model) if q.label in model.names]
-    low, high = limits_and_deeper([likelihood], quantities)[0][0].T
+    low, high = find_limits([likelihood], quantities)[0][0].T
     ends = np.nan_to_num(np.exp(low), nan=-np.inf), np.nan_to_num(np.exp(high), nan=np.inf)
     limits = {q.label: (float(a), float(b)) for q, a, b in zip(quantities, *ends, strict=True)}
     value = dict(zip(model.names, found.parameters, strict=True))

@@ -35,7 +35,7 @@ def fit(trace: Trace, *, times_given: bool = False, guess: bool = False) -> Fitt
     if guess:
         last = start.instant + start.share.sum()
         how["iguess"] = [last, 0.0, *start.share, *start.time]
-    posed = model.Model(
+    case_problem = model.Model(
         const.Experiment(etype="Tensile", sigma=1.0),
         const.DataParameters(),
         const.PlotParameters(xlabel="t [s]", ylabel="J [m/N]"),
@@ -44,14 +44,14 @@ def fit(trace: Trace, *, times_given: bool = False, guess: bool = False) -> Fitt
         **how,
     )
     data = np.array([trace.time_s, trace.compliance])
-    values, covariance = posed.fit_function_to_data(data, trace.time_s[0], trace.time_s[-1])
+    values, covariance = case_problem.fit_function_to_data(data, trace.time_s[0], trace.time_s[-1])
     shares = values[2 : 2 + trace.branches]
     times = start.time if times_given else values[2 + trace.branches :]
     found = Kelvin(float(values[0] - shares.sum()), shares, times)
     deviations = np.sqrt(np.diag(covariance))
     return Fitted(
         found.maxwell(),
-        posed.func(trace.time_s, *values),
+        case_problem.func(trace.time_s, *values),
         lambda: _limits(values, deviations, times, times_given=times_given),
     )
 

@@ -26,7 +26,7 @@ from biogrip.library import (
     Noise,
     Sample,
     add_noise,
-    held,
+    hold,
     set_up,
     simulate,
 )
@@ -43,7 +43,7 @@ NOISE = Noise("gaussian", 0.01, "peak")
 
 _ARM = Arm(inertia_kgm2=1e-20, damping_Nms_per_rad=1e-12, stiffness_Nm_per_rad=1e-12)
 GRIPPER = Gripper(arm_length_m=1.5e-3, reference_angle_deg=75.0, left=_ARM, right=_ARM)
-PROTOCOL = (held(DURATION_S, TORQUE_NM),)
+PROTOCOL = (hold(DURATION_S, TORQUE_NM),)
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ __version__ = "0.1.0"
 _LIBRARY = frozenset(
     (
         *("Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper", "Identification", "Noise"),
-        *("Phase", "Sample", "add_noise", "held", "identify_sample", "judge", "plot", "set_up"),
+        *("Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot", "set_up"),
         "simulate",
     )
 )

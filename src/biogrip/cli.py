@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from biogrip import __version__
 from biogrip.errors import BiogripError
-from biogrip.files import watched
+from biogrip.files import watch_writes
 from biogrip.terminal import visible, visible_lines
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         # Protect only files inside a study's results.
-        with watched(_refuse_others) if options.recorded else nullcontext():
+        with watch_writes(_refuse_others) if options.recorded else nullcontext():
             options.command(options)
             sys.stdout.flush()
     except BiogripError as error:
@@ -263,7 +263,7 @@ def _identify(options: argparse.Namespace) -> None:
 
 
 def _groups(options: argparse.Namespace) -> None:
-    from biogrip.own_traces.many_cells import groups
+    from biogrip.own_traces.groups_of_cells import groups
 
     options.status = groups(
         options.table,

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 _DIGITS = 5
 _MOST_DIGITS = 9
 # Fits are converged to 0.001 in chi^2; smaller digits may differ between processors.
-_RISE_DECIMALS = 2
+_INCREASE_DECIMALS = 2
 
 # Parsed by Python: powers computed by different processors may differ.
 _LARGEST = 300
@@ -40,9 +40,9 @@ def rounded_numbers(data: Any) -> Any:
     return rounded(data) if isinstance(data, float) else data
 
 
-def rounded_rise(rise: float) -> float:
+def round_increase(increase: float) -> float:
     """Round an increase of chi^2 to five digits, and to the tolerance of fits."""
-    return float(f"{round(rise, _RISE_DECIMALS):.{_DIGITS}g}") + 0.0
+    return float(f"{round(increase, _INCREASE_DECIMALS):.{_DIGITS}g}") + 0.0
 
 
 def significant(values: Array, digits: int) -> Array:

@@ -19,7 +19,7 @@ _watches: list[tuple[Watch, Begin | None]] = []
 
 
 @contextmanager
-def watched(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
+def watch_writes(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
     """Call `watch` for every file written atomically within a context, and `begin` before."""
     both = watch, begin
     _watches.append(both)
@@ -30,7 +30,7 @@ def watched(watch: Watch, begin: Begin | None = None) -> Iterator[None]:
 
 
 @contextmanager
-def written_whole(path: Path) -> Iterator[Path]:
+def atomic_write(path: Path) -> Iterator[Path]:
     """Yield a scratch path beside `path`, and move it into place if no error occurs.
 
     Raises
@@ -38,7 +38,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     BiogripError
         If the file cannot be written.
     """
-    scratch = scratch_of(path)
+    scratch = scratch_path(path)
     unfinished.add(str(scratch))
     try:
         for _, begin in _watches:
@@ -60,14 +60,14 @@ def written_whole(path: Path) -> Iterator[Path]:
         unfinished.discard(str(scratch))
 
 
-def scratch_of(path: Path) -> Path:
+def scratch_path(path: Path) -> Path:
     """Return the scratch path of a file, unique to this process."""
     return path.with_name(f".{path.name}.{os.getpid()}.part")
 
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file atomically."""
-    with written_whole(path) as scratch:
+    with atomic_write(path) as scratch:
         scratch.write_text(text, encoding="utf-8", newline="\n")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import Phase, held
+from biogrip.experiment.protocol import Phase, hold
 from biogrip.experiment.sample import Sample
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identify.answer import Identification, silent
@@ -163,7 +163,7 @@ __all__ = [
     "Phase",
     "Sample",
     "add_noise",
-    "held",
+    "hold",
     "identify_sample",
     "judge",
     "plot",

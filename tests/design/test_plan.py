@@ -8,11 +8,11 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
-from biogrip.design.experiment import Wanted, relative_bounds
+from biogrip.design.experiment import DesignInputs, relative_bounds
 from biogrip.design.schedule import Plan, planned
 from biogrip.design.search import Torque, TorqueSearch, best_torques
 from biogrip.design.shapes import SHAPES
-from biogrip.design.waveform import Limits, held
+from biogrip.design.waveform import Limits, hold
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import largest_torque
 from biogrip.experiment.sample import MODELS
@@ -24,7 +24,7 @@ from biogrip.response.linear import rotation, step_response
 ARM = Arm(1.0e-14, 3.3e-12, 4.4e-7)
 GRIPPER = Gripper(1.5e-3, 75.0, ARM, ARM)
 MODEL = MODELS["generalized_maxwell"]
-DROP = Wanted(
+DROP = DesignInputs(
     gripper=GRIPPER,
     model=MODEL,
     parameters=np.array([[9.5, 1e-4, 10.0, 1e-4]]),
@@ -44,8 +44,8 @@ DROP = Wanted(
 def _plan(tried: int = 128, shape: str = "steps") -> Plan:
     # Ramps of 0.1 ms: of 10 ms they show nothing of what is over after 0.1 ms.
     limits = replace(DROP.limits, shortest_s=0.01 if shape == "steps" else 1e-4)
-    wanted = replace(DROP, shapes=(shape,), limits=limits)
-    return planned(wanted, best_torques(wanted, tried, np.random.default_rng(1), silent))
+    inputs = replace(DROP, shapes=(shape,), limits=limits)
+    return planned(inputs, best_torques(inputs, tried, np.random.default_rng(1), silent))
 
 
 def _rotation(plan: Plan, sample: Array) -> Array:
@@ -97,10 +97,10 @@ def test_contact_is_kept(shape: str) -> None:
 
 
 def test_stroke_limits_the_torque() -> None:
-    wanted = replace(DROP, stroke_rad=1e-3)
-    search = TorqueSearch(wanted, SHAPES["steps"])
+    inputs = replace(DROP, stroke_rad=1e-3)
+    search = TorqueSearch(inputs, SHAPES["steps"])
     torque = search.torque(np.full(9, 0.5))
-    plan = planned(replace(wanted, samples=50), [torque])
+    plan = planned(replace(inputs, samples=50), [torque])
     turned = np.abs(_rotation(plan, DROP.parameters[0])).max()
     assert turned <= 1e-3 * 1.001
     assert torque.largest_Nm < 1e-9
@@ -123,17 +123,17 @@ def test_sinusoids_repeat_themselves() -> None:
 
 def test_of_several_shapes_the_best_is_taken() -> None:
     """For a drop, sinusoids."""
-    wanted = replace(DROP, shapes=("steps", "sinusoids"))
-    plan = planned(wanted, best_torques(wanted, 256, np.random.default_rng(1), silent))
+    inputs = replace(DROP, shapes=("steps", "sinusoids"))
+    plan = planned(inputs, best_torques(inputs, 256, np.random.default_rng(1), silent))
     assert any(phase.left.harmonics for phase in plan.phases)
     assert relative_bounds(plan.information).max() < relative_bounds(_plan().information).max()
 
 
 def test_what_is_known_already_is_not_asked_again() -> None:
     """With k, k_p and c known far better, every reading in which c_p shows is made."""
-    steps = Torque(held(np.array([1.0, 1.0]), np.array([0.5, 1.0])), 8e-9)
-    wanted = replace(DROP, before=np.diag([1e12, 1e12, 1e12, 0.0]))
-    plan = planned(wanted, [steps])
+    steps = Torque(hold(np.array([1.0, 1.0]), np.array([0.5, 1.0])), 8e-9)
+    inputs = replace(DROP, before=np.diag([1e12, 1e12, 1e12, 0.0]))
+    plan = planned(inputs, [steps])
     after = plan.time_s - plan.torque.time_s[plan.torque.time_s.searchsorted(plan.time_s) - 1]
     # The drop's ring decays with 2.1e4/s; twenty slots after each of two steps.
     assert np.sum(after < 2.05e-4) == 40
@@ -144,12 +144,12 @@ def test_what_is_known_already_is_not_asked_again() -> None:
 
 def test_where_jaws_would_pull_it_says_so() -> None:
     """The paper's protocol on a drop: let go to a fifth, which a viscous drop resists."""
-    steps = held(np.array([200.0, 200.0]), np.array([1.0, 0.2]))
+    steps = hold(np.array([200.0, 200.0]), np.array([1.0, 0.2]))
     with pytest.raises(BiogripError, match="have to pull"):
         planned(DROP, [Torque(steps, 1.6e-9)])
 
 
 def test_a_whole_search_beats_the_best_single_step() -> None:
-    single = Torque(held(np.array([400.0]), np.ones(1)), 8e-9)
+    single = Torque(hold(np.array([400.0]), np.ones(1)), 8e-9)
     best = relative_bounds(_plan(512).information).max()
     assert best < relative_bounds(planned(DROP, [single]).information).max()

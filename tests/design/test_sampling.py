@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from biogrip.arrays import Array
 from biogrip.design.criteria import CRITERIA, OVER, Criterion, inverted
-from biogrip.design.few_cells import in_few_cells
+from biogrip.design.few_bins import in_few_bins
 from biogrip.design.sampling import Optimum, best_sampling
 
 GAP = 1e-3
@@ -19,9 +19,9 @@ def _quadratic(points: int = 201) -> Array:
     return np.stack((np.ones_like(x), x, x**2))[None]
 
 
-def _free(told: Array, criterion: Criterion) -> Optimum:
-    room = np.full(told.shape[2], 1.0)
-    return best_sampling(told, room, 1, criterion, gap=GAP, most=200)
+def _free(sensitivity: Array, criterion: Criterion) -> Optimum:
+    room = np.full(sensitivity.shape[2], 1.0)
+    return best_sampling(sensitivity, room, 1, criterion, gap=GAP, most=200)
 
 
 @pytest.mark.parametrize(
@@ -50,8 +50,8 @@ def _random(seed: int, samples: int) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     time = np.linspace(0.05, 4, 40)
     rates = rng.uniform(0.3, 3.0, (samples, 3, 1))
-    told = np.exp(-rates * time) * rng.uniform(0.5, 2.0, (samples, 3, 1)) * 10
-    return told, rng.integers(1, 8, 40).astype(float)
+    sensitivity = np.exp(-rates * time) * rng.uniform(0.5, 2.0, (samples, 3, 1)) * 10
+    return sensitivity, rng.integers(1, 8, 40).astype(float)
 
 
 def test_samples_weigh_by_a_power_of_the_root_of_their_determinant() -> None:
@@ -66,15 +66,15 @@ def test_samples_weigh_by_a_power_of_the_root_of_their_determinant() -> None:
 @pytest.mark.parametrize("name", CRITERIA)
 def test_nothing_else_is_better_than_the_gap_says(name: str, over: str) -> None:
     """Full cells, several samples: against another solver from where we stand, and at random."""
-    told, capacity = _random(1, 3)
+    sensitivity, capacity = _random(1, 3)
     criterion = Criterion(name, over, (0, 2))
-    found = best_sampling(told, capacity, 60, criterion, gap=5e-3, most=300)
+    found = best_sampling(sensitivity, capacity, 60, criterion, gap=5e-3, most=300)
     assert found.gap < 5e-3
     assert found.samples.sum() == pytest.approx(60)
     assert np.all((found.samples >= 0) & (found.samples <= capacity * (1 + 1e-12)))
 
     def bound(samples: Array) -> float:
-        covariances = inverted((told * samples) @ told.swapaxes(1, 2))
+        covariances = inverted((sensitivity * samples) @ sensitivity.swapaxes(1, 2))
         return criterion.typical_bound(covariances[:, [[0], [2]], [0, 2]])
 
     ours = bound(found.samples)
@@ -99,40 +99,44 @@ def test_nothing_else_is_better_than_the_gap_says(name: str, over: str) -> None:
 
 def test_information_from_before_counts() -> None:
     """What is there already is as good as readings that had to be made."""
-    told, capacity = _random(5, 1)
+    sensitivity, capacity = _random(5, 1)
     there = np.where(np.arange(40) < 10, capacity, 0.0)
-    before = ((told * there) @ told.swapaxes(1, 2))[0]
+    before = ((sensitivity * there) @ sensitivity.swapaxes(1, 2))[0]
     criterion = Criterion("A", "worst", ALL)
-    found = best_sampling(told, capacity, 30, criterion, gap=1e-3, most=300, before=before)
+    found = best_sampling(sensitivity, capacity, 30, criterion, gap=1e-3, most=300, before=before)
     assert found.gap < 1e-3
-    whole = inverted((told * (found.samples + there)) @ told.swapaxes(1, 2))
+    whole = inverted((sensitivity * (found.samples + there)) @ sensitivity.swapaxes(1, 2))
     # Inverses lose what their condition number is, 1e10 here.
     np.testing.assert_allclose(found.covariances, whole, rtol=1e-5)
     rng = np.random.default_rng(6)
     for _ in range(200):
         tried = capacity * rng.random(40) ** rng.uniform(0.2, 5)
         tried *= min(30 / tried.sum(), (capacity / np.maximum(tried, 1e-300)).min())
-        other = inverted((told * (tried + there)) @ told.swapaxes(1, 2))
+        other = inverted((sensitivity * (tried + there)) @ sensitivity.swapaxes(1, 2))
         assert criterion.typical_bound(whole) <= criterion.typical_bound(other) * (1 + found.gap)
 
 
 def test_with_less_room_than_samples_all_cells_are_full() -> None:
-    told, capacity = _random(3, 1)
-    found = best_sampling(told, capacity, 10_000, Criterion("D", "worst", ALL), gap=GAP, most=5)
+    sensitivity, capacity = _random(3, 1)
+    found = best_sampling(
+        sensitivity, capacity, 10_000, Criterion("D", "worst", ALL), gap=GAP, most=5
+    )
     np.testing.assert_array_equal(found.samples, capacity)
     assert found.gap == pytest.approx(0.0, abs=1e-9)
 
 
 def test_in_few_cells_as_much_is_told() -> None:
     """Of Caratheodory's corner no more than 6 + 1 cells are filled in part, a sample."""
-    told, capacity = _random(4, 2)
+    sensitivity, capacity = _random(4, 2)
     criterion = Criterion("D", "mean", ALL)
-    found = best_sampling(told, capacity, 60, criterion, gap=GAP, most=200)
-    few = in_few_cells(told, found.samples, capacity, np.linspace(0, 1, 40))
+    found = best_sampling(sensitivity, capacity, 60, criterion, gap=GAP, most=200)
+    few = in_few_bins(sensitivity, found.samples, capacity, np.linspace(0, 1, 40))
     partly = (few > 1e-6) & (few < capacity - 1e-6)
     assert np.count_nonzero(partly) <= 2 * 6 + 1
     assert few.sum() == pytest.approx(60)
-    before, after = ((told * one) @ told.swapaxes(1, 2) for one in (found.samples, few))
+    before, after = (
+        (sensitivity * one) @ sensitivity.swapaxes(1, 2) for one in (found.samples, few)
+    )
     for one, other in zip(before, after, strict=True):
         shares = np.linalg.eigvals(np.linalg.solve(one, other)).real
         # Each entry of the whitened information by 1e-3: three of them in a row.
@@ -141,15 +145,19 @@ def test_in_few_cells_as_much_is_told() -> None:
 
 def test_in_few_cells_what_no_reading_tells_apart_is_left_alone() -> None:
     """A parameter that only goes with another, and one that never shows."""
-    told, capacity = _random(4, 2)
-    apart = np.concatenate((told, 1e-3 * told[:, :1], np.zeros_like(told[:, :1])), axis=1)
-    found = best_sampling(told, capacity, 60, Criterion("D", "mean", ALL), gap=GAP, most=200)
+    sensitivity, capacity = _random(4, 2)
+    apart = np.concatenate(
+        (sensitivity, 1e-3 * sensitivity[:, :1], np.zeros_like(sensitivity[:, :1])), axis=1
+    )
+    found = best_sampling(sensitivity, capacity, 60, Criterion("D", "mean", ALL), gap=GAP, most=200)
     cost = np.linspace(0, 1, 40)
-    few = in_few_cells(apart, found.samples, capacity, cost)
+    few = in_few_bins(apart, found.samples, capacity, cost)
     assert few.sum() == pytest.approx(60)
     partly = (few > 1e-6) & (few < capacity - 1e-6)
     assert np.count_nonzero(partly) <= 2 * 6 + 1
-    before, after = ((told * one) @ told.swapaxes(1, 2) for one in (found.samples, few))
+    before, after = (
+        (sensitivity * one) @ sensitivity.swapaxes(1, 2) for one in (found.samples, few)
+    )
     for one, other in zip(before, after, strict=True):
         shares = np.linalg.eigvals(np.linalg.solve(one, other)).real
         np.testing.assert_allclose(shares, 1.0, atol=4e-3)

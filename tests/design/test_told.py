@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.design.told import Earlier, information_at, told_by
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.design.earlier_traces import Earlier, estimate_from_traces, information_at
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.groups.replicates import joint_problem
 from biogrip.identify.answer import Identification
@@ -22,14 +22,14 @@ CASE = STUDY.cases["endothelial_cell"]
 MODEL = MODELS["generalized_maxwell"]
 NOISE_RAD = 3e-6
 TRUTH = np.log([35.0, 12.3, 299.9, 1e-2])
-STEPS = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
-PULSES = torque_history((held(0.2, 1.6e-9), held(0.2, 0.8e-9)))
+STEPS = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
+PULSES = torque_history((hold(0.2, 1.6e-9), hold(0.2, 0.8e-9)))
 SLOW = np.arange(1, 800) / 2
 FAST = np.concatenate((np.arange(1, 60) * 1e-5, 0.2 + np.arange(1, 60) * 1e-5))
 
 
 @cache
-def posed(name: str) -> Problem:
+def case_problem(name: str) -> Problem:
     """A trace of the paper's protocol, seldom sampled, or one of pulses, in bursts."""
     torque, times = (STEPS, SLOW) if name == "slow" else (PULSES, FAST)
     network = MODEL.network(np.exp(TRUTH)[None])
@@ -45,10 +45,10 @@ def from_truth(problem: Problem) -> Identification:
     return identify_from(problem, TRUTH)
 
 
-def told(problem: Problem, drawn: int, before: Earlier | None = None) -> Earlier:
+def sensitivity(problem: Problem, drawn: int, before: Earlier | None = None) -> Earlier:
     ends = problem.low, problem.high
     rng = np.random.default_rng(3)
-    return told_by(problem, NOISE_RAD, from_truth, ends, drawn, rng, before)
+    return estimate_from_traces(problem, NOISE_RAD, from_truth, ends, drawn, rng, before)
 
 
 def differenced(name: str, x: Array) -> Array:
@@ -67,7 +67,7 @@ def differenced(name: str, x: Array) -> Array:
 def test_information_of_two_experiments_is_the_sum_of_both() -> None:
     """At the same parameters, which are not the truth; central differences err by 1e-8 of it."""
     x = TRUTH + np.array([0.1, -0.1, 0.2, 0.5])
-    both = joint_problem([posed("slow"), posed("fast")], 2 * [NOISE_RAD])
+    both = joint_problem([case_problem("slow"), case_problem("fast")], 2 * [NOISE_RAD])
     found = information_at(both, NOISE_RAD, x[None])[0]
     parts = [differenced(name, x) for name in ("slow", "fast")]
     size = np.sqrt(np.outer(*2 * [np.diag(found)]))
@@ -79,8 +79,8 @@ def test_information_of_two_experiments_is_the_sum_of_both() -> None:
 
 def test_what_a_trace_tells_badly_is_anywhere_where_it_still_fits() -> None:
     """c_p need only be small: draws lie over decades of it, and none is excluded by the trace."""
-    problem = posed("slow")
-    found = told(problem, 60)
+    problem = case_problem("slow")
+    found = sensitivity(problem, 60)
     logs = np.log(found.parameters)
     assert len(logs) > 20
     c_p = logs[:, MODEL.names.index("c_p")]
@@ -95,9 +95,9 @@ def test_what_a_trace_tells_badly_is_anywhere_where_it_still_fits() -> None:
 
 
 def test_the_next_experiment_determines_what_the_first_does_not() -> None:
-    first = told(posed("slow"), 8)
-    both = joint_problem([posed("slow"), posed("fast")], 2 * [NOISE_RAD])
-    second = told(both, 8, first)
+    first = sensitivity(case_problem("slow"), 8)
+    both = joint_problem([case_problem("slow"), case_problem("fast")], 2 * [NOISE_RAD])
+    second = sensitivity(both, 8, first)
     index = MODEL.names.index("c_p")
     before, after = (np.ptp(np.log(each.parameters[:, index])) for each in (first, second))
     assert before > np.log(100)
@@ -107,13 +107,13 @@ def test_the_next_experiment_determines_what_the_first_does_not() -> None:
 
 def test_a_fit_starts_from_what_was_told_before() -> None:
     """An identifier that is lost alone is brought back by samples that were plausible before."""
-    problem = joint_problem([posed("slow"), posed("fast")], 2 * [NOISE_RAD])
-    right = told(problem, 4)
+    problem = joint_problem([case_problem("slow"), case_problem("fast")], 2 * [NOISE_RAD])
+    right = sensitivity(problem, 4)
     lost = identify_from(problem, np.array([problem.low[0], *TRUTH[1:3], problem.high[3]]))
     assert lost.misfit_rad > 1.05 * right.misfit_rad
     ends = problem.low, problem.high
     rng = np.random.default_rng(0)
-    alone = told_by(problem, NOISE_RAD, lambda _: lost, ends, 2, rng)
-    helped = told_by(problem, NOISE_RAD, lambda _: lost, ends, 2, rng, right)
+    alone = estimate_from_traces(problem, NOISE_RAD, lambda _: lost, ends, 2, rng)
+    helped = estimate_from_traces(problem, NOISE_RAD, lambda _: lost, ends, 2, rng, right)
     assert alone.misfit_rad == lost.misfit_rad
     assert helped.misfit_rad == pytest.approx(right.misfit_rad, rel=1e-6)

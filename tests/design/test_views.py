@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from biogrip.design.cells import cells, swinging_cells
 from biogrip.design.experiment import relative_bounds
 from biogrip.design.shapes import SHAPES
 from biogrip.design.steps import steps
+from biogrip.design.time_bins import periodic_time_bins, time_bins
 from biogrip.design.views import Views
-from biogrip.design.waveform import Limits, Waveform, held, linear, swinging
+from biogrip.design.waveform import Limits, Waveform, hold, linear, swinging
 from biogrip.experiment.protocol import Phase, load, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
@@ -20,7 +20,7 @@ SAMPLES = np.array([[35.0, 12.3, 299.9, 1e-3], [9.5, 1e-4, 10.0, 1e-4]])
 DURATIONS = np.array([0.5, 0.02, 1.0, 30.0])
 LEVELS = np.array([0.7, 0.2, 1.0, 0.4])
 WAVEFORMS = {
-    "steps": held(DURATIONS, LEVELS),
+    "steps": hold(DURATIONS, LEVELS),
     "ramps": linear(DURATIONS, LEVELS, np.array([0.7, 0.9, 0.3, 0.0])),
     "sinusoids": swinging(
         DURATIONS, LEVELS, np.array([0.2, 0.1, 0.0, 0.4]), np.array([1.2e-4, 3e-3, 1.0, 70.0])
@@ -43,8 +43,8 @@ def test_against_responses(request: pytest.FixtureRequest, arms: str, name: str)
     waveform = WAVEFORMS[name]
     elapsed = np.geomspace(1e-6, 0.015, 30)
     moving = Views(gripper, MODEL, SAMPLES, elapsed).under(waveform)
-    view = moving.seen(np.arange(4))
-    own = moving.seen(np.array([2]), elapsed[::3])
+    view = moving.respond(np.arange(4))
+    own = moving.respond(np.array([2]), elapsed[::3])
     np.testing.assert_allclose(own.force[:, 0], view.force[:, 2, ::3], rtol=1e-12)
     torque = torque_history(phases_of(waveform))
     for k, start in enumerate(torque.time_s):
@@ -132,11 +132,11 @@ def test_triangles_as_they_are_meant() -> None:
 def test_a_short_ramp_is_a_step_and_a_small_sinusoid_a_hold(gripper: Gripper) -> None:
     elapsed = np.geomspace(1e-4, 0.4, 20)
     views = Views(gripper, MODEL, SAMPLES, elapsed)
-    step = views.under(held(np.array([1.0, 1.0]), np.array([0.0, 1.0]))).seen(np.array([1]))
+    step = views.under(hold(np.array([1.0, 1.0]), np.array([0.0, 1.0]))).respond(np.array([1]))
     ramped = linear(np.array([1.0, 1e-9, 1.0]), np.array([0.0, 0, 1.0]), np.array([0.0, 1.0, 1.0]))
     swung = swinging(np.ones(2), np.array([0.0, 1.0]), np.array([0.0, 1e-9]), np.full(2, 1e-3))
     for waveform in (ramped, swung):
-        other = views.under(waveform).seen(np.array([len(waveform.levels) - 1]))
+        other = views.under(waveform).respond(np.array([len(waveform.levels) - 1]))
         for name in ("sensitivity", "rotation", "force"):
             one, same = getattr(step, name), getattr(other, name)
             # A nanosecond of the ring, 1e5/s, and 1e-9 of the torque near resonance.
@@ -156,7 +156,7 @@ def test_a_train_as_it_is_meant() -> None:
 
 @pytest.mark.parametrize("slots", [2, 10, 24, 25, 26, 1000, 10**7])
 def test_cells_have_every_slot_once(slots: int) -> None:
-    found = cells(slots, 1.3)
+    found = time_bins(slots, 1.3)
     assert found.first[0] == 1
     np.testing.assert_array_equal(found.first[1:], (found.first + found.slots)[:-1])
     assert found.first[-1] + found.slots[-1] == slots
@@ -166,7 +166,7 @@ def test_cells_have_every_slot_once(slots: int) -> None:
 @pytest.mark.parametrize("period", [8, 14, 100, 3000, 10**6])
 @pytest.mark.parametrize("slots", [2, 1000, 12_345])
 def test_cells_of_a_sinusoid_have_every_slot_once(slots: int, period: int) -> None:
-    found = swinging_cells(slots, period, 12, 1.5)
+    found = periodic_time_bins(slots, period, 12, 1.5)
     columns = (column.tolist() for column in (found.first, found.slots, found.repeats))
     every = [
         first + period * turn + slot

@@ -5,12 +5,12 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.nesting import as_richer, contained, different_in
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 
-TORQUE = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+TORQUE = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
 TIME_S = np.linspace(0.0, 400.0, 801)
 DECADES = {"stiffness": (0, 2), "damping": (0, 3), "springpot": (0, 2), "exponent": (-0.6, -0.2)}
 TRIED = [name for name in CANDIDATES if name[-1] not in "5678"]

@@ -6,19 +6,25 @@ from scipy.signal import lfilter, periodogram
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import KINDS, Noise, add_noise, rms
-from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing, remembering
+from biogrip.experiment.noise_parts import (
+    Drift,
+    Flicker,
+    Outliers,
+    Relaxing,
+    draw_ornstein_uhlenbeck,
+)
 
 CLEAN = np.concatenate((np.zeros(100_000), np.full(100_000, 2.0)))
 
 
-def noise_of(kind: str, reference: str) -> np.ndarray:
+def estimate_noise(kind: str, reference: str) -> np.ndarray:
     rng = np.random.default_rng(0)
     return add_noise(CLEAN, Noise(kind, 0.1, reference), rng) - CLEAN
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_level_is_the_standard_deviation_over_the_peak(kind: str) -> None:
-    noise = noise_of(kind, "peak")
+    noise = estimate_noise(kind, "peak")
     # 2e5 samples: the standard deviation is known to 0.2 %, three times that is allowed.
     assert rms(noise) == pytest.approx(0.2, rel=6e-3)
     assert rms(noise[:100_000]) == pytest.approx(rms(noise[100_000:]), rel=2e-2)
@@ -27,14 +33,14 @@ def test_level_is_the_standard_deviation_over_the_peak(kind: str) -> None:
 
 
 def test_proportional_noise_vanishes_with_the_signal() -> None:
-    noise = noise_of("gaussian", "signal")
+    noise = estimate_noise("gaussian", "signal")
     assert np.all(noise[:100_000] == 0)
     assert rms(noise[100_000:]) == pytest.approx(0.2, rel=1e-2)
 
 
 def test_uniform_noise_is_bounded() -> None:
     bound = 0.2 * np.sqrt(3)
-    noise = noise_of("uniform", "peak")
+    noise = estimate_noise("uniform", "peak")
     assert 0.999 * bound < np.abs(noise).max() <= bound * (1 + 1e-12)
 
 
@@ -75,7 +81,7 @@ def test_a_part_that_remembers_is_an_autoregressive_process() -> None:
     coefficient = np.exp(-0.1 / 2.0)
     draws[1:] *= np.sqrt(1 - coefficient**2)
     expected = lfilter([1.0], [1.0, -coefficient], draws)
-    found = remembering(TIMES, np.array([1.0]), np.array([0.5]), rng)
+    found = draw_ornstein_uhlenbeck(TIMES, np.array([1.0]), np.array([0.5]), rng)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     times = np.array([0.0, 0.3, 0.4, 2.0, 7.0])
     seen = noises(20_000, times, relaxing=Relaxing(1.0, 2.0))

@@ -1,8 +1,8 @@
 import numpy as np
 
-from biogrip.experiment.protocol import held, sample_times, torque_at, torque_history
+from biogrip.experiment.protocol import hold, sample_times, torque_at, torque_history
 
-PAPER = (held(200.0, 1.6e-9), held(200.0, 0.32e-9))
+PAPER = (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))
 
 
 def test_steps_add_up_to_the_torque() -> None:

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from biogrip.experiment.maxwell_models import generalized_maxwell, liquid_drop
-from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import MODELS, Network, model_named, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, sample_polynomials, step_response
@@ -66,7 +66,7 @@ def test_maxwell_liquid_flows_at_the_rate_of_its_damper(gripper: Gripper) -> Non
     """k_p, c_p to 0 and soft arms: phi = tau/u (1/k + t/c)."""
     soft = replace(gripper.left, stiffness_Nm_per_rad=1e-16)
     free = Gripper(gripper.arm_length_m, gripper.reference_angle_deg, soft, soft)
-    constant = torque_history((held(400.0, 1.6e-9),))
+    constant = torque_history((hold(400.0, 1.6e-9),))
     ours = response_of(free, constant, liquid_drop([2.0, 0.0, 50.0]))
     expected = 1.6e-9 / (2 * free.lever_m**2) * (1 / 2.0 + TIMES / 50.0)
     # The arm's damper delays the start by c_g / (u k) = 4e-7 s.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from biogrip.groups.dishes import (
+from biogrip.groups.group_findings import (
     GroupFinding,
     JudgedCell,
     differences_of_groups,
@@ -101,7 +101,7 @@ def test_the_ratio_that_is_seen_has_the_usual_power(findings: list[GroupFinding]
     found = differences_of_groups(findings)[1]
     spreads = [each.population.spread for each in (findings[0], findings[4]) if each.population]
     spread = float(np.sqrt(np.mean(np.square(spreads))))
-    assert power(found.ratio_seen, 4, spread, 0.1) == pytest.approx(0.8, abs=1e-6)
+    assert power(found.detectable_ratio, 4, spread, 0.1) == pytest.approx(0.8, abs=1e-6)
 
 
 def test_the_order_of_cells_does_not_matter(findings: list[GroupFinding]) -> None:

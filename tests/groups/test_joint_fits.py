@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.groups.joint_fit import JointFit, fitted_jointly
 from biogrip.groups.replicates import JointResiduals, joint_problem
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.limits import find_limits
 from biogrip.identify.answer import Identification
 from biogrip.identify.local_fits import LocalFits
 from biogrip.identify.problem import Problem
@@ -121,9 +121,9 @@ def test_chi_squared_rises_at_the_limits_by_the_threshold(
                 bounds=(uneven[0].low[free], uneven[0].high[free]),
                 x_scale="jac",
             )
-            rise = 2 * found.cost - ours @ ours
-            assert rise == pytest.approx(likelihood.threshold, rel=0.01)
-        ((near,),) = limits_and_deeper([likelihood], [finding.quantity])[0]
+            increase = 2 * found.cost - ours @ ours
+            assert increase == pytest.approx(likelihood.threshold, rel=0.01)
+        ((near,),) = find_limits([likelihood], [finding.quantity])[0]
         assert near == pytest.approx((finding.profile.low, finding.profile.high), abs=1e-3)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.groups.membership import Cell, read_cells
+from biogrip.groups.cell_table import Cell, read_cells
 
 
 def table(folder: Path, text: str) -> Path:

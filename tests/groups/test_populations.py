@@ -8,16 +8,16 @@ from scipy import integrate, special, stats
 
 from biogrip.arrays import Array
 from biogrip.groups.comparison import adjusted, difference
-from biogrip.groups.population import Estimates, Population, population_of
-from biogrip.groups.power import cells_needed, power, ratio_seen
-from biogrip.groups.shift import shift
+from biogrip.groups.hodges_lehmann import shift
+from biogrip.groups.population import Estimates, Population, estimate_population
+from biogrip.groups.power import cells_needed, detectable_ratio, power
 
 RNG = np.random.default_rng(20)
 
 
 def dish(y: Array, s: Array | float, confidence: float = 0.95) -> Population:
     names = tuple(f"cell {i}" for i in range(len(y)))
-    return population_of(Estimates(names, y, np.broadcast_to(s, y.shape)), confidence)
+    return estimate_population(Estimates(names, y, np.broadcast_to(s, y.shape)), confidence)
 
 
 def drawn(count: int, spread: float, error: Array | float, centre: float = 0.0) -> Array:
@@ -161,7 +161,7 @@ def test_power_is_the_noncentral_t() -> None:
     enough = cells_needed(1.4, 0.8, 0.3, 0.1)
     assert power(1.4, enough - 1, 0.3, 0.1) < 0.8 <= power(1.4, enough, 0.3, 0.1)
     assert cells_needed(100.0, 0.8, 0.1, 0.0) == 3
-    seen = ratio_seen(12, 0.8, 0.3, 0.1)
+    seen = detectable_ratio(12, 0.8, 0.3, 0.1)
     assert power(seen, 12, 0.3, 0.1) == pytest.approx(0.8, abs=1e-6)
 
 
@@ -199,7 +199,7 @@ def test_enough_cells_are_found_for_every_difference(ratio: float, spread: float
 @pytest.mark.parametrize("wanted", [0.1, 0.8, 0.99])
 @pytest.mark.parametrize("cells", [2, 3, 20, 1000])
 def test_the_ratio_seen_has_the_power_wanted(cells: int, wanted: float) -> None:
-    seen = ratio_seen(cells, wanted, 0.3, 0.1)
+    seen = detectable_ratio(cells, wanted, 0.3, 0.1)
     assert power(seen, cells, 0.3, 0.1) == pytest.approx(wanted, abs=1e-9)
 
 

@@ -22,7 +22,7 @@ ROUGH, TIGHT = 1e-6, 1e-11
 HINGE = 10.0
 
 
-class Held:
+class FitConstraint:
     """A quantity's logarithm held at a target; points are of what is left free.
 
     Parameters
@@ -87,7 +87,7 @@ class Held:
             residual, sensitivity = self._likelihood.problem.residuals(x)
             late = self._late(x)
             slopes_of = np.zeros((len(late), len(x)))
-            branches = [hinge.branch for hinge in self._quantity.hinges]
+            branches = [hinge.branch for hinge in self._quantity.penalties]
             for row, (k, c), beyond in zip(slopes_of, branches, late, strict=True):
                 if beyond > 0:
                     row[c], row[k] = HINGE, -HINGE
@@ -106,7 +106,7 @@ class Held:
         longest = np.log(self._likelihood.problem.residuals.duration_s)
         return [
             float(x[c] - x[k] - longest)
-            for k, c in (hinge.branch for hinge in self._quantity.hinges)
+            for k, c in (hinge.branch for hinge in self._quantity.penalties)
         ]
 
     def fitted(self, x: Array, tolerance: float = TIGHT) -> tuple[float, Array]:
@@ -118,14 +118,16 @@ class Held:
         least = residuals.samples * (self._likelihood.misfit_rad / self._likelihood.noise_rad) ** 2
         return 2 * float(found.cost) - least, self.log_parameters(found.x)
 
-    def rise(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
+    def increase(self, rng: np.random.Generator, count: int, starts: Iterable[Array] = ()) -> float:
         """Lowest rise of chi^2 from so many random starts, and some more."""
         points = rng.uniform(self.low, self.high, (CANDIDATES, len(self.low)))
         many = np.array([self.log_parameters(point) for point in points])
         misfit = self._likelihood.problem.misfit(np.exp(many))
         late = np.array([sum(max(u, 0.0) ** 2 for u in self._late(x)) for x in many])
-        rises = np.array([self._likelihood.rise(float(u)) for u in misfit]) + HINGE**2 * late
-        order = np.argsort(rises)
+        increases = (
+            np.array([self._likelihood.increase(float(u)) for u in misfit]) + HINGE**2 * late
+        )
+        order = np.argsort(increases)
         good = count // 3
         first = np.concatenate(
             (many[order[:good]], many[rng.permutation(order[good:])[good:count]])
@@ -158,8 +160,8 @@ def rise_at(
         for softer in (0.0, 3.0, 6.0)
         for small in (1.0, 2.5, 5.0)
     ]
-    held = Held(likelihood, quantity, limit)
-    return held.rise(rng, count, (likelihood.best, *others))
+    held = FitConstraint(likelihood, quantity, limit)
+    return held.increase(rng, count, (likelihood.best, *others))
 
 
 def rises_along(
@@ -169,14 +171,14 @@ def rises_along(
 
     They differ where the optimum's basin ends, or is no longer the lowest, close to the limit.
     """
-    x, rises = likelihood.best, []
+    x, increases = likelihood.best, []
     start = quantity.log(x)
     ends = quantity.range(likelihood.problem.low, likelihood.problem.high)
     beyond = float(np.clip(1.25 * limit - 0.25 * start, *ends))
     there = np.linspace(start, limit, steps + 1)[1:]
     on = np.linspace(limit, beyond, steps // 4 + 1)[1:]
     for target in (*there, *on, *on[-2::-1], limit):
-        rise, x = Held(likelihood, quantity, float(target)).fitted(x)
+        increase, x = FitConstraint(likelihood, quantity, float(target)).fitted(x)
         if target == limit:
-            rises.append(rise)
-    return rises[0], rises[-1]
+            increases.append(increase)
+    return increases[0], increases[-1]

@@ -50,20 +50,22 @@ def experiment(model: str = "generalized_maxwell") -> library.CaseProblem:
     """The default study's gripper and protocol."""
     arm = library.Arm(inertia_kgm2=1e-14, damping_Nms_per_rad=3.3e-12, stiffness_Nm_per_rad=4.4e-7)
     gripper = library.Gripper(arm_length_m=1.5e-3, reference_angle_deg=75.0, left=arm, right=arm)
-    protocol = (library.held(200.0, 1.6e-9), library.held(200.0, 0.32e-9))
+    protocol = (library.hold(200.0, 1.6e-9), library.hold(200.0, 0.32e-9))
     return library.set_up(gripper, protocol, library.Sample(model))
 
 
 def answer() -> Figure:
     """Gripper, trace, and what a determined and an undetermined parameter look like."""
-    posed, times = experiment(), np.linspace(0.0, 400.0, 4001)
-    rotation = library.simulate(posed, DROP, times)
+    case_problem, times = experiment(), np.linspace(0.0, 400.0, 4001)
+    rotation = library.simulate(case_problem, DROP, times)
     noise = Noise("gaussian", 0.1, "peak")
     trace = add_noise(rotation, noise, np.random.default_rng(0))
-    found = library.identify_sample(posed, times, trace)
-    told = library.judge(posed, times, trace, found)
+    found = library.identify_sample(case_problem, times, trace)
+    told = library.judge(case_problem, times, trace, found)
     fitted = library.simulate(
-        posed, dict(zip(posed.searched.names, map(float, found.parameters), strict=True)), times
+        case_problem,
+        dict(zip(case_problem.searched.names, map(float, found.parameters), strict=True)),
+        times,
     )
     drawn = figure(PAGE_IN, 2.2)
     grid = drawn.subplots(1, 4, width_ratios=(0.75, 1.3, 1, 1))
@@ -78,7 +80,7 @@ def answer() -> Figure:
         (grid[3], "c_p", "4  c$_p$: only bounded"),
     ):
         profile = findings[name].profile
-        axes.plot(np.exp(profile.log_values), profile.rises, color=FITTED)
+        axes.plot(np.exp(profile.log_values), profile.increases, color=FITTED)
         axes.axhline(3.84, color=TARGET, linestyle="--", linewidth=0.7)
         low, high = findings[name].low, findings[name].high
         axes.axvspan(low or 1e-5, high, color=SHADE, zorder=0)
@@ -118,8 +120,10 @@ def example_profiles() -> Figure:
 def example_fit() -> Figure:
     """The example trace, its fit, and the residual."""
     time_s, rotation = np.loadtxt(EXAMPLE, delimiter=",", skiprows=1, unpack=True)
-    posed = experiment()
-    return library.plot(posed, time_s, rotation, library.identify_sample(posed, time_s, rotation))
+    case_problem = experiment()
+    return library.plot(
+        case_problem, time_s, rotation, library.identify_sample(case_problem, time_s, rotation)
+    )
 
 
 def groups() -> Figure:
@@ -173,8 +177,8 @@ def noise() -> Figure:
 
 def residuals() -> Figure:
     """What fits leave of traces: white noise, autocorrelated noise, and outliers."""
-    posed = experiment()
-    rotation = library.simulate(posed, DROP, TIMES)
+    case_problem = experiment()
+    rotation = library.simulate(case_problem, DROP, TIMES)
     drawn = figure(PAGE_IN, 1.9)
     grid = drawn.subplots(1, 3, sharey=True)
     kinds = _kinds()
@@ -185,9 +189,9 @@ def residuals() -> Figure:
         strict=True,
     ):
         trace = add_noise(rotation, kinds[name], np.random.default_rng(2), TIMES)
-        found = library.identify_sample(posed, TIMES, trace)
-        values = dict(zip(posed.searched.names, map(float, found.parameters), strict=True))
-        left: Array = trace - library.simulate(posed, values, TIMES)
+        found = library.identify_sample(case_problem, TIMES, trace)
+        values = dict(zip(case_problem.searched.names, map(float, found.parameters), strict=True))
+        left: Array = trace - library.simulate(case_problem, values, TIMES)
         left /= left.std() if name != "outliers" else 1.48 * np.median(np.abs(left))
         axes.plot(TIMES, left, ".", color=MEASURED, markersize=1.5)
         means = [part.mean() for part in np.array_split(left, 20)]

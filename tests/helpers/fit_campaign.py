@@ -32,7 +32,7 @@ from biogrip.arrays import Array, ComplexArray
 from biogrip.experiment.sample import CANDIDATES, MODELS, Parameter
 from biogrip.identify.least_squares import LeastSquaresSettings
 from biogrip.identify.nested_fits import fit_models
-from biogrip.library import Arm, GeneRange, Gripper, held, set_up
+from biogrip.library import Arm, GeneRange, Gripper, hold, set_up
 
 TRIED = (*MODELS, "generalized_maxwell_2", "generalized_maxwell_3")
 """Names of the models that every trace is fitted with."""
@@ -314,8 +314,8 @@ class StepResponses:
         """
         s = np.full((len(parameters), 1), 1j * np.sqrt(STIFFNESS / INERTIA))
         for _ in range(6):
-            inert = INERTIA * s * s
-            rest = self._impedance(model, parameters, s, slopes=False)[0] - inert
+            escape_formula = INERTIA * s * s
+            rest = self._impedance(model, parameters, s, slopes=False)[0] - escape_formula
             s = 1j * np.sqrt(rest / INERTIA)
         for _ in range(40):
             value, slope = self._impedance(model, parameters, s, slopes=False)
@@ -513,7 +513,7 @@ def search_range(model: str) -> tuple[Array, Array]:
 
 @cache
 def _ranges() -> Mapping[str, GeneRange]:
-    return set_up(GRIPPER, (held(1.0, 1e-9),), CANDIDATES["damper"]).ranges
+    return set_up(GRIPPER, (hold(1.0, 1e-9),), CANDIDATES["damper"]).ranges
 
 
 def fits_of(trace: Trace) -> dict[str, tuple[Array, float]]:
@@ -521,7 +521,7 @@ def fits_of(trace: Trace) -> dict[str, tuple[Array, float]]:
     starts = [start for start, _ in trace.steps]
     torques = np.cumsum([jump for _, jump in trace.steps])
     lengths = np.diff([*starts, trace.samples - 1]) * trace.interval_s
-    phases = tuple(map(held, lengths.tolist(), torques.tolist()))
+    phases = tuple(map(hold, lengths.tolist(), torques.tolist()))
     experiment = set_up(GRIPPER, phases, CANDIDATES[TRIED[0]])
     problem = experiment.of(trace.time_s, trace.rotation_rad)
     found = fit_models(

@@ -16,15 +16,15 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.groups.comparison import difference
-from biogrip.groups.dishes import log_deviation
-from biogrip.groups.population import FEWEST_CELLS, Estimates, population_of
+from biogrip.groups.group_findings import log_deviation
+from biogrip.groups.hodges_lehmann import shift
+from biogrip.groups.population import FEWEST_CELLS, Estimates, estimate_population
 from biogrip.groups.power import power
-from biogrip.groups.shift import shift
-from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
-from biogrip.identifiability.profiles import Profile, profiles_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.identifiability.profiles import Profile, compute_profiles
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
-from biogrip.identify.problem import problem_of
+from biogrip.identify.problem import make_problem
 from biogrip.products.stages.full_judgements import refitted
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.places import ROOT
@@ -67,7 +67,7 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
                 step_response(GRIPPER, MODEL.network(np.exp(logs[-1]))), TORQUE, times
             )
             problems += [
-                problem_of(
+                make_problem(
                     GRIPPER,
                     MODEL,
                     TORQUE,
@@ -82,7 +82,9 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
     found = identified(problems, seeds)
     judged = profiles(
         [
-            likelihood_of(problem, np.log(each.parameters), each.misfit_rad, confidence=CONFIDENCE)
+            make_likelihood(
+                problem, np.log(each.parameters), each.misfit_rad, confidence=CONFIDENCE
+            )
             for problem, each in zip(problems, found, strict=True)
         ]
     )
@@ -100,14 +102,14 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
 
 def profiles(likelihoods: list[Likelihood]) -> list[list[tuple[Likelihood, Profile]]]:
     """Profiles of the quantities, followed again where one has led deeper."""
-    own = profiles_of(likelihoods, QUANTITIES, smooth=False)
+    own = compute_profiles(likelihoods, QUANTITIES, smooth=False)
     for index, likelihood in enumerate(likelihoods):
-        lowest = min(own[index], key=lambda each: float(each.rises.min()))
-        if lowest.rises.min() < -MISSED:
+        lowest = min(own[index], key=lambda each: float(each.increases.min()))
+        if lowest.increases.min() < -MISSED:
             deeper = refitted(likelihood, lowest.lowest, CONFIDENCE)
             if deeper is not None:
                 likelihoods[index] = deeper
-                own[index] = profiles_of([deeper], QUANTITIES, smooth=False)[0]
+                own[index] = compute_profiles([deeper], QUANTITIES, smooth=False)[0]
     return [
         [(likelihood, each) for each in some]
         for likelihood, some in zip(likelihoods, own, strict=True)
@@ -139,7 +141,7 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
             determined += [len(each.cells) for each in own]
             if min(len(each.cells) for each in own) < FEWEST_CELLS:
                 continue
-            populations = [population_of(each, CONFIDENCE) for each in own]
+            populations = [estimate_population(each, CONFIDENCE) for each in own]
             compared = difference(*populations)
             held.append(compared.low <= RATIO <= compared.high)
             seen.append(compared.p_value < 1 - CONFIDENCE)

@@ -14,7 +14,7 @@ from biogrip.cli import main
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.running.resolved import write_study
-from biogrip.running.sheet import Sheet, sheets_of
+from biogrip.running.rules import Rule, make_rules
 from biogrip.study.study import Study
 
 
@@ -34,40 +34,40 @@ def make_in_process(folder: Path, study: Study, wanted: Iterable[str] | None = N
         results = Path("results")
         write_study(study, results)
         plan = Plan(study, results)
-        alone = [Sheet(p.name, (p,), plan, tuple(p.jobs(plan))) for p in products().values()]
-        sheets = sheets_of(products().values(), plan) if wanted is None else alone
-        makers = _makers(sheets)
+        alone = [Rule(p.name, (p,), plan, tuple(p.jobs(plan))) for p in products().values()]
+        rules = make_rules(products().values(), plan) if wanted is None else alone
+        makers = _makers(rules)
         for file in makers if wanted is None else wanted:
             _make(file, makers)
 
 
 def inputs_and_outputs(study: Study) -> tuple[set[str], set[str]]:
     """Every file that a run of a study reads, and every one that it makes, from nothing."""
-    makers = _makers(sheets_of(products().values(), Plan(study, Path("nowhere"))))
+    makers = _makers(make_rules(products().values(), Plan(study, Path("nowhere"))))
     read = {
         file
-        for sheet, job in makers.values()
-        for files in sheet.inputs(job).values()
+        for rule, job in makers.values()
+        for files in rule.inputs(job).values()
         for file in files
     }
     return read, set(makers)
 
 
-def _makers(sheets: Iterable[Sheet]) -> dict[str, tuple[Sheet, Wildcards]]:
+def _makers(rules: Iterable[Rule]) -> dict[str, tuple[Rule, Wildcards]]:
     """Sheet and job that make each file."""
     return {
-        pattern.format(**job): (sheet, job)
-        for sheet in sheets
-        for job in sheet.jobs
-        for pattern in sheet.outputs.values()
+        pattern.format(**job): (rule, job)
+        for rule in rules
+        for job in rule.jobs
+        for pattern in rule.outputs.values()
     }
 
 
-def _make(file: str, makers: dict[str, tuple[Sheet, Wildcards]]) -> None:
+def _make(file: str, makers: dict[str, tuple[Rule, Wildcards]]) -> None:
     if Path(file).exists():
         return
-    sheet, job = makers[file]
-    for needed in {file for files in sheet.inputs(job).values() for file in files}:
+    rule, job = makers[file]
+    for needed in {file for files in rule.inputs(job).values() for file in files}:
         _make(needed, makers)
-    made_for = ["--made-for", sheet.digest(job)]
-    assert main(["make", *shlex.split(sheet.command(job)), *made_for]) == 0, file
+    made_for = ["--made-for", rule.digest(job)]
+    assert main(["make", *shlex.split(rule.command(job)), *made_for]) == 0, file

@@ -12,9 +12,9 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
-from biogrip.identifiability.profiles import profiles_of
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
+from biogrip.identifiability.profiles import compute_profiles
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.answer import silent
 from biogrip.identify.identifier import identifier
@@ -33,9 +33,11 @@ NAMES = ("example_trace", *(f"trace_{year}" for year in range(2006, 2021)), "a",
 
 def likelihood_for(case: str, seed: int) -> Likelihood:
     """What the limits of a simulated trace are measured against."""
-    posed = problem(case, seed, rate_Hz=10.0)
-    found = run("least_squares", posed, seed)
-    return likelihood_of(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    case_problem = problem(case, seed, rate_Hz=10.0)
+    found = run("least_squares", case_problem, seed)
+    return make_likelihood(
+        case_problem, np.log(found.parameters), found.misfit_rad, confidence=0.95
+    )
 
 
 @functools.cache
@@ -49,7 +51,7 @@ def example(name: str) -> Likelihood:
     rng = stream(STUDY.study_seed, name, 0, "identifiability")
     identify = identifier("least_squares", STUDY.config.of_methods.of("least_squares"))
     (found,) = identify([_example()], [rng], silent)
-    return likelihood_of(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    return make_likelihood(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
 
 
 def misses(
@@ -58,20 +60,23 @@ def misses(
     """Quantity, whose limit, its logarithm, and by what share of the threshold the rise misses."""
     rng = np.random.default_rng(0)
     starts, steps = effort
-    (profiles,) = profiles_of([likelihood], quantities)
-    (near,) = limits_and_deeper([likelihood], quantities)[0]
+    (profiles,) = compute_profiles([likelihood], quantities)
+    (near,) = find_limits([likelihood], quantities)[0]
     for quantity, found, limits in zip(quantities, profiles, near, strict=True):
         for limit in (found.low, found.high):
             if limit is not None:
-                rise = rise_at(likelihood, quantity, limit, rng, starts)
-                yield quantity.label, "profile", limit, rise / likelihood.threshold - 1
+                increase = rise_at(likelihood, quantity, limit, rng, starts)
+                yield quantity.label, "profile", limit, increase / likelihood.threshold - 1
         for limit in limits:
             if np.isfinite(limit):
-                rises = list(rises_along(likelihood, quantity, limit, steps))
-                if min(abs(rise / likelihood.threshold - 1) for rise in rises) > ALLOWED:
+                increases = list(rises_along(likelihood, quantity, limit, steps))
+                if (
+                    min(abs(increase / likelihood.threshold - 1) for increase in increases)
+                    > ALLOWED
+                ):
                     # Where the optimum's basin leads over into a lower one, it is that one's.
-                    rises.append(rise_at(likelihood, quantity, limit, rng, starts))
-                miss = min((rise / likelihood.threshold - 1 for rise in rises), key=abs)
+                    increases.append(rise_at(likelihood, quantity, limit, rng, starts))
+                miss = min((increase / likelihood.threshold - 1 for increase in increases), key=abs)
                 yield quantity.label, "near", limit, float(miss)
 
 
@@ -95,7 +100,7 @@ def differences(limits: Array) -> Array:
 
 def limits_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[tuple[float, float]]:
     """Limits of quantities' profiles, NaN where there is none."""
-    (found,) = profiles_of([likelihood], quantities)
+    (found,) = compute_profiles([likelihood], quantities)
     return [
         (np.nan if p.low is None else p.low, np.nan if p.high is None else p.high) for p in found
     ]

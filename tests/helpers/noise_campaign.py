@@ -16,8 +16,8 @@ from scipy.special import chdtrc
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -108,31 +108,33 @@ def quantities(case: str) -> list[Quantity]:
 def seen(kind: Kind, seed: int) -> Seen:
     """Simulate a trace, and judge it in both ways; fits start at the truth."""
     case = STUDY.cases[kind.case]
-    posed, rng = case.problem, np.random.default_rng([seed, 16])
-    time_s = case.sampling.over(posed.torque.end_s)
+    case_problem, rng = case.problem, np.random.default_rng([seed, 16])
+    time_s = case.sampling.over(case_problem.torque.end_s)
     sample = case.sample.model.sample(case.parameters)
     error = kind.gripper * rng.standard_normal()
     left, right = (
         replace(arm, stiffness_Nm_per_rad=arm.stiffness_Nm_per_rad * (1 + error))
-        for arm in (posed.gripper.left, posed.gripper.right)
+        for arm in (case_problem.gripper.left, case_problem.gripper.right)
     )
-    gripper = replace(posed.gripper, left=left, right=right)
-    clean = simulated_rotation(gripper, sample, posed.torque, time_s, nonlinear=False)[0]
+    gripper = replace(case_problem.gripper, left=left, right=right)
+    clean = simulated_rotation(gripper, sample, case_problem.torque, time_s, nonlinear=False)[0]
     trace = add_noise(clean, kind.noise, rng, time_s)
-    truth = posed.logs(case.parameters)
+    truth = case_problem.logs(case.parameters)
 
     def find(problem: Problem) -> Identification:
         return identify_from(problem, truth)
 
-    plain = posed.of(time_s, trace)
+    plain = case_problem.of(time_s, trace)
     ignored = _likelihood(plain, find(plain))
-    more = replace(posed, offset=True, drift=True).of(time_s, trace)
+    more = replace(case_problem, offset=True, drift=True).of(time_s, trace)
     fall = fall_of(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
     doubts = list(doubts_about_noise(plain.residuals(ignored.best)[0]))
-    assumed = replace(posed, coloured=True)
+    assumed = replace(case_problem, coloured=True)
     if kind.gripper:
-        known = {"stiffness_Nm_per_rad": kind.gripper * posed.gripper.left.stiffness_Nm_per_rad}
-        assumed = replace(posed, uncertainty={"left": known, "right": known})
+        known = {
+            "stiffness_Nm_per_rad": kind.gripper * case_problem.gripper.left.stiffness_Nm_per_rad
+        }
+        assumed = replace(case_problem, uncertainty={"left": known, "right": known})
     fit = trace_fit(assumed, time_s, trace, find)
     allowed = _likelihood(fit.problem, fit.found)
     every = quantities(kind.case)
@@ -145,13 +147,13 @@ def seen(kind: Kind, seed: int) -> Seen:
 
 def _likelihood(problem: Problem, found: Identification) -> Likelihood:
     best = np.log(found.parameters)
-    return likelihood_of(problem, best, found.misfit_rad, confidence=CONFIDENCE)
+    return make_likelihood(problem, best, found.misfit_rad, confidence=CONFIDENCE)
 
 
 def _held(
     likelihood: Likelihood, every: Sequence[Quantity], truth: Array
 ) -> list[tuple[float, bool]]:
-    (limits,) = limits_and_deeper([likelihood], every)[0]
+    (limits,) = find_limits([likelihood], every)[0]
     low, high = np.where(np.isnan(limits), (-np.inf, np.inf), limits).T
     logs = np.array([quantity.log(truth) for quantity in every])
     held = (low <= logs) & (logs <= high)

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 from biogrip.products.figures import declared
 
 _DOTS_PER_INCH = 60
@@ -24,9 +24,9 @@ def in_coarse_dots() -> Iterator[None]:
 
 
 def _save_coarsely(figure: Figure, png: Path) -> None:
-    with written_whole(png) as scratch:
+    with atomic_write(png) as scratch:
         figure.savefig(scratch, format="png", dpi=_DOTS_PER_INCH)
-    with written_whole(png.with_suffix(".pdf")) as scratch:
+    with atomic_write(png.with_suffix(".pdf")) as scratch:
         scratch.touch()
 
 

@@ -25,7 +25,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import sample_times
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import PosteriorSettings
-from biogrip.identifiability.prior import prior_of
+from biogrip.identifiability.prior import make_prior
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.sampling import sampled
 from biogrip.identify.answer import silent
@@ -56,7 +56,7 @@ def drawn(number: int, settings: PosteriorSettings = SETTINGS) -> Draw:
     rng = np.random.default_rng([number, 31])
     genes = [RANGES[p.range_name] for p in MODEL.parameters]
     low, high = (np.log([getattr(own, end) for own in genes]) for end in ("low", "high"))
-    prior = prior_of(MODEL, low, high, {})
+    prior = make_prior(MODEL, low, high, {})
     truth = prior.draw(1, rng)
     times = sample_times(400.0, RATE_HZ)
     clean = rotation(step_response(GRIPPER, MODEL.network(np.exp(truth))), TORQUE, times)[0]

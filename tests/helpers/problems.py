@@ -12,7 +12,7 @@ from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.identify import least_squares
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import identifier
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem, make_problem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
@@ -44,9 +44,9 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
     return posed_for(MODEL, times, trace)
 
 
-def run(method: str, posed: Problem, seed: int = 0) -> Identification:
+def run(method: str, case_problem: Problem, seed: int = 0) -> Identification:
     identify = identifier(method, STUDY.config.of_methods.of(method))
-    (answer,) = identify([posed], [np.random.default_rng(seed)], silent)
+    (answer,) = identify([case_problem], [np.random.default_rng(seed)], silent)
     return answer
 
 
@@ -76,7 +76,7 @@ def problem_alone(
 ) -> Problem:
     """The problem of a trace that shares its rows with no other; assumed is as `condensed_of`'s."""
     condensed = condensed_of(torque, time_s, **assumed)
-    return problem_of(
+    return make_problem(
         gripper, model, torque, time_s, rotation_rad, STUDY.ranges, condensed, noise_rad=noise_rad
     )
 
@@ -97,7 +97,7 @@ def posed_for(model: SampleModel, times: Array, trace: Array) -> Problem:
     return problem_alone(STUDY.gripper, model, study_torque(), times, trace)
 
 
-def posed(
+def case_problem(
     times: Array,
     response: Array,
     count: int,
@@ -110,11 +110,13 @@ def posed(
     condensed = condensed_of(TORQUE, times, nonlinear=nonlinear)
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
-    return [problem_of(GRIPPER, model, TORQUE, times, trace, RANGES, condensed) for trace in traces]
+    return [
+        make_problem(GRIPPER, model, TORQUE, times, trace, RANGES, condensed) for trace in traces
+    ]
 
 
 def of_case(case: str, count: int, level: float = 0.1) -> list[Problem]:
-    return posed(*clean(case), count, level=level)
+    return case_problem(*clean(case), count, level=level)
 
 
 def identified(

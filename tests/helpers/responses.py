@@ -17,19 +17,19 @@ import numpy as np
 from flint import acb, acb_mat, arb, ctx
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held
+from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, hold
 from biogrip.experiment.sample import MODELS, SampleModel
 from biogrip.instrument.gripper import Gripper
 
 SWING = Load(1e-9, 0.0, 0.0, (Harmonic(4e-10, 0.3, -np.pi / 2),))
 PROTOCOLS = {
-    "steps": (held(200.0, 1.6e-9), held(200.0, 0.32e-9)),
+    "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
     "ramp, parabola and sinusoid": (
         Phase(50.0, Load(0.0, 2e-11), Load(0.0, 2e-11)),
         Phase(150.0, Load(1e-9, 1e-12, 1e-14), Load(1e-9, 1e-12, 1e-14)),
         Phase(200.0, SWING, SWING),
     ),
-    "arms driven differently": (held(200.0, 1.6e-9, 1.0e-9), held(200.0, 0.3e-9, 0.5e-9)),
+    "arms driven differently": (hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)),
 }
 MODEL_PARAMETERS = {name: list(model.example) for name, model in MODELS.items()}
 # Logarithms between which parameters of each kind are searched for, about.

@@ -16,7 +16,7 @@ from biogrip.design.schedule import planned
 from biogrip.design.search import best_torques
 from biogrip.experiment.random_streams import stream
 from biogrip.identify.answer import silent
-from biogrip.study.asked_design import wanted_of
+from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study
 from tests.helpers.groups_campaign import write
@@ -33,7 +33,7 @@ KINDS = (("steps", 10.0), ("ramps", 10.0), ("ramps", 0.1), ("sinusoids", 10.0))
 def told(case_name: str, shape: str, shortest_ms: float, tried: int) -> pd.DataFrame:
     """Design with torques of one shape, and give what is told, a row a quantity."""
     study = _study()
-    wanted = wanted_of(study.cases[case_name])
+    wanted = make_design_inputs(study.cases[case_name])
     limits = replace(wanted.limits, shortest_s=1e-3 * shortest_ms)
     wanted = replace(wanted, shapes=(shape,), limits=limits)
     rng = stream(study.study_seed, case_name, 0, "design")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
+from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.points import Points
-from biogrip.identifiability.profiles import Profile, gaps_of, profiles_of
+from biogrip.identifiability.profiles import Profile, compute_profiles, find_gaps
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
 from biogrip.products.stages.full_judgements import refitted, shown_of
@@ -22,29 +22,29 @@ QUANTITIES = parameters_and_sum(MODEL)
 
 def parabolas(values: Array) -> Array:
     """Two basins about -2 and 2, whose square roots are straight."""
-    rises: Array = np.minimum((values + 2) ** 2, (values - 2) ** 2)
-    return rises
+    increases: Array = np.minimum((values + 2) ** 2, (values - 2) ** 2)
+    return increases
 
 
 def test_a_set_in_two_parts_has_a_gap() -> None:
     values = np.linspace(-5, 5, 101)
-    (gap,) = gaps_of(values, parabolas(values), 1.0)
+    (gap,) = find_gaps(values, parabolas(values), 1.0)
     assert gap == pytest.approx((-1.0, 1.0))
-    assert gaps_of(values, parabolas(values), 4.5) == ()
+    assert find_gaps(values, parabolas(values), 4.5) == ()
     # What is above the threshold by no more than fits are good to is none.
-    assert gaps_of(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
+    assert find_gaps(values, np.minimum(parabolas(values), 1.005), 1.0) == ()
 
 
 def test_a_verdict_names_its_gaps() -> None:
     values = np.linspace(-5, 5, 101)
-    gaps = gaps_of(values, parabolas(values), 1.0)
+    gaps = find_gaps(values, parabolas(values), 1.0)
     whole = Profile(values, parabolas(values), 2.0, -3.0, 3.0, np.zeros(4))
     words = [Finding(QUANTITIES[0], p, 0.1).words() for p in (whole, replace(whole, gaps=gaps))]
     assert words[0] == "determined: 7.39 N/m (0.0498 to 20.1)"
     assert words[1] == "determined: 7.39 N/m (0.0498 to 20.1), except 0.368 to 2.72 N/m"
 
 
-class Parabolas(HeldFits):
+class Parabolas(ConstrainedFits):
     """Fits that stay where they start."""
 
     def __init__(self) -> None:
@@ -65,20 +65,20 @@ def test_points_are_added_until_a_curve_can_be_drawn() -> None:
     points.smooth(np.array([[-3.0, 3.1]]))
     assert {-3.0, 3.1} <= set(points.values)
     assert np.all(np.diff(points.values) > 0)
-    np.testing.assert_allclose(points.rises, parabolas(points.values))
-    shown = np.sqrt(np.minimum(points.rises, 16.0))
+    np.testing.assert_allclose(points.increases, parabolas(points.values))
+    shown = np.sqrt(np.minimum(points.increases, 16.0))
     assert np.max(np.abs(np.diff(shown))) <= 0.3
 
 
 def test_a_profile_crosses_the_threshold_at_its_limits() -> None:
     likelihood = likelihood_for("liquid_drop_2", 0)
     k = QUANTITIES[0]
-    ((found,),) = profiles_of([likelihood], [k])
+    ((found,),) = compute_profiles([likelihood], [k])
     for limit in (found.low, found.high):
         assert limit is not None
-        at = np.interp(limit, found.log_values, found.rises)
+        at = np.interp(limit, found.log_values, found.increases)
         assert at == pytest.approx(likelihood.threshold, rel=0.01)
-    ((coarse,),) = profiles_of([likelihood], [k], smooth=False)
+    ((coarse,),) = compute_profiles([likelihood], [k], smooth=False)
     assert len(coarse.log_values) < len(found.log_values)
     assert (coarse.low, coarse.high) == (found.low, found.high)
 
@@ -89,10 +89,10 @@ def test_limits_tell_of_an_optimum_that_was_missed() -> None:
     misfit_rad = float(right.problem.misfit(np.exp(away)[None])[0])
     missed = replace(right, best=away, misfit_rad=misfit_rad)
     quantities = [QUANTITIES[0], QUANTITIES[4]]
-    assert limits_and_deeper([right], quantities)[1] == {}
-    deeper = limits_and_deeper([right, missed], quantities)[1]
-    assert list(deeper) == [1]
-    again = refitted(missed, deeper[1], 0.95)
+    assert find_limits([right], quantities)[1] == {}
+    lower = find_limits([right, missed], quantities)[1]
+    assert list(lower) == [1]
+    again = refitted(missed, lower[1], 0.95)
     assert again is not None
     assert again.misfit_rad == pytest.approx(right.misfit_rad, rel=1e-9)
     assert refitted(right, right.best, 0.95) is None
@@ -107,8 +107,10 @@ def test_limits_tell_of_an_optimum_that_was_missed() -> None:
 def test_what_is_counted_is_what_users_are_shown() -> None:
     likelihoods = [likelihood_for("liquid_drop_1", seed) for seed in (0, 4)]
     for seed, shown in zip((0, 4), shown_of(likelihoods, QUANTITIES, 0.95), strict=True):
-        posed = problem("liquid_drop_1", seed, rate_Hz=10.0)
-        told = diagnose(posed, MODEL, run("least_squares", posed, seed), confidence=0.95)
+        case_problem = problem("liquid_drop_1", seed, rate_Hz=10.0)
+        told = diagnose(
+            case_problem, MODEL, run("least_squares", case_problem, seed), confidence=0.95
+        )
         for mine, finding in zip(shown, told.findings, strict=True):
             assert mine.verdict == finding.verdict
             ours = np.array([mine.low, mine.high], dtype=float)

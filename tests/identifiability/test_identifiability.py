@@ -11,16 +11,16 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, model_named
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
-from biogrip.identifiability.profiles import profiles_of
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
+from biogrip.identifiability.profiles import compute_profiles
 from biogrip.identifiability.quantities import (
-    Hinge,
+    BranchPenalty,
     Quantity,
-    combinations_of,
+    find_combinations,
     parameters_and_sum,
 )
-from biogrip.identifiability.valley import valley_and_deeper
+from biogrip.identifiability.valley import compute_valley
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -77,9 +77,9 @@ def test_a_parameter_without_information_is_taken_as_known() -> None:
 )
 def test_bounds_of_the_papers_cases(case: str, quantity: str, percent: tuple[float, float]) -> None:
     """Independent bounds, of a prototype that differentiated numerically."""
-    posed = problem(case, 0, level=0.0, rate_Hz=10.0)
+    case_problem = problem(case, 0, level=0.0, rate_Hz=10.0)
     truth = np.log([SAMPLES[case][name] for name in MODEL.names])
-    _, sensitivity = posed.residuals(truth)
+    _, sensitivity = case_problem.residuals(truth)
     noise = 0.1 * float(np.abs(clean(case, 10.0)[1]).max())
     (q,) = (q for q in parameters_and_sum(MODEL) if q.label == quantity)
     assert percent[0] <= 100 * bound(sensitivity, noise, truth, q) <= percent[1]
@@ -90,7 +90,7 @@ def test_quantities_and_their_gradients(form: str) -> None:
     model = model_named("burgers")
     x = np.log([3.0, 200.0, 2.0, 40.0])
     k_s, c_s, k_v, c_v = np.exp(x)
-    springs, times = combinations_of(model, [0, 2]), combinations_of(model, [0, 3])
+    springs, times = find_combinations(model, [0, 2]), find_combinations(model, [0, 3])
     quantity, value = {
         "sum": (springs[0], k_s + k_v),
         "series": (springs[1], k_s * k_v / (k_s + k_v)),
@@ -120,9 +120,9 @@ def test_quantities_and_their_gradients(form: str) -> None:
 
 @functools.cache
 def told(case: str) -> tuple[Diagnosis, Likelihood]:
-    posed = problem(case, 4, rate_Hz=10.0)
-    found = run("least_squares", posed)
-    diagnosis = diagnose(posed, MODEL, found, confidence=0.95)
+    case_problem = problem(case, 4, rate_Hz=10.0)
+    found = run("least_squares", case_problem)
+    diagnosis = diagnose(case_problem, MODEL, found, confidence=0.95)
     return diagnosis, diagnosis.likelihood
 
 
@@ -132,24 +132,28 @@ def test_a_profile_is_the_lowest_misfit_with_one_parameter_held() -> None:
 
     times, response = clean("liquid_drop_2")
     trace = response + 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
-    posed = posed_for(maxwell, times, trace)
-    found = run("least_squares", posed)
-    likelihood = likelihood_of(posed, np.log(found.parameters), found.misfit_rad, confidence=0.95)
+    case_problem = posed_for(maxwell, times, trace)
+    found = run("least_squares", case_problem)
+    likelihood = make_likelihood(
+        case_problem, np.log(found.parameters), found.misfit_rad, confidence=0.95
+    )
     k = parameters_and_sum(maxwell)[0]
-    ((followed,),) = profiles_of([likelihood], [k])
+    ((followed,),) = compute_profiles([likelihood], [k])
     for index in range(0, len(followed.log_values), 7):
         held = math.exp(followed.log_values[index])
         c = np.geomspace(5.0, 20.0, 4001)
-        searched = posed.misfit(np.stack((np.full_like(c, held), c), axis=1)).min()
-        assert followed.rises[index] == pytest.approx(likelihood.rise(searched), rel=1e-3, abs=0.02)
+        searched = case_problem.misfit(np.stack((np.full_like(c, held), c), axis=1)).min()
+        assert followed.increases[index] == pytest.approx(
+            likelihood.increase(searched), rel=1e-3, abs=0.02
+        )
     low, high = followed.low, followed.high
     assert low is not None
     assert high is not None
     for limit in (low, high):
         c = np.geomspace(8.0, 12.0, 8001)
-        misfit = posed.misfit(np.stack((np.full_like(c, math.exp(limit)), c), axis=1)).min()
-        assert likelihood.rise(misfit) == pytest.approx(likelihood.threshold, abs=0.01)
-    ((near,),) = limits_and_deeper([likelihood], [k])[0]
+        misfit = case_problem.misfit(np.stack((np.full_like(c, math.exp(limit)), c), axis=1)).min()
+        assert likelihood.increase(misfit) == pytest.approx(likelihood.threshold, abs=0.01)
+    ((near,),) = find_limits([likelihood], [k])[0]
     assert near == pytest.approx((low, high), abs=1e-4)
 
 
@@ -186,8 +190,8 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
     response = rotation(step_response(GRIPPER, DAMPER.network([[10.0]])), TORQUE, times)[0]
     noise = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
     maxwell = MODELS["maxwell"]
-    posed = posed_for(maxwell, times, response + noise)
-    diagnosis = diagnose(posed, maxwell, run("least_squares", posed), confidence=0.95)
+    case_problem = posed_for(maxwell, times, response + noise)
+    diagnosis = diagnose(case_problem, maxwell, run("least_squares", case_problem), confidence=0.95)
     k, c = diagnosis.findings
     assert (k.verdict, c.verdict) == (BOUNDED_BELOW, DETERMINED)
     assert "only bounded below: at least" in k.words()
@@ -195,14 +199,16 @@ def test_a_bare_damper_is_known_from_one_side_by_a_spring_it_hides() -> None:
 
 
 def test_known_noise_scales_the_limits() -> None:
-    posed = problem("endothelial_cell", 1)
-    found = run("least_squares", posed)
+    case_problem = problem("endothelial_cell", 1)
+    found = run("least_squares", case_problem)
     best = np.log(found.parameters)
     k_p = parameters_and_sum(MODEL)[1]
     widths = []
     for noise in (None, 2 * found.misfit_rad):
-        likelihood = likelihood_of(posed, best, found.misfit_rad, confidence=0.95, noise_rad=noise)
-        ((limits,),) = limits_and_deeper([likelihood], [k_p])[0]
+        likelihood = make_likelihood(
+            case_problem, best, found.misfit_rad, confidence=0.95, noise_rad=noise
+        )
+        ((limits,),) = find_limits([likelihood], [k_p])[0]
         widths.append(np.ptp(limits))
     assert widths[1] / widths[0] == pytest.approx(2.0, rel=0.02)
 
@@ -212,44 +218,46 @@ def test_a_wrong_model_is_doubted() -> None:
     times, response = clean("endothelial_cell")
     trace = response * (1 + 0.3 * np.sin(times / 20))
     trace = trace + 0.01 * response.max() * np.random.default_rng(0).standard_normal(len(times))
-    posed = posed_for(DAMPER, times, trace)
-    diagnosis = diagnose(posed, DAMPER, run("least_squares", posed), confidence=0.95)
+    case_problem = posed_for(DAMPER, times, trace)
+    diagnosis = diagnose(case_problem, DAMPER, run("least_squares", case_problem), confidence=0.95)
     assert any("residuals are correlated" in note for note in diagnosis.notes)
     assert any("times the noise of the trace" in note for note in diagnosis.notes)
 
 
 @pytest.mark.parametrize(("times", "said"), [(0.5, False), (1.5, False), (2.5, True), (27, True)])
 def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool) -> None:
-    posed = problem("endothelial_cell", 1)
-    found = run("least_squares", posed)
+    case_problem = problem("endothelial_cell", 1)
+    found = run("least_squares", case_problem)
     noise_rad = times * found.misfit_rad
-    told = diagnose(posed, MODEL, found, confidence=0.95, noise_rad=noise_rad)
+    told = diagnose(case_problem, MODEL, found, confidence=0.95, noise_rad=noise_rad)
     words = f"The noise that was given is {times:.2g} times what the fit leaves"
     assert any(note.startswith(words) for note in told.notes) == said
     # Of a trace without noise nothing is left at all, whatever noise it is held against.
     exact = replace(found, misfit_rad=1e-3 * noise_rad)
-    told = diagnose(posed, MODEL, exact, confidence=0.95, noise_rad=noise_rad)
+    told = diagnose(case_problem, MODEL, exact, confidence=0.95, noise_rad=noise_rad)
     assert not any("that was given" in note for note in told.notes)
 
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:
     diagnosis, likelihood = told("liquid_drop_1")
-    valley, _ = valley_and_deeper(likelihood, MODEL)
+    valley, _ = compute_valley(likelihood, MODEL)
     assert valley is not None
     along, arm = ({key: np.array(grid[key]) for key in grid} for grid in valley["grids"])
-    rises = along["rises"]
+    increases = along["increases"]
     sums = along["x_values"] + along["y_values"]
     best = float(np.exp(diagnosis.findings[-1].profile.best))
     on = np.abs(sums / best - 1) < 1e-4
-    assert np.all(rises[on] < likelihood.certainty)
-    assert np.all(rises[sums / best < 0.93] > likelihood.certainty)
-    assert rises.min() > -0.1
+    assert np.all(increases[on] < likelihood.certainty)
+    assert np.all(increases[sums / best < 0.93] > likelihood.certainty)
+    assert increases.min() > -0.1
     # Beyond the sum a weak, slow branch hides any c: c_p alone is what the sum was.
     beyond = arm["x_values"] > 0.5 * best
-    lowest = [arm["rises"][:, i].min() for i in range(arm["rises"].shape[1]) if beyond[0, i]]
+    lowest = [
+        arm["increases"][:, i].min() for i in range(arm["increases"].shape[1]) if beyond[0, i]
+    ]
     assert max(lowest) < likelihood.certainty
     assert np.ptp(lowest) < 0.5
-    assert valley_and_deeper(likelihood, MODELS["maxwell"]) == (None, None)
+    assert compute_valley(likelihood, MODELS["maxwell"]) == (None, None)
 
 
 def test_data_of_a_diagnosis_are_plain_and_rounded() -> None:
@@ -260,7 +268,7 @@ def test_data_of_a_diagnosis_are_plain_and_rounded() -> None:
     assert k["verdict"] == DETERMINED
     assert k["low"] < k["value"] < k["high"]
     assert float(f"{k['value']:.5g}") == k["value"]
-    assert len(k["profile"]["values"]) == len(k["profile"]["rises"])
+    assert len(k["profile"]["values"]) == len(k["profile"]["increases"])
     assert k["in_words"] == f"determined: {k['value']:.3g} N/m ({k['low']:.3g} to {k['high']:.3g})"
 
 
@@ -288,11 +296,11 @@ def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:
     inside = np.zeros(2)
     errors = np.empty((2, seeds))
     for seed in range(seeds):
-        posed = problem(case, 100 + seed)
-        found = run("least_squares", posed, seed)
+        case_problem = problem(case, 100 + seed)
+        found = run("least_squares", case_problem, seed)
         best = np.log(found.parameters)
-        likelihood = likelihood_of(posed, best, found.misfit_rad, confidence=0.95)
-        (limits,) = limits_and_deeper([likelihood], quantities)[0]
+        likelihood = make_likelihood(case_problem, best, found.misfit_rad, confidence=0.95)
+        (limits,) = find_limits([likelihood], quantities)[0]
         for row, (q, (low, high)) in enumerate(zip(quantities, limits, strict=True)):
             inside[row] += low <= q.log(truth) <= high
             errors[row, seed] = q.log(best) - q.log(truth)
@@ -309,4 +317,4 @@ def test_one_quantity_in_text() -> None:
     x: Array = np.log([1.0, 1.0, 3.0, 4.0])
     assert (q.label, q.unit) == ("c + c_p", "N s/m")
     assert math.exp(q.log(x)) == pytest.approx(7.0)
-    assert q.hinges == (Hinge((0, 2)),)
+    assert q.penalties == (BranchPenalty((0, 2)),)

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from biogrip.experiment.sample import MODELS
+from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.local_fits import FINE
 from biogrip.identify.multi_start import fit_from
-from tests.helpers.definition import Held
+from tests.helpers.definition import FitConstraint
 from tests.helpers.limits_campaign import (
     ALIKE,
     ALLOWED,
@@ -47,7 +47,7 @@ def test_the_name_of_a_trace_changes_no_limit() -> None:
     likelihoods = [example(name) for name in NAMES]
     best = np.array([likelihood.best for likelihood in likelihoods])
     assert np.ptp(best, axis=0).max() < 1e-7
-    fast = limits_and_deeper(likelihoods, QUANTITIES)[0]
+    fast = find_limits(likelihoods, QUANTITIES)[0]
     assert differences(fast).max() < ALIKE
     away = np.abs(best - best[0]).max(axis=1)
     two = QUANTITIES[0], QUANTITIES[4]
@@ -58,11 +58,11 @@ def test_the_name_of_a_trace_changes_no_limit() -> None:
 
 @pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
 def test_an_optimum_is_the_same_from_wherever_it_is_reached(case: str) -> None:
-    posed = problem(case, 0, rate_Hz=10.0)
-    best = np.log(run("least_squares", posed).parameters)
+    case_problem = problem(case, 0, rate_Hz=10.0)
+    best = np.log(run("least_squares", case_problem).parameters)
     rng = np.random.default_rng(0)
     starts = best + 0.3 * rng.standard_normal((5, len(best)))
-    found = fit_from([posed] * len(starts), starts).x
+    found = fit_from([case_problem] * len(starts), starts).x
     assert np.ptp([best, *found], axis=0).max() < 1e-7
 
 
@@ -70,12 +70,12 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
     maxwell = MODELS["maxwell"]
     times, response = clean("liquid_drop_2")
     noise = 0.1 * response.max() * np.random.default_rng(2).standard_normal(len(times))
-    posed = posed_for(maxwell, times, response + noise)
-    found = run("least_squares", posed)
+    case_problem = posed_for(maxwell, times, response + noise)
+    found = run("least_squares", case_problem)
     elsewhere = found.parameters * np.array([1.1, 1.02])
-    misfit_rad = float(posed.misfit(elsewhere[None])[0])
+    misfit_rad = float(case_problem.misfit(elsewhere[None])[0])
     missed = replace(found, parameters=elsewhere, misfit_rad=misfit_rad)
-    right, again = (diagnose(posed, maxwell, f, confidence=0.95) for f in (found, missed))
+    right, again = (diagnose(case_problem, maxwell, f, confidence=0.95) for f in (found, missed))
     assert again.likelihood.misfit_rad == pytest.approx(right.likelihood.misfit_rad, rel=1e-9)
     for one, other in zip(right.findings, again.findings, strict=True):
         assert one.verdict == DETERMINED
@@ -87,10 +87,10 @@ def test_an_optimum_that_was_missed_is_judged_again() -> None:
 def test_a_held_fit_is_scipys(label: str) -> None:
     likelihood = likelihood_for("endothelial_cell", 1)
     (quantity,) = (q for q in QUANTITIES if q.label == label)
-    fits, one = HeldFits([likelihood], [quantity]), np.zeros(1, dtype=np.int64)
+    fits, one = ConstrainedFits([likelihood], [quantity]), np.zeros(1, dtype=np.int64)
     for away in (-0.3, 0.1):
         target = quantity.log(likelihood.best) + away
-        (rise,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
+        (increase,), (x,) = fits.at(one, np.array([target]), likelihood.best[None], FINE)
         assert quantity.log(x) == pytest.approx(target, abs=1e-11)
-        scipys, _ = Held(likelihood, quantity, target).fitted(likelihood.best)
-        assert rise == pytest.approx(scipys, abs=0.02)
+        scipys, _ = FitConstraint(likelihood, quantity, target).fitted(likelihood.best)
+        assert increase == pytest.approx(scipys, abs=0.02)

@@ -6,14 +6,14 @@ from scipy.integrate import cumulative_simpson, simpson
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, with_fixed
-from biogrip.identifiability.evidence import evidence_of
+from biogrip.identifiability.evidence import compute_evidence
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import LogNormal, PosteriorSettings
-from biogrip.identifiability.prior import prior_of
+from biogrip.identifiability.prior import make_prior
 from biogrip.identifiability.sampling import Samples, sampled
 from biogrip.identify.answer import silent
 from biogrip.identify.problem import Problem
-from tests.helpers.problems import MODEL, clean, posed, posed_for, run
+from tests.helpers.problems import MODEL, case_problem, clean, posed_for, run
 
 SETTINGS = PosteriorSettings(walkers=60, most_steps=10_000)
 FEW = PosteriorSettings(walkers=20, most_steps=1000)
@@ -27,7 +27,7 @@ def trace_of(case: str) -> tuple[Array, Array]:
 
 def posterior_of(problem: Problem, told: dict[str, LogNormal] | None = None) -> Posterior:
     model = problem.residuals.model
-    return Posterior(problem, prior_of(model, problem.low, problem.high, told or {}))
+    return Posterior(problem, make_prior(model, problem.low, problem.high, told or {}))
 
 
 def sample(posterior: Posterior, seed: int = 0, settings: PosteriorSettings = SETTINGS) -> Samples:
@@ -59,7 +59,7 @@ def test_a_maxwell_liquid_against_quadrature(told: dict[str, LogNormal]) -> None
             # Four standard deviations of as many independent samples as are claimed.
             few = min(found.convergence.bulk, found.convergence.tail)
             assert share == pytest.approx(level, abs=4 * np.sqrt(level * (1 - level) / few))
-    evidence = evidence_of(posterior, found, np.random.default_rng(1))
+    evidence = compute_evidence(posterior, found, np.random.default_rng(1))
     assert evidence.reliable
     assert evidence.error < 0.02
     assert evidence.log == pytest.approx(largest + np.log(whole), abs=4 * evidence.error + 1e-3)
@@ -102,7 +102,7 @@ def test_both_arms_of_a_valley_are_found() -> None:
 
 
 def few_samples(seed: int) -> Samples:
-    (problem,) = posed(*clean("liquid_drop_1"), 1)
+    (problem,) = case_problem(*clean("liquid_drop_1"), 1)
     return sample(posterior_of(problem), seed, FEW)
 
 

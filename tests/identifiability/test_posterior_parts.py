@@ -8,23 +8,23 @@ import pytest
 from scipy import integrate, stats
 
 from biogrip.experiment.sample import CANDIDATES, MODELS, model_named
-from biogrip.identifiability.convergence import convergence_of
-from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR, marginals_of
-from biogrip.identifiability.mixture import FREEDOM, Mixture, mixture_of
+from biogrip.identifiability.convergence import diagnose_convergence
+from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR, compute_marginals
+from biogrip.identifiability.mixture import FREEDOM, Mixture, fit_mixture
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import LogNormal, PosteriorSettings
-from biogrip.identifiability.prior import prior_of
+from biogrip.identifiability.prior import make_prior
 from biogrip.identifiability.quantities import parameters_and_sum
-from biogrip.identifiability.straightened import Straightened, straightened
+from biogrip.identifiability.valley_coordinates import ValleyCoordinates, valley_coordinates
 from tests.helpers.problems import MODEL, problem
 
 LOW, HIGH = np.log([0.1, 1e-3, 1.0, 1e-4]), np.log([100.0, 1e3, 1e4, 1e5])
-TOLD = {"k": LogNormal(5.0, 0.7), "c": LogNormal(1e5, 2.0)}
+POSTERIOR = {"k": LogNormal(5.0, 0.7), "c": LogNormal(1e5, 2.0)}
 
 
 def test_the_prior_is_a_normal_distribution_cut_off_or_a_uniform_one() -> None:
     """Against SciPy's; the median of c is beyond the range."""
-    prior = prior_of(MODEL, LOW, HIGH, TOLD)
+    prior = make_prior(MODEL, LOW, HIGH, POSTERIOR)
     own: list[Any] = [stats.uniform(a, b - a) for a, b in zip(LOW, HIGH, strict=True)]
     for index, median, spread in ((0, 5.0, 0.7), (2, 1e5, 2.0)):
         ends = (np.array([LOW[index], HIGH[index]]) - np.log(median)) / spread
@@ -44,7 +44,7 @@ def test_the_prior_is_a_normal_distribution_cut_off_or_a_uniform_one() -> None:
 def test_branches_come_in_their_order_and_the_prior_still_integrates_to_one() -> None:
     model = CANDIDATES["generalized_maxwell_3"].model
     low, high = np.zeros(8), np.full(8, 2.0)
-    prior = prior_of(model, low, high, {})
+    prior = make_prior(model, low, high, {})
     anywhere = np.random.default_rng(1).uniform(low, high, (100_000, 8))
     density = np.exp(prior.log_density(anywhere))
     # A sixth of the points count: their share has a standard deviation of 0.7 %.
@@ -60,7 +60,7 @@ def test_branches_come_in_their_order_and_the_prior_still_integrates_to_one() ->
 def test_straight_coordinates_lead_back_and_keep_volumes(name: str) -> None:
     model = CANDIDATES[name].model
     size = len(model.names)
-    axes = straightened(model)
+    axes = valley_coordinates(model)
     points = np.random.default_rng(3).uniform(-8, 8, (20, size))
     np.testing.assert_allclose(axes.back(axes.of(points)), points, rtol=1e-12, atol=1e-12)
     low, high = axes.range(np.full(size, -8.0), np.full(size, 8.0))
@@ -103,7 +103,7 @@ def test_a_mixture_follows_what_is_narrow_here_and_wide_there() -> None:
     rng = np.random.default_rng(5)
     ridge = np.stack([rng.uniform(-10, 10, 6000), rng.normal(0, 0.01, 6000)], axis=1)
     blob = rng.normal([0, 5], 0.3, (3000, 2))
-    mixture = mixture_of(np.concatenate([ridge, blob]), rng)
+    mixture = fit_mixture(np.concatenate([ridge, blob]), rng)
     drawn = mixture.draw(20_000, rng)
     density = (2 / 3) * stats.uniform(-10, 20).pdf(drawn[:, 0])
     density *= stats.norm(0, 0.01).pdf(drawn[:, 1])
@@ -115,9 +115,9 @@ def test_a_mixture_follows_what_is_narrow_here_and_wide_there() -> None:
 
 def test_noise_of_unknown_level_is_integrated_over() -> None:
     """Against SciPy's quadrature over the level, Jeffreys' prior 1/sigma."""
-    posed = problem("endothelial_cell", 0, rate_Hz=0.05)
-    posterior = Posterior(posed, prior_of(MODEL, posed.low, posed.high, {}))
-    samples = posed.residuals.samples
+    case_problem = problem("endothelial_cell", 0, rate_Hz=0.05)
+    posterior = Posterior(case_problem, make_prior(MODEL, case_problem.low, case_problem.high, {}))
+    samples = case_problem.residuals.samples
     misfits = np.array([2e-6, 3e-6, 5e-6])
     for misfit_rad, found in zip(misfits, posterior.log_likelihood(misfits), strict=True):
 
@@ -132,21 +132,21 @@ def test_noise_of_unknown_level_is_integrated_over() -> None:
 
 
 def test_noise_of_known_level_has_its_normal_density() -> None:
-    posed = problem("endothelial_cell", 0)
-    prior = prior_of(MODEL, posed.low, posed.high, {})
+    case_problem = problem("endothelial_cell", 0)
+    prior = make_prior(MODEL, case_problem.low, case_problem.high, {})
     points = prior.draw(5, np.random.default_rng(6))
-    found = Posterior(posed, prior, noise_rad=3e-6).log_density(points)
+    found = Posterior(case_problem, prior, noise_rad=3e-6).log_density(points)
     for point, density in zip(points, found, strict=True):
-        residual, _ = posed.residuals(point)
+        residual, _ = case_problem.residuals(point)
         wanted = np.sum(stats.norm(0, 3e-6).logpdf(residual))
         assert density - prior.log_density(point[None])[0] == pytest.approx(wanted, rel=1e-10)
 
 
 def test_the_density_of_a_sample_does_not_depend_on_the_others() -> None:
-    posed = problem("liquid_drop_1", 1)
-    posterior = Posterior(posed, prior_of(MODEL, posed.low, posed.high, {}))
+    case_problem = problem("liquid_drop_1", 1)
+    posterior = Posterior(case_problem, make_prior(MODEL, case_problem.low, case_problem.high, {}))
     points = posterior.prior.draw(300, np.random.default_rng(7))
-    points[3] = posed.high + 1.0
+    points[3] = case_problem.high + 1.0
     together = posterior.log_density(points)
     alone = [posterior.log_density(points[some])[0] for some in np.arange(300)[:, None]]
     np.testing.assert_array_equal(together, alone)
@@ -162,7 +162,7 @@ def test_marginals_are_quantiles_of_what_counts() -> None:
     columns = [rng.permutation(steps) for _ in range(4)]
     samples = np.stack(columns, axis=1) * 0.1 + np.log([1.0, 1e-3, 400.0, 1e-3])
     quantities = parameters_and_sum(MODEL)
-    found = {m.quantity.label: m for m in marginals_of(samples, quantities, 400.0, 0.9)}
+    found = {m.quantity.label: m for m in compute_marginals(samples, quantities, 400.0, 0.9)}
     width = 0.1 * stats.norm.ppf(0.95)
     assert found["k"].median == pytest.approx(1.0, rel=1e-3)
     assert np.log(found["k"].outer) == pytest.approx([-width, width], abs=1e-3)
@@ -184,26 +184,26 @@ def test_marginals_are_quantiles_of_what_counts() -> None:
 
 def test_samples_that_have_not_converged_are_told() -> None:
     rng = np.random.default_rng(9)
-    axes = Straightened((2, 3))
+    axes = ValleyCoordinates((2, 3))
     good = rng.normal(0, 1, (500, 20, 4))
-    told = convergence_of(good, axes)
+    told = diagnose_convergence(good, axes)
     assert told.reached
     assert told.words().startswith("The samples have converged")
     # One walker in twenty elsewhere, in a single parameter.
     stuck = good.copy()
     stuck[:, 7, 1] += 3.0
-    assert convergence_of(stuck, axes).r_hat > 1.02
+    assert diagnose_convergence(stuck, axes).r_hat > 1.02
     # What shows in the sum only: parameters that cancel.
     bent = good.copy()
     # Logarithms of two dampers whose sum is another one for every walker.
     share = rng.uniform(0.2, 0.8, (500, 20))
     total = np.exp(0.001 * np.arange(20))
     bent[:, :, 2], bent[:, :, 3] = np.log(share * total), np.log((1 - share) * total)
-    assert convergence_of(bent, Straightened(())).r_hat < 1.02
-    assert convergence_of(bent, axes).r_hat > 1.02
+    assert diagnose_convergence(bent, ValleyCoordinates(())).r_hat < 1.02
+    assert diagnose_convergence(bent, axes).r_hat > 1.02
     # Slow walks: few independent samples.
     slow = np.cumsum(rng.normal(0, 0.1, (500, 20, 4)), axis=0)
-    assert "have not converged" in convergence_of(slow, axes).words()
+    assert "have not converged" in diagnose_convergence(slow, axes).words()
 
 
 def test_priors_are_of_what_is_identified() -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from biogrip.experiment.sample import SampleModel, model_named, with_fixed
-from biogrip.identifiability.held_fits import HeldFits
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
-from biogrip.identifiability.profiles import profiles_of
+from biogrip.identifiability.constrained_fits import ConstrainedFits
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
+from biogrip.identifiability.profiles import compute_profiles
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import identifier
@@ -18,7 +18,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.identify.problem import Problem
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.default import STUDY, study_of
-from tests.helpers.problems import GRIPPER, TORQUE, clean, posed
+from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean
 
 TIMES = clean("endothelial_cell")[0]
 TWO = model_named("generalized_maxwell", 2)
@@ -30,13 +30,13 @@ def problems(
     model: SampleModel, parameters: dict[str, float], count: int, level: float
 ) -> list[Problem]:
     response = step_response(GRIPPER, model.sample(parameters), inertia=False)
-    return posed(TIMES, rotation(response, TORQUE, TIMES)[0], count, model, level)
+    return case_problem(TIMES, rotation(response, TORQUE, TIMES)[0], count, model, level)
 
 
-def identified(method: str, posed: list[Problem]) -> list[Identification]:
-    rngs = [np.random.default_rng([seed, 3]) for seed in range(len(posed))]
+def identified(method: str, case_problem: list[Problem]) -> list[Identification]:
+    rngs = [np.random.default_rng([seed, 3]) for seed in range(len(case_problem))]
     settings = STUDY.config.of_methods.of(method)
-    return identifier(method, settings)(posed, rngs, silent)
+    return identifier(method, settings)(case_problem, rngs, silent)
 
 
 def assert_in_order(model: SampleModel, parameters: np.ndarray) -> None:
@@ -88,7 +88,7 @@ def likelihoods() -> list[Likelihood]:
     """Of three traces."""
     each = problems(TWO, SAMPLE, 3, 3e-3)
     return [
-        likelihood_of(p, np.log(a.parameters), a.misfit_rad, confidence=0.95)
+        make_likelihood(p, np.log(a.parameters), a.misfit_rad, confidence=0.95)
         for p, a in zip(each, identified("least_squares", each), strict=True)
     ]
 
@@ -96,17 +96,17 @@ def likelihoods() -> list[Likelihood]:
 def test_another_name_of_the_optimum_is_none_of_its_neighbours() -> None:
     """With names free, the fit with a branch at the value of the other is as good as the best."""
     every = parameters_and_sum(TWO)
-    fits = HeldFits(likelihoods(), every)
+    fits = ConstrainedFits(likelihoods(), every)
     swapped = fits.best[:: len(every), [1, 0, 2, 4, 3, 5]]
     for which in (0, 1, 3, 4):
         targets = swapped[:, which]
-        rises, _ = fits.at(which + len(every) * np.arange(3), targets, swapped, FINE)
-        assert np.all(rises > 10)
+        increases, _ = fits.at(which + len(every) * np.arange(3), targets, swapped, FINE)
+        assert np.all(increases > 10)
 
 
 def test_intervals_are_those_of_one_branch() -> None:
     quantities = parameters_and_sum(TWO)
-    for profiles in profiles_of(likelihoods(), quantities, smooth=False):
+    for profiles in compute_profiles(likelihoods(), quantities, smooth=False):
         for quantity, found in zip(quantities, profiles, strict=True):
             if quantity.label in ("k_1", "k_2", "c_1", "c_2"):
                 assert found.low is not None
@@ -117,8 +117,8 @@ def test_intervals_are_those_of_one_branch() -> None:
 
 def test_profiles_end_where_limits_are_near_the_optimum() -> None:
     quantities = parameters_and_sum(TWO)[:2]
-    near = limits_and_deeper(likelihoods(), quantities)[0]
-    for limits, profiles in zip(near, profiles_of(likelihoods(), quantities), strict=True):
+    near = find_limits(likelihoods(), quantities)[0]
+    for limits, profiles in zip(near, compute_profiles(likelihoods(), quantities), strict=True):
         ends = np.array([(found.low, found.high) for found in profiles], dtype=float)
         np.testing.assert_allclose(ends, limits, rtol=0, atol=2e-3)
 

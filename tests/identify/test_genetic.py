@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.setup import evolved
+from benchmarks.setup import evolve
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.noise import Noise, add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory
@@ -11,7 +11,7 @@ from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic_operators import cross, mutate
 from biogrip.identify.genetic_settings import GeneticSettings
-from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.identify.genome import GeneRange, Genome, make_genome
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
@@ -20,7 +20,7 @@ from tests.helpers.plain_genetic import chromosomes_of
 PAPER = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
 MODEL = MODELS["generalized_maxwell"]
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
-GENOME = genome_of(MODEL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
+GENOME = make_genome(MODEL, {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING})
 BOWL = np.log10([35.0, 5.5, 290.0, 4.4e-3])
 
 
@@ -44,7 +44,7 @@ def bowl(parameters: Array) -> Array:
 
 
 def run(settings: GeneticSettings = PAPER, seed: int = 0) -> Identification:
-    return evolved(bowl, GENOME, settings, np.random.default_rng(seed))
+    return evolve(bowl, GENOME, settings, np.random.default_rng(seed))
 
 
 def test_finds_the_bottom_of_a_bowl() -> None:
@@ -138,7 +138,7 @@ def test_mutation_waits_for_its_generation() -> None:
         return bowl(parameters)
 
     few = replace(PAPER, population=10, survivors=5, max_generations=60, min_generations=60)
-    evolved(spying, GENOME, few, np.random.default_rng(0))
+    evolve(spying, GENOME, few, np.random.default_rng(0))
     first, before, after = seen[0], set.union(*seen[1:20]), set.union(*seen[20:])
     assert before <= first
     assert not after <= first
@@ -166,7 +166,7 @@ def test_last_bits_of_the_misfit_do_not_matter(
 
     for seed in range(5):
         calm, shaken = (
-            evolved(f, GENOME, PAPER, np.random.default_rng(seed)) for f in (misfit, disturbed)
+            evolve(f, GENOME, PAPER, np.random.default_rng(seed)) for f in (misfit, disturbed)
         )
         np.testing.assert_array_equal(calm.history.best_parameters, shaken.history.best_parameters)
 
@@ -181,7 +181,7 @@ def test_about_four_runs_in_ten_find_the_basin_of_table_5(
     target, trace = endothelial
     misfit = SeriesMisfit(gripper, MODEL, steps, 0.1, trace)
     floor = 1.02 * rms(trace - target)
-    answers = [evolved(misfit, GENOME, PAPER, np.random.default_rng([8, s])) for s in range(60)]
+    answers = [evolve(misfit, GENOME, PAPER, np.random.default_rng([8, s])) for s in range(60)]
     good = [answer for answer in answers if answer.misfit_rad <= floor]
     assert 25 - 4 * 3.8 < len(good) < 25 + 4 * 3.8
     k, k_p, c, c_p = np.array([answer.parameters for answer in good]).T
@@ -198,7 +198,7 @@ def test_ties_are_broken_by_the_chromosome_alone() -> None:
         return np.ones(len(parameters))
 
     settings = replace(PAPER, min_generations=3, max_generations=3)
-    answer = evolved(flat, GENOME, settings, np.random.default_rng(0))
+    answer = evolve(flat, GENOME, settings, np.random.default_rng(0))
     drawn = GENOME.draw(500, np.random.default_rng(0))
     lowest = drawn[np.argmin(GENOME.code(drawn)[0])]
     np.testing.assert_array_equal(
@@ -249,7 +249,7 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
 
     narrow = GeneRange((0, 0), (5, 5))
     wide = GeneRange((0, 5), (5, 5))
-    genome = genome_of(MODEL, {"k": wide, "k_p": narrow, "c": narrow, "c_p": narrow})
+    genome = make_genome(MODEL, {"k": wide, "k_p": narrow, "c": narrow, "c_p": narrow})
 
     class Single(type(genome)):  # type: ignore[misc]
         def draw(self, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -258,7 +258,7 @@ def test_mutation_starts_with_the_generation_it_says() -> None:
     settings = replace(
         PAPER, mutation_start=2, mutation_probability=1.0, mutated_genes=5, max_generations=2
     )
-    evolved(
+    evolve(
         spying, Single(genome.low, genome.high, genome.sizes), settings, np.random.default_rng(0)
     )
     assert seen[:2] == [1, 1]
@@ -273,12 +273,12 @@ def test_survivors_that_mutate_are_evaluated_again_and_the_best_is_kept() -> Non
         return bowl(parameters)
 
     settings = replace(PAPER, mutation_start=5, mutants="all", max_generations=30)
-    answer = evolved(counting, GENOME, settings, np.random.default_rng(0))
+    answer = evolve(counting, GENOME, settings, np.random.default_rng(0))
     assert np.all(np.diff(answer.history.best_misfit) <= 0)
     assert answer.generations == 30
     assert np.diff(answer.history.evaluations).tolist() == [250] * 4 + [250 + 249] * 26
     assert answer.evaluations == sum(counted)
-    children_only = evolved(
+    children_only = evolve(
         bowl, GENOME, replace(settings, mutants="children"), np.random.default_rng(0)
     )
     assert np.array_equal(answer.history.best_misfit[:5], children_only.history.best_misfit[:5])

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from biogrip.experiment.sample import MODELS
-from biogrip.identify.genome import GeneRange, genome_of, nearest_encodable
+from biogrip.identify.genome import GeneRange, make_genome, nearest_encodable
 
 STIFFNESS, DAMPING = GeneRange((-3, 8), (1, 9)), GeneRange((-4, 5), (1, 9))
 RANGES = {"k": STIFFNESS, "k_p": STIFFNESS, "c": DAMPING, "c_p": DAMPING}
-GENOME = genome_of(MODELS["generalized_maxwell"], RANGES)
+GENOME = make_genome(MODELS["generalized_maxwell"], RANGES)
 
 
 def test_ranges_are_those_of_table_4() -> None:
@@ -38,13 +38,13 @@ def test_codes_tell_all_chromosomes_apart() -> None:
     chromosomes = np.unique(GENOME.draw(50_000, np.random.default_rng(2)), axis=0)
     assert len(np.unique(GENOME.code(chromosomes), axis=1).T) == len(chromosomes)
     widest = {name: GeneRange((-18, 18), (1, 9)) for name in RANGES}
-    genome = genome_of(MODELS["generalized_maxwell"], widest)
+    genome = make_genome(MODELS["generalized_maxwell"], widest)
     extremes = np.stack((genome.low, genome.high))
     assert genome.code(extremes).tolist() == [[0, 37**4 * 81**4 - 1]]
 
 
 def test_a_model_with_fewer_parameters_has_fewer_genes() -> None:
-    assert genome_of(MODELS["liquid_drop"], RANGES).genes == 9
+    assert make_genome(MODELS["liquid_drop"], RANGES).genes == 9
 
 
 @pytest.mark.parametrize(
@@ -60,7 +60,7 @@ def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
     digits: int, digit: tuple[int, int]
 ) -> None:
     ranges = {**RANGES, "k": GeneRange((-16, 16), digit, digits)}
-    genome = genome_of(MODELS["generalized_maxwell"], ranges)
+    genome = make_genome(MODELS["generalized_maxwell"], ranges)
     assert genome.genes == 9 + 1 + digits
     chromosomes = genome.draw(300, np.random.default_rng(digits))
     decoded = genome.decode(chromosomes)
@@ -74,7 +74,7 @@ def test_any_number_of_digits_is_decoded_as_the_decimal_number_it_is(
 
 
 def test_a_first_digit_is_never_zero_lest_numbers_were_encoded_twice() -> None:
-    genome = genome_of(MODELS["damper"], {"c_p": GeneRange((0, 0), (0, 9), 3)})
+    genome = make_genome(MODELS["damper"], {"c_p": GeneRange((0, 0), (0, 9), 3)})
     first, second, third = (genome.draw(5000, np.random.default_rng(0))[:, g] for g in (1, 2, 3))
     assert (set(first), set(second), set(third)) == ({*range(1, 10)}, *[{*range(10)}] * 2)
 

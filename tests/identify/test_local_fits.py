@@ -28,10 +28,10 @@ from tests.helpers.problems import (
     SAMPLES,
     SETTINGS,
     TORQUE,
+    case_problem,
     clean,
     identified,
     of_case,
-    posed,
     problem_alone,
 )
 from tests.helpers.responses import MODEL_PARAMETERS
@@ -52,9 +52,9 @@ def test_the_best_of_the_study_s_starts_is_that_of_scipy(case: str) -> None:
     trace = np.zeros(len(starts), dtype=np.int64)
     many = LocalFits([problem]).fitted(starts, trace, ROUGH).misfit_rad
     one = np.array([scipy_fit(problem, start, ROUGH, prior=True).misfit_rad for start in starts])
-    rises = problem.residuals.samples * ((np.stack((many, one)) / one.min()) ** 2 - 1)
-    assert rises[0].min() < 0.1
-    reached = np.sum(rises < 1, axis=1)
+    increases = problem.residuals.samples * ((np.stack((many, one)) / one.min()) ** 2 - 1)
+    assert increases[0].min() < 0.1
+    reached = np.sum(increases < 1, axis=1)
     assert reached[0] >= 0.7 * reached[1]
 
 
@@ -110,7 +110,7 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
     response = rotation(
         step_response(GRIPPER, model.network([truth]), inertia=False), TORQUE, times
     )
-    (problem,) = posed(times, response[0], 1, model, level=0.0)
+    (problem,) = case_problem(times, response[0], 1, model, level=0.0)
     near = np.log(truth) + 0.1 * np.random.default_rng(1).normal(size=(5, len(truth)))
     found = LocalFits([problem]).fitted(near, np.zeros(5, dtype=np.int64))
     assert np.min(found.misfit_rad) < 1e-6 * np.abs(response).max()
@@ -193,7 +193,7 @@ def mixed() -> list[Problem]:
     trace = response + 1e-5 * np.random.default_rng(9).standard_normal(len(times))
     half = times[::2], trace[::2]
     drop = MODELS["liquid_drop"]
-    (nonlinear,) = posed(times[::20], trace[::20], 1, nonlinear=True)
+    (nonlinear,) = case_problem(times[::20], trace[::20], 1, nonlinear=True)
     ringing = problem_alone(GRIPPER, MODEL, TORQUE, *half, ringing_s=rings_s)
     joint = joint_problem(linear[:2], [1e-5, 2e-5])
     narrow = replace(linear[2], low=linear[2].low + 1)

@@ -13,7 +13,7 @@ from biogrip.identify.least_squares import LeastSquaresSettings
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.problem import Problem
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, clean, posed
+from tests.helpers.problems import GRIPPER, SAMPLES, TORQUE, case_problem, clean
 
 TRIED = (*MODELS, "generalized_maxwell_2")
 FEW = LeastSquaresSettings(candidates=200, starts=4)
@@ -23,7 +23,7 @@ def fitted(
     response: Array, times: Array, tried: Sequence[str], traces: int, level: float
 ) -> tuple[dict[str, list[Problem]], dict[str, list[Identification]]]:
     problems = {
-        name: posed(times, response, traces, CANDIDATES[name].model, level) for name in tried
+        name: case_problem(times, response, traces, CANDIDATES[name].model, level) for name in tried
     }
     rngs = {name: [np.random.default_rng(n) for n in range(traces)] for name in tried}
     return problems, fit_models(problems, FEW, rngs, lambda: None)
@@ -33,14 +33,14 @@ def worse(
     problems: dict[str, list[Problem]], found: dict[str, list[Identification]]
 ) -> list[tuple[str, str, float]]:
     """Pairs the wrong way round, and by how much in chi^2."""
-    rises = [
+    increases = [
         (richer, simpler, problem.residuals.samples * (2 * np.log(a.misfit_rad / b.misfit_rad)))
         for richer in found
         for simpler in contained(richer)
         if simpler in found
         for problem, a, b in zip(problems[richer], found[richer], found[simpler], strict=True)
     ]
-    return [each for each in rises if each[-1] > 1e-3]
+    return [each for each in increases if each[-1] > 1e-3]
 
 
 @pytest.mark.parametrize("case", SAMPLES)

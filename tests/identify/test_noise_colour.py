@@ -6,17 +6,17 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Flicker, Relaxing
-from biogrip.identify.noise_colour import ColourLikelihood, _logarithms
-from biogrip.response.whitening import Colour, Whitening
+from biogrip.identify.noise_model_fit import NoiseModelLikelihood, _logarithms
+from biogrip.response.whitening import NoiseModel, Whitening
 from tests.response.test_whitening import correlation
 
 TIMES = np.cumsum(np.random.default_rng(0).exponential(1.0, 200))
 DIRECTIONS = np.stack((np.ones(200), TIMES, np.exp(-TIMES / 40)))
 
 
-def restricted(time_s: Array, rows: Array, left: Array, colour: Colour) -> float:
+def restricted(time_s: Array, rows: Array, left: Array, noise_model: NoiseModel) -> float:
     """Minus twice the restricted likelihood, the scale profiled out, from dense matrices."""
-    matrix = correlation(time_s, colour)
+    matrix = correlation(time_s, noise_model)
     inverse = np.linalg.inv(matrix)
     information = rows @ inverse @ rows.T
     taken = inverse - inverse @ rows.T @ np.linalg.solve(information, rows @ inverse)
@@ -31,21 +31,21 @@ def test_the_likelihood_is_that_of_what_no_direction_reaches() -> None:
     """Differences between colours, less the prior on the share of 1/f noise; twelve digits are
     there, and the condition of the matrices takes four."""
     left = np.random.default_rng(1).standard_normal(200)
-    likelihood = ColourLikelihood(TIMES, left, DIRECTIONS)
-    colours = [Colour(0.3, 5.0, 0.2), Colour(0.9, 1.0, 0.05), Colour(0.01, 100.0, 0.6)]
+    likelihood = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
+    colours = [NoiseModel(0.3, 5.0, 0.2), NoiseModel(0.9, 1.0, 0.05), NoiseModel(0.01, 100.0, 0.6)]
     found, expected = [], []
-    for colour in colours:
-        x = _logarithms(colour)
+    for noise_model in colours:
+        x = _logarithms(noise_model)
         found.append(likelihood._deviance(x) + x[2])
-        expected.append(restricted(TIMES, DIRECTIONS, left, colour))
+        expected.append(restricted(TIMES, DIRECTIONS, left, noise_model))
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-8)
 
 
 def test_what_directions_have_in_it_does_not_matter() -> None:
     left = np.random.default_rng(2).standard_normal(200)
-    plain = ColourLikelihood(TIMES, left, DIRECTIONS)
-    other = ColourLikelihood(TIMES, left + np.array([3.0, -0.1, 7.0]) @ DIRECTIONS, DIRECTIONS)
-    x = _logarithms(Colour(0.3, 5.0, 0.2))
+    plain = NoiseModelLikelihood(TIMES, left, DIRECTIONS)
+    other = NoiseModelLikelihood(TIMES, left + np.array([3.0, -0.1, 7.0]) @ DIRECTIONS, DIRECTIONS)
+    x = _logarithms(NoiseModel(0.3, 5.0, 0.2))
     assert other._deviance(x) == pytest.approx(plain._deviance(x), rel=1e-9)
 
 
@@ -66,10 +66,10 @@ def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
     found = []
     for seed in range(9):
         trace = add_noise(np.ones(1500), noise, np.random.default_rng([seed, 5]), times)
-        colour = ColourLikelihood(times, trace, np.ones((1, 1500))).best()
+        noise_model = NoiseModelLikelihood(times, trace, np.ones((1, 1500))).best()
         # What is forgotten within a sample is white.
-        slow = colour.relaxing * np.exp(-1 / colour.time_s)
-        found.append((slow, colour.flicker))
+        slow = noise_model.relaxing * np.exp(-1 / noise_model.time_s)
+        found.append((slow, noise_model.flicker))
     np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
 
 
@@ -85,11 +85,11 @@ def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
     logs, freedoms = [], []
     for seed in range(40):
         trace = add_noise(np.ones(400), noise, np.random.default_rng([seed, 6]), times)
-        likelihood = ColourLikelihood(times, trace, np.vstack((direction, np.ones(400))))
-        colour = likelihood.best()
-        x = _logarithms(colour)
-        white = Whitening(times, colour, np.ones((1, 400)) / 20)(direction)
+        likelihood = NoiseModelLikelihood(times, trace, np.vstack((direction, np.ones(400))))
+        noise_model = likelihood.best()
+        x = _logarithms(noise_model)
+        white = Whitening(times, noise_model, np.ones((1, 400)) / 20)(direction)
         logs.append(2 * likelihood._log_scale(x) - np.log(float(white[0] @ white[0])))
         scaled = direction / np.exp(likelihood._log_scale(x))
-        freedoms.append(likelihood.freedom(colour, scaled, np.ones((1, 400)) / 20))
+        freedoms.append(likelihood.freedom(noise_model, scaled, np.ones((1, 400)) / 20))
     assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5

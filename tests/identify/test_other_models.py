@@ -16,11 +16,13 @@ TRACE = RESPONSE * np.random.default_rng(3).normal(1.0, 0.1, len(TIMES))
 @pytest.mark.parametrize("name", CANDIDATES)
 @pytest.mark.parametrize(("block", "by_series"), [("", True), ("{offset: true}", False)])
 def test_it_is_the_same_to_the_last_bit(name: str, block: str, by_series: bool) -> None:
-    posed: CaseProblem = study_of(block and f"measurement: {block}").case("liquid_drop_2").problem
+    case_problem: CaseProblem = (
+        study_of(block and f"measurement: {block}").case("liquid_drop_2").problem
+    )
     model = CANDIDATES[name].model
-    first = posed.of(TIMES, TRACE)
+    first = case_problem.of(TIMES, TRACE)
     assert isinstance(first.misfit, SeriesMisfit) == by_series
-    ours, fresh = posed.for_model(first, model), posed.of(TIMES, TRACE, model)
+    ours, fresh = case_problem.for_model(first, model), case_problem.of(TIMES, TRACE, model)
     low, high = fresh.low, fresh.high
     assert (ours.low.tolist(), ours.high.tolist()) == (low.tolist(), high.tolist())
     assert (ours.genome.low.tolist(), ours.genome.sizes) == (
@@ -32,6 +34,6 @@ def test_it_is_the_same_to_the_last_bit(name: str, block: str, by_series: bool) 
     for one, other in zip(ours.residuals(points[0]), fresh.residuals(points[0]), strict=True):
         np.testing.assert_array_equal(one, other)
     # And the first is what it was.
-    again = posed.of(TIMES, TRACE)
+    again = case_problem.of(TIMES, TRACE)
     sample = np.exp(0.5 * (first.low + first.high))[None]
     assert first.misfit(sample) == again.misfit(sample)

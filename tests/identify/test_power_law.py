@@ -7,12 +7,20 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, MODELS, SampleModel
-from biogrip.identifiability.likelihood import likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.model_choice import ranked
 from biogrip.response.linear import rotation, step_response
-from tests.helpers.problems import GRIPPER, SETTINGS, TORQUE, identified, posed, posed_for, run
+from tests.helpers.problems import (
+    GRIPPER,
+    SETTINGS,
+    TORQUE,
+    case_problem,
+    identified,
+    posed_for,
+    run,
+)
 
 SOLID, LIQUID = MODELS["fractional_kelvin_voigt"], MODELS["fractional_maxwell"]
 TIMES = np.arange(401.0)
@@ -31,13 +39,13 @@ def response(model: SampleModel, sample: list[float]) -> Array:
 )
 def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float]) -> None:
     """40 seeds, 95 %: fewer than 33 hold it once in 3000 times."""
-    problems = posed(TIMES, response(model, truth), 40, model, level=0.03)
+    problems = case_problem(TIMES, response(model, truth), 40, model, level=0.03)
     found = identified(problems, list(range(40)), FEW)
     likelihoods = [
-        likelihood_of(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)
+        make_likelihood(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)
         for problem, one in zip(problems, found, strict=True)
     ]
-    limits, _ = limits_and_deeper(likelihoods, parameters_and_sum(model))
+    limits, _ = find_limits(likelihoods, parameters_and_sum(model))
     held = (limits[..., 0] <= np.log(truth)) & (np.log(truth) <= limits[..., 1])
     assert np.all(held.sum(axis=0) >= 33)
     # And are of use: the exponent's are a fifth of it wide, or less.

@@ -5,15 +5,15 @@ import pytest
 from scipy.optimize import least_squares
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.local_fits import LocalFits
 from biogrip.identify.multi_start import fit_from
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem, make_problem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.nonlinear import nonlinear_rotation
 from tests.helpers.problems import condensed_of, problem_alone
@@ -27,15 +27,15 @@ RANGES = {
 TORQUES = {"the paper's": 1.6e-9, "ten times": 1.6e-8}
 
 
-def posed(gripper: Gripper, torque_Nm: float, traces: int) -> list[Problem]:
+def case_problem(gripper: Gripper, torque_Nm: float, traces: int) -> list[Problem]:
     """Traces with one percent of noise."""
-    torque = torque_history((held(200.0, torque_Nm), held(200.0, 0.2 * torque_Nm)))
+    torque = torque_history((hold(200.0, torque_Nm), hold(200.0, 0.2 * torque_Nm)))
     time_s = np.linspace(0.0, 400.0, 801)
     clean = nonlinear_rotation(gripper, MODEL.network(TRUTH), torque, time_s)[0]
     noise = np.random.default_rng(5).standard_normal((traces, len(time_s)))
     condensed = condensed_of(torque, time_s, nonlinear=True)
     return [
-        problem_of(gripper, MODEL, torque, time_s, trace, RANGES, condensed)
+        make_problem(gripper, MODEL, torque, time_s, trace, RANGES, condensed)
         for trace in clean + 0.01 * clean.max() * noise
     ]
 
@@ -59,23 +59,23 @@ def lowest(likelihood: Likelihood, held_index: int, value: float) -> float:
 @pytest.mark.parametrize("torque", TORQUES)
 def test_limits_are_those_of_the_nonlinear_model(gripper: Gripper, torque: str) -> None:
     """To a percent of the threshold, by their definition."""
-    (problem,) = posed(gripper, TORQUES[torque], 1)
+    (problem,) = case_problem(gripper, TORQUES[torque], 1)
     (best,) = fit_from([problem], np.log(TRUTH)).x
     residual, slopes = problem.residuals(best)
     size = np.linalg.norm(slopes, axis=1) * np.linalg.norm(residual)
     assert np.all(np.abs(slopes @ residual) < 1e-5 * size)
     misfit = float(np.sqrt(np.mean(residual**2)))
-    likelihood = likelihood_of(problem, best, misfit, confidence=0.95)
-    (limits,) = limits_and_deeper([likelihood], parameters_and_sum(MODEL))[0]
+    likelihood = make_likelihood(problem, best, misfit, confidence=0.95)
+    (limits,) = find_limits([likelihood], parameters_and_sum(MODEL))[0]
     assert np.all(np.isfinite(limits))
     for index, ends in enumerate(limits):
         for end in ends:
-            rise = lowest(likelihood, index, float(end))
-            assert rise == pytest.approx(likelihood.threshold, rel=0.01)
+            increase = lowest(likelihood, index, float(end))
+            assert increase == pytest.approx(likelihood.threshold, rel=0.01)
 
 
 def test_fits_do_not_depend_on_the_batch(gripper: Gripper) -> None:
-    problems = posed(gripper, TORQUES["ten times"], 3)
+    problems = case_problem(gripper, TORQUES["ten times"], 3)
     starts = np.log(TRUTH) + np.random.default_rng(0).uniform(-2, 2, (6, 3))
     trace = np.arange(6) % 3
     together = LocalFits(problems).fitted(starts, trace)
@@ -88,7 +88,7 @@ def test_fits_do_not_depend_on_the_batch(gripper: Gripper) -> None:
 
 def test_where_the_model_has_no_answer_no_fit_ends(gripper: Gripper) -> None:
     """A start that the torque closes beyond what the model describes stays, infinitely bad."""
-    torque = torque_history((held(200.0, 1e-6), held(200.0, 1e-7)))
+    torque = torque_history((hold(200.0, 1e-6), hold(200.0, 1e-7)))
     time_s = np.linspace(0.0, 400.0, 801)
     trace = 0.3 * np.ones(len(time_s))
     beyond = problem_alone(gripper, MODEL, torque, time_s, trace, nonlinear=True)

@@ -4,19 +4,19 @@ import numpy as np
 import pytest
 
 from biogrip import library
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.identify.multi_start import fit_from
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem, make_problem
 from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import GRIPPER, RANGES, condensed_of, problem_alone
 
 MODEL = MODELS["generalized_maxwell"]
 CELL = np.array([35.0, 12.3, 299.9, 1e-3])
-TORQUE = torque_history((held(20.0, 1.6e-8), held(20.0, 4e-9)))
+TORQUE = torque_history((hold(20.0, 1.6e-8), hold(20.0, 4e-9)))
 # With four derivatives more than a hundred fits at once are more numbers than are held at once.
 TIMES = np.concatenate([start + 1e-5 * np.arange(1, 1501) for start in (0.0, 20.0)])
 TIMES = np.concatenate(
@@ -28,7 +28,7 @@ def _problems(count: int) -> list[Problem]:
     clean = rotation(step_response(GRIPPER, MODEL.network(CELL)), TORQUE, TIMES)[0]
     rows = condensed_of(TORQUE, TIMES, ringing_s=ringing_s(GRIPPER))
     return [
-        problem_of(
+        make_problem(
             GRIPPER,
             MODEL,
             TORQUE,
@@ -68,7 +68,7 @@ def test_who_samples_fast_is_told_of_fits_with_rings(
     model: str, interval_s: float, level: float
 ) -> None:
     """Chi^2 is that of what is simulated; nobody has to ask for the arms' inertia."""
-    protocol = (library.held(200.0, 1.6e-9), library.held(200.0, 0.32e-9))
+    protocol = (library.hold(200.0, 1.6e-9), library.hold(200.0, 0.32e-9))
     experiment = library.set_up(GRIPPER, protocol, library.Sample(model))
     time_s = np.arange(0.0, 400.0, interval_s)
     clean = library.simulate(experiment, RINGING[model], time_s)
@@ -87,7 +87,7 @@ def test_who_samples_fast_is_told_of_fits_with_rings(
 
 def test_a_ring_that_is_not_reckoned_with_is_taken_for_the_sample() -> None:
     """By standard deviations of k_s, in a trace that is sampled for it."""
-    torque = torque_history((held(2.0, 1.6e-9), held(2.0, 0.32e-9)))
+    torque = torque_history((hold(2.0, 1.6e-9), hold(2.0, 0.32e-9)))
     model, sample = MODELS["zener_kelvin"], np.array([*RINGING["zener_kelvin"].values()])
     time_s = np.arange(0.0, 4.0, 0.002)
     clean = rotation(step_response(GRIPPER, model.network(sample)), torque, time_s)[0]
@@ -97,7 +97,7 @@ def test_a_ring_that_is_not_reckoned_with_is_taken_for_the_sample() -> None:
         problem_alone(GRIPPER, model, torque, time_s, trace, noise_rad=noise_rad, ringing_s=ring_s)
         for ring_s in (ringing_s(GRIPPER), 0.0)
     )
-    found, wrong = (fit_from([posed], np.log(sample)) for posed in (with_it, without))
+    found, wrong = (fit_from([case_problem], np.log(sample)) for case_problem in (with_it, without))
     chi2, wrong_chi2 = (len(time_s) * (f.misfit_rad[0] / noise_rad) ** 2 for f in (found, wrong))
     assert wrong_chi2 > chi2 + 100
     slopes = with_it.residuals(found.x[0])[1] / noise_rad

@@ -13,12 +13,12 @@ from biogrip.identify import genetic, genetic_refined
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import WORD_BITS, GeneRange, Genome
-from biogrip.identify.problem import Problem, problem_of
+from biogrip.identify.problem import Problem, make_problem
 from biogrip.identify.redraws import redraws
 from biogrip.identify.selection import best
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
-from biogrip.response.misfit import together
+from biogrip.response.misfit import combine_misfits
 from tests.helpers.plain_genetic import chromosomes_of, decoded, identified
 from tests.helpers.problems import condensed_of
 
@@ -45,7 +45,7 @@ MODELS_SEARCHED = {
 }
 
 
-def posed(
+def case_problem(
     gripper: Gripper,
     steps: TorqueHistory,
     count: int,
@@ -60,7 +60,7 @@ def posed(
     noise = np.random.default_rng(3).standard_normal((count, len(time_s)))
     traces = clean + 0.1 * clean.max() * noise
     shared = condensed_of(steps, time_s, **how)
-    return [problem_of(gripper, model, steps, time_s, trace, RANGES, shared) for trace in traces]
+    return [make_problem(gripper, model, steps, time_s, trace, RANGES, shared) for trace in traces]
 
 
 def rng(seed: int) -> np.random.Generator:
@@ -96,7 +96,7 @@ def assert_same_in_groups(problems: list[Problem], settings: GeneticSettings) ->
 
 @pytest.mark.parametrize("reading", READINGS)
 def test_every_reading(reading: str, gripper: Gripper, steps: TorqueHistory) -> None:
-    problems = posed(gripper, steps, 5)
+    problems = case_problem(gripper, steps, 5)
     assert_same_in_groups(problems, READINGS[reading])
     for seed, problem in enumerate(problems):
         plain = identified(problem.misfit, problem.genome, READINGS[reading], rng(seed))
@@ -106,7 +106,7 @@ def test_every_reading(reading: str, gripper: Gripper, steps: TorqueHistory) -> 
 
 @pytest.mark.parametrize("name", MODELS_SEARCHED)
 def test_every_kind_of_model(name: str, gripper: Gripper, steps: TorqueHistory) -> None:
-    problems = posed(gripper, steps, 3, MODELS_SEARCHED[name])
+    problems = case_problem(gripper, steps, 3, MODELS_SEARCHED[name])
     assert_same_in_groups(problems, SMALL)
     (first, *_) = problems
     plain = identified(first.misfit, first.genome, SMALL, rng(0))
@@ -119,24 +119,24 @@ def test_misfits_that_form_the_responses(
     how: dict[str, Any], gripper: Gripper, steps: TorqueHistory
 ) -> None:
     few = replace(SMALL, population=10, survivors=5, max_generations=7)
-    assert_same_in_groups(posed(gripper, steps, 3, **how), few)
+    assert_same_in_groups(case_problem(gripper, steps, 3, **how), few)
 
 
 def test_unequal_arms(unequal_gripper: Gripper, steps: TorqueHistory) -> None:
-    assert_same_in_groups(posed(unequal_gripper, steps, 3), SMALL)
+    assert_same_in_groups(case_problem(unequal_gripper, steps, 3), SMALL)
 
 
 def test_the_papers_budget(gripper: Gripper, steps: TorqueHistory) -> None:
     """Larger than what is looked at together: seeds stop one after the other."""
     settings = GeneticSettings(500, 250, "pairs", 1, -1, 20, 0.5, 1, 20, 40, 200)
-    assert_same_in_groups(posed(gripper, steps, 8), settings)
+    assert_same_in_groups(case_problem(gripper, steps, 8), settings)
 
 
 def test_polished_populations(gripper: Gripper, steps: TorqueHistory) -> None:
     settings = genetic_refined.RefinedSettings(
         replace(SMALL, max_generations=8), genetic_refined.Polishing(2, 1)
     )
-    problems = posed(gripper, steps, 2)
+    problems = case_problem(gripper, steps, 2)
     polished = genetic_refined.identify_many
     alone = [polished([p], settings, [rng(s)])[0] for s, p in enumerate(problems)]
     found = polished(problems, settings, [rng(0), rng(1)])
@@ -146,7 +146,10 @@ def test_polished_populations(gripper: Gripper, steps: TorqueHistory) -> None:
 def test_progress_is_of_all_together(gripper: Gripper, steps: TorqueHistory) -> None:
     told: list[tuple[int, float]] = []
     found = genetic.identify_many(
-        posed(gripper, steps, 3), SMALL, [rng(s) for s in range(3)], lambda *now: told.append(now)
+        case_problem(gripper, steps, 3),
+        SMALL,
+        [rng(s) for s in range(3)],
+        lambda *now: told.append(now),
     )
     assert told[-1][0] == sum(answer.evaluations for answer in found)
     assert len(told) == max(answer.generations for answer in found)
@@ -205,7 +208,7 @@ def test_the_best_in_order(words: int, size: int) -> None:
 
 @pytest.mark.parametrize("branches", [1, 2, 5])
 def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: TorqueHistory) -> None:
-    (problem,) = posed(gripper, steps, 1, model_named("generalized_maxwell", branches))
+    (problem,) = case_problem(gripper, steps, 1, model_named("generalized_maxwell", branches))
     genome = problem.genome
     chromosomes = genome.draw(400, rng(0))
     codes = genome.code(chromosomes)
@@ -216,8 +219,8 @@ def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: Tor
 
 
 def test_a_misfit_does_not_depend_on_its_company(gripper: Gripper, steps: TorqueHistory) -> None:
-    problems = posed(gripper, steps, 4)
-    misfits = together([problem.misfit for problem in problems])
+    problems = case_problem(gripper, steps, 4)
+    misfits = combine_misfits([problem.misfit for problem in problems])
     genome = problems[0].genome
     samples: Array = genome.decode(genome.draw(4 * 997, rng(1))).reshape(4, 997, 4)
     traces = np.array([2, 0, 3, 1])

@@ -49,7 +49,7 @@ def test_white_noise_and_a_known_gripper_leave_the_fit_as_it_is() -> None:
     fit = trace_fit(POSED, TIMES, trace, find)
     expected = find(POSED.of(TIMES, trace))
     np.testing.assert_array_equal(fit.found.parameters, expected.parameters)
-    assert fit.colour is None
+    assert fit.noise_model is None
     assert not fit.outliers.any()
     assert fit.notes() == []
 
@@ -58,10 +58,13 @@ def test_an_uncertain_inertia_changes_the_ring_where_one_shows() -> None:
     """By half of what twice the uncertainty does; without a ring, nothing of it is fitted."""
     arm = POSED.gripper.left
     unsure = 0.05 * arm.inertia_kgm2
-    posed = replace(POSED, uncertainty={"left": {"inertia_kgm2": unsure}})
+    case_problem = replace(POSED, uncertainty={"left": {"inertia_kgm2": unsure}})
     times, parameters = np.linspace(1e-6, 4e-4, 400), np.exp(TRUTH)
-    assert gripper_functions(posed, times, parameters, inertia=False).shape == (0, len(times))
-    (row,) = gripper_functions(posed, times, parameters, inertia=True)
+    assert gripper_functions(case_problem, times, parameters, inertia=False).shape == (
+        0,
+        len(times),
+    )
+    (row,) = gripper_functions(case_problem, times, parameters, inertia=True)
     heavy, light = (
         simulated_rotation(
             replace(
@@ -91,9 +94,9 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
         name: {"stiffness_Nm_per_rad": value}
         for name, value in zip(("left", "right"), known, strict=True)
     }
-    posed = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
+    case_problem = replace(POSED, uncertainty=uncertainty, noise_rad=float(level))
     trace = noisy(Noise("gaussian", 0.02, "peak"))
-    fit = trace_fit(posed, TIMES, trace, find)
+    fit = trace_fit(case_problem, TIMES, trace, find)
     _, slopes = fit.problem.residuals(np.log(fit.found.parameters))
     told = [0, 2]  # k and c: nothing is told of c_p, and next to nothing of k_p.
 
@@ -126,10 +129,10 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
 def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", relaxing=Relaxing(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
-    posed = replace(POSED, coloured=True)
-    fit = trace_fit(posed, TIMES, noisy(noise), find)
-    assert fit.colour is not None
-    assert fit.colour.relaxing + fit.colour.flicker == pytest.approx(0.5, abs=0.25)
+    case_problem = replace(POSED, coloured=True)
+    fit = trace_fit(case_problem, TIMES, noisy(noise), find)
+    assert fit.noise_model is not None
+    assert fit.noise_model.relaxing + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
     # What is only just outside of the noise may be missed, or not.
     assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))
@@ -138,17 +141,17 @@ def test_noise_is_found_and_said() -> None:
     assert "correlated over some" in model
     assert f"{np.count_nonzero(fit.outliers)} samples of 801" in outliers
     assert fit.problem.residuals.freedom < 1000
-    other = posed.for_model(fit.problem, POSED.searched)
+    other = case_problem.for_model(fit.problem, POSED.searched)
     np.testing.assert_array_equal(other.residuals(TRUTH)[0], fit.problem.residuals(TRUTH)[0])
 
 
 def test_a_drift_changes_nothing_of_what_is_found() -> None:
     """It is fitted along whether it is there or not, so the same noise gives the same limits."""
-    posed = replace(POSED, coloured=True)
+    case_problem = replace(POSED, coloured=True)
     steady = Noise("gaussian", 0.02, "peak")
     drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
     one, other = (
-        trace_fit(posed, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
+        trace_fit(case_problem, TIMES, noisy(steady) + added, find) for added in (0 * drift, drift)
     )
     np.testing.assert_allclose(one.found.parameters[[0, 2]], other.found.parameters[[0, 2]], 1e-3)
     first, second = (each.problem.residuals(TRUTH)[1] for each in (one, other))
@@ -156,10 +159,10 @@ def test_a_drift_changes_nothing_of_what_is_found() -> None:
 
 
 def test_too_many_samples_for_a_colour_are_refused() -> None:
-    posed: CaseProblem = replace(POSED, coloured=True)
+    case_problem: CaseProblem = replace(POSED, coloured=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
-        trace_fit(posed, times, times, find)
+        trace_fit(case_problem, times, times, find)
 
 
 def test_outliers_are_as_rare_as_gaussian_noise_has_them() -> None:

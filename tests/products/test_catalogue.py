@@ -21,7 +21,7 @@ from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
 from biogrip.products.report import page
-from biogrip.running.sheet import Sheet, files_of, sheets_of
+from biogrip.running.rules import Rule, files_of, make_rules
 from biogrip.study.source import overlaid, read_config
 from tests.helpers.default import plan_of
 from tests.helpers.places import ROOT
@@ -51,10 +51,10 @@ ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 
 @pytest.fixture
-def everything(monkeypatch: pytest.MonkeyPatch) -> list[Sheet]:
+def everything(monkeypatch: pytest.MonkeyPatch) -> list[Rule]:
     """Sheets of the default study, its sweeps, and a case of every kind."""
     monkeypatch.chdir(ROOT)
-    return sheets_of(products().values(), plan_of(ROBUSTNESS + EVERYTHING))
+    return make_rules(products().values(), plan_of(ROBUSTNESS + EVERYTHING))
 
 
 def test_every_module_that_declares_something_is_found() -> None:
@@ -78,49 +78,49 @@ def test_every_product_is_found_by_its_name_alone() -> None:
         chosen(["fit", "fti"])
 
 
-def test_every_file_is_written_by_one_product_only(everything: list[Sheet]) -> None:
+def test_every_file_is_written_by_one_product_only(everything: list[Rule]) -> None:
     patterns = Counter(p for product in products().values() for p in product.writes.values())
     assert [pattern for pattern, count in patterns.items() if count > 1] == []
     files = Counter(files_of(everything))
     assert [file for file, count in files.items() if count > 1] == []
     # And no pattern could be filled in to be another's file.
-    for sheet in everything:
-        for pattern in sheet.outputs.values():
+    for rule in everything:
+        for pattern in rule.outputs.values():
             parts = re.split(r"{(\w+)}", pattern)
             filled = [
-                f"({sheet.constraints[part]})" if odd % 2 else re.escape(part)
+                f"({rule.constraints[part]})" if odd % 2 else re.escape(part)
                 for odd, part in enumerate(parts)
             ]
-            own = set(files_of([sheet]))
+            own = set(files_of([rule]))
             fits = {file for file in files if re.fullmatch("".join(filled), file)}
             assert fits <= own, pattern
 
 
-def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[Sheet]) -> None:
+def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[Rule]) -> None:
     written = set(files_of(everything))
-    for sheet in everything:
-        for product in sheet.products:
-            for job in product.jobs(sheet.plan):
-                for read in product.inputs(sheet.plan, job).values():
+    for rule in everything:
+        for product in rule.products:
+            for job in product.jobs(rule.plan):
+                for read in product.inputs(rule.plan, job).values():
                     assert set(read) - written <= {"data/example_trace.csv"}, (product.name, job)
 
 
-def test_the_sheets_make_every_job_of_every_product_once(everything: list[Sheet]) -> None:
+def test_the_sheets_make_every_job_of_every_product_once(everything: list[Rule]) -> None:
     """One command makes them, for one of the sheet's jobs."""
     for product in products().values():
-        sheets = [sheet for sheet in everything if product in sheet.products]
-        made = [dict(job) for sheet in sheets for job in sheet.jobs]
+        rules = [rule for rule in everything if product in rule.products]
+        made = [dict(job) for rule in rules for job in rule.jobs]
         plan = everything[0].plan
         assert sorted(made, key=str) == sorted(map(dict, product.jobs(plan)), key=str), product.name
 
 
-def test_the_page_names_the_rule_that_makes_each_file(everything: list[Sheet]) -> None:
+def test_the_page_names_the_rule_that_makes_each_file(everything: list[Rule]) -> None:
     """Cases have not all the same figures, so there are several rules of a sheet."""
     rules = {
-        pattern.format(**job): sheet.name
-        for sheet in everything
-        for job in sheet.jobs
-        for pattern in sheet.outputs.values()
+        pattern.format(**job): rule.name
+        for rule in everything
+        for job in rule.jobs
+        for pattern in rule.outputs.values()
     }
     shown = page.settings(everything[0].plan.study, {})
     entries = (*shown.figures, *shown.tables)
@@ -137,17 +137,17 @@ def test_every_overlay_is_planned(
     over: dict[str, Any] = {}
     for name in overlay:
         over = overlaid(over, read_config(ROOT / "config" / name))
-    sheets = sheets_of(products().values(), plan_of(yaml.safe_dump(over)))
-    told_apart = [sheet.digest(job) for sheet in sheets for job in sheet.jobs]
+    rules = make_rules(products().values(), plan_of(yaml.safe_dump(over)))
+    told_apart = [rule.digest(job) for rule in rules for job in rule.jobs]
     assert len(set(told_apart)) > 10
 
 
-def test_no_command_nor_parameter_is_long(everything: list[Sheet]) -> None:
+def test_no_command_nor_parameter_is_long(everything: list[Rule]) -> None:
     """However many cases, seeds and points there are."""
-    for sheet in everything:
-        for job in sheet.jobs:
-            assert len(f"biogrip make {sheet.command(job)} 2> {sheet.log.format(**job)}") <= 300
-            assert len(sheet.digest(job)) <= 300
+    for rule in everything:
+        for job in rule.jobs:
+            assert len(f"biogrip make {rule.command(job)} 2> {rule.log.format(**job)}") <= 300
+            assert len(rule.digest(job)) <= 300
 
 
 def changed(value: Any) -> Iterator[Any]:
@@ -183,14 +183,14 @@ def changed(value: Any) -> Iterator[Any]:
         raise AssertionError(f"{value!r}")
 
 
-def test_a_digest_changes_with_every_setting(everything: list[Sheet]) -> None:
+def test_a_digest_changes_with_every_setting(everything: list[Rule]) -> None:
     """Of one job of each product: with each field, item and key."""
-    for sheet in everything:
-        for product in sheet.products:
-            for job in islice(product.jobs(sheet.plan), 1):
-                settings = product.settings(sheet.plan.study, job)
+    for rule in everything:
+        for product in rule.products:
+            for job in islice(product.jobs(rule.plan), 1):
+                settings = product.settings(rule.plan.study, job)
                 ours = digest(settings)
-                assert ours == digest(product.settings(sheet.plan.study, job))
+                assert ours == digest(product.settings(rule.plan.study, job))
                 others = [digest(other) for other in changed(settings)]
                 assert ours not in others, product.name
                 assert len(others) >= (settings is not None)
@@ -212,8 +212,8 @@ def test_a_digest_has_twelve_digits(wrapped: Callable[[float], object]) -> None:
 
 
 def digests() -> str:
-    sheets = sheets_of(products().values(), plan_of())
-    return "".join(f"{sheet.name} {[*map(sheet.digest, sheet.jobs)]}\n" for sheet in sheets)
+    rules = make_rules(products().values(), plan_of())
+    return "".join(f"{rule.name} {[*map(rule.digest, rule.jobs)]}\n" for rule in rules)
 
 
 def test_a_digest_is_the_same_in_every_process() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import styled
-from biogrip.products.files.posterior import SAMPLES, TOLD, read_samples
+from biogrip.products.files.posterior import POSTERIOR, SAMPLES, read_samples
 from biogrip.products.plan import Plan
 from biogrip.products.stages.judgement import JUDGED
 from biogrip.products.stages.measurement import MEASUREMENT
@@ -103,7 +103,9 @@ def test_models_are_compared_where_nothing_is_known(folder: Path) -> None:
     assert [(row["case"], row["model"]) for row in rows] == [("mine", "Maxwell liquid")]
     assert float(rows[0]["delta_log_evidence"]) == 0.0
     assert rows[0]["reliable"] == "yes"
-    assert json.loads((folder / TOLD.format(case="liquid_drop_2")).read_text())["evidence"] == []
+    assert (
+        json.loads((folder / POSTERIOR.format(case="liquid_drop_2")).read_text())["evidence"] == []
+    )
 
 
 def test_a_second_run_gives_the_same_bytes(folder: Path, study: Study, tmp_path: Path) -> None:
@@ -114,14 +116,14 @@ def test_a_second_run_gives_the_same_bytes(folder: Path, study: Study, tmp_path:
         MEASUREMENT.run(plan, case | {"batch": "seeds_0-0"})
         JUDGED.run(plan, case)
         SAMPLED.run(plan, case)
-    for pattern in (TOLD, SAMPLES):
+    for pattern in (POSTERIOR, SAMPLES):
         file = pattern.format(case="mine")
         assert (tmp_path / file).read_bytes() == (folder / file).read_bytes()
 
 
 def test_the_figure_shows_samples_interval_and_truth(folder: Path, study: Study) -> None:
     case = study.case("mine")
-    told: dict[str, Any] = json.loads((folder / TOLD.format(case="mine")).read_text())
+    told: dict[str, Any] = json.loads((folder / POSTERIOR.format(case="mine")).read_text())
     model = case.sample.model
     values = read_samples(folder / SAMPLES.format(case="mine"), model)
     with styled():

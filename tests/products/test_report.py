@@ -187,20 +187,20 @@ def test_a_profile_is_the_library_s(opened: Opened, finished: Path) -> None:
     for index, quantity in enumerate(("k", "k_p", "c", "c_p", "c + c_p")):
         (found,) = (q for q in verdicts["quantities"] if q["quantity"] == quantity)
         values = np.array(found["profile"]["values"])
-        expected = np.array(found["profile"]["rises"])
+        expected = np.array(found["profile"]["increases"])
         # Further out another basin may begin, for which the page does not look.
         shown = np.flatnonzero(expected < 3 * verdicts["threshold"])
         # The page's elements in their order: branch and parallel ones of each kind.
         names = opened.page.evaluate("biogrip.cases[0].elements.map(e => e.name)")
         chosen = "sum" if index == 4 else names.index(quantity)
-        rises = opened.page.evaluate(
+        increases = opened.page.evaluate(
             """([chosen, values]) => {
                 const item = biogrip.cases[0], fit = item.methods[0].fits[0];
                 return biogrip.profileOf(item, item.trace(0), fit.sample, chosen, values).rises;
             }""",
             [chosen, np.log(values[shown]).tolist()],
         )
-        assert np.allclose(rises, expected[shown], rtol=0.01, atol=0.01), quantity
+        assert np.allclose(increases, expected[shown], rtol=0.01, atol=0.01), quantity
         compared += len(shown)
     assert compared > 50
 

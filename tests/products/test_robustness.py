@@ -9,7 +9,7 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.at_truth import headlines
 from biogrip.instrument.gripper import Arm, Gripper
@@ -89,7 +89,7 @@ def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
 
 def _response(parameters: np.ndarray) -> np.ndarray:
     arm = Arm(1.0e-14, 3.3e-12, 4.4e-7)
-    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
     step = step_response(Gripper(1.5e-3, 75.0, arm, arm), generalized_maxwell(parameters))
     return rotation(step, steps, TIME_S)[0]
 

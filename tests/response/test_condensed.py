@@ -11,7 +11,7 @@ from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import ringing_s
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
-from biogrip.response.whitening import Colour, Whitening
+from biogrip.response.whitening import NoiseModel, Whitening
 from tests.helpers.problems import condensed_of, condensed_rows
 from tests.helpers.responses import PROTOCOLS, random_samples
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
@@ -28,8 +28,8 @@ DENSE = {
 
 def products(rows: Array, slopes: Array) -> Array:
     """Sum of squares, gradients and information: all that least squares sees."""
-    together = np.vstack((rows, slopes))
-    found: Array = together @ together.T
+    combine_misfits = np.vstack((rows, slopes))
+    found: Array = combine_misfits @ combine_misfits.T
     return found
 
 
@@ -114,7 +114,7 @@ def test_the_nonlinear_model_of_arms_that_ring(gripper: Gripper, times: str) -> 
 def test_in_coloured_noise_every_sample_of_arms_that_ring_has_a_row(gripper: Gripper) -> None:
     torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE["uniform"][::100]
     nuisance = nuisance_basis(time_s, offset=True, drift=True)
-    whitening = Whitening(time_s, Colour(0.3, 5.0, 0.2), nuisance)
+    whitening = Whitening(time_s, NoiseModel(0.3, 5.0, 0.2), nuisance)
     condensed = Condensed(
         torque, time_s, nuisance, ringing_s=ringing_s(gripper), whitening=whitening
     )

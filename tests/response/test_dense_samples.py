@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.response.dense_samples import DenseSamples
-from biogrip.response.mode_growth import growth_of_modes
+from biogrip.response.mode_growth import compute_growth
 from tests.helpers.responses import PROTOCOLS
 
 _RNG = np.random.default_rng(4)
@@ -27,8 +27,7 @@ def test_products_are_those_of_all_samples(protocol: str, times: str) -> None:
     dense = DenseSamples(torque, time_s)
     rates = -np.geomspace(1e-6, 1e3, 25)
     samples, values = (
-        np.concatenate(growth_of_modes(rates[None], torque, t)[0][0])
-        for t in (time_s, dense.time_s)
+        np.concatenate(compute_growth(rates[None], torque, t)[0][0]) for t in (time_s, dense.time_s)
     )
     size = np.linalg.norm(samples, axis=1, keepdims=True)
     samples, values = samples / size, values / size

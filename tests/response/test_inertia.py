@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.network import Network
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.inertia import (
@@ -75,7 +75,7 @@ def test_an_empty_gripper_is_reckoned_with() -> None:
     )
     change = np.linalg.norm(np.exp(-slow * time_s) - ring)
     size = np.sqrt(np.mean((1 - np.exp(-slow * time_s)) ** 2))
-    found = change_by_inertia(gripper, torque_history((held(1.0, 1e-9),)), time_s)
+    found = change_by_inertia(gripper, torque_history((hold(1.0, 1e-9),)), time_s)
     # The size is that at every other sample.
     assert found >= change / size * (1 - 1e-3)
 
@@ -88,7 +88,7 @@ def test_rings_are_over_when_they_are_said_to_be(
     """Even those of a bare spring, from which only the arms' own dampers take energy."""
     gripper, none = request.getfixturevalue(arms), np.zeros((1, 0))
     spring = Network(np.array([stiffness]), np.zeros(1), none, none)
-    step = torque_history((held(1.0, 1e-9),))
+    step = torque_history((hold(1.0, 1e-9),))
     after_s = ringing_s(gripper) * np.linspace(1.0, 1.5, 500)
     with_it, without = both_ways(gripper, spring, step, after_s)
     assert np.max(np.abs(with_it - without)) < 1e-14 * np.max(np.abs(without))
@@ -132,9 +132,9 @@ def test_the_same_arms_sampled_fast_show_it(interval_s: float, level: float) -> 
     clean = simulated_rotation(problem.gripper, sample, TORQUE, time_s, nonlinear=False)[0]
     noisy = add_noise(clean, Noise("gaussian", level, "peak"), np.random.default_rng(1))
     assert problem.shows_inertia(time_s, noisy)
-    posed = problem.of(time_s, noisy)
-    assert posed.residuals.inertia
-    assert not posed.residuals.plain
+    case_problem = problem.of(time_s, noisy)
+    assert case_problem.residuals.inertia
+    assert not case_problem.residuals.plain
     # Noise that is given counts, not that which neighbours suggest.
     assert not problem.shows_inertia(time_s, noisy, noise_rad=1e4 * float(clean.max()))
 
@@ -149,12 +149,12 @@ def test_power_laws_ring_whoever_else_does(gripper: Gripper, name: str) -> None:
     near = np.log(MODEL_PARAMETERS[name])
     rng = np.random.default_rng(2)
     logs = np.clip(near + rng.normal(size=(8, 3)), *log_range(model))
-    step = torque_history((held(0.5, 1.6e-9), held(1.0, 0.4e-9)))
+    step = torque_history((hold(0.5, 1.6e-9), hold(1.0, 0.4e-9)))
     time_s = np.sort(np.concatenate([start + np.geomspace(1e-7, 0.4, 15) for start in (0, 0.5)]))
     ringing = while_ringing(gripper, step, time_s)
     allowed = np.where(ringing, 1e-12, 3.1e-8 / ringing_s(gripper) ** 2)
-    together = linear_responses(gripper, model, step, time_s, np.exp(logs), inertia=True)
-    for own, rows in zip(np.exp(logs), together, strict=True):
+    combine_misfits = linear_responses(gripper, model, step, time_s, np.exp(logs), inertia=True)
+    for own, rows in zip(np.exp(logs), combine_misfits, strict=True):
         alone = linear_responses(gripper, model, step, time_s, own[None], inertia=True)[0]
         np.testing.assert_array_equal(alone, rows)
         network = model.network(own[None])

@@ -3,7 +3,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.maxwell_models import damper, generalized_maxwell, maxwell
-from biogrip.experiment.protocol import TorqueHistory, held, torque_at, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_at, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.jaw_force import jaw_force, jaw_force_response, linear_jaw_force
 from biogrip.response.linear import rotation, step_response
@@ -34,7 +34,7 @@ def test_equal_arms_over_the_whole_search_range(
 
 def test_unequal_arms_and_torques(unequal_gripper: Gripper, steps: TorqueHistory) -> None:
     assert worst_error(unequal_gripper, steps, random_samples(100, 310)) < 1e-11
-    apart = torque_history((held(50.0, 1.6e-9, 0.9e-9), held(350.0, 0.32e-9, 0.4e-9)))
+    apart = torque_history((hold(50.0, 1.6e-9, 0.9e-9), hold(350.0, 0.32e-9, 0.4e-9)))
     assert worst_error(unequal_gripper, apart, random_samples(50, 311)) < 1e-10
 
 
@@ -63,7 +63,7 @@ def test_nonlinear_against_radau(case: int) -> None:
     # Of stiffer samples Radau's own force is a difference of nearly equal displacements.
     sample, factor = 10 ** rng.uniform([-1, -3, 0, -3], [2, 1, 2, 1]), rng.uniform(1, 10)
     taus = 1.6e-9 * factor, 0.32e-9 * factor
-    torque = torque_history(tuple(held(200.0, tau) for tau in taus))
+    torque = torque_history(tuple(hold(200.0, tau) for tau in taus))
     time_s = np.concatenate((np.geomspace(0.1, 200, 25), 200 + np.geomspace(0.1, 200, 25)))
     time_s[24] = np.nextafter(200, 0)
     network = generalized_maxwell(sample)
@@ -78,7 +78,7 @@ def test_nonlinear_against_radau(case: int) -> None:
 def test_nonlinear_force_follows_the_work_of_unequal_arms(unequal_gripper: Gripper) -> None:
     """Of a bare damper the force's impulse is what it gave way times c_p."""
     c_p = 20.0
-    torque = torque_history((held(40.0, 3e-9, 2e-9),))
+    torque = torque_history((hold(40.0, 3e-9, 2e-9),))
     x, weights = np.polynomial.legendre.leggauss(40)
     edges = np.concatenate(([0.0], np.geomspace(1e-6, 40.0, 40)))
     half = 0.5 * np.diff(edges)
@@ -102,7 +102,7 @@ def test_what_is_left_in_the_end(gripper: Gripper) -> None:
     np.testing.assert_allclose(response.static[:, 0, 0], expected, rtol=1e-14)
     liquid = jaw_force_response(gripper, maxwell([[1.0, 10.0]]))
     assert liquid.static[0, 0, 0] == 0
-    torque = torque_history((held(5000.0, 1.6e-9),))
+    torque = torque_history((hold(5000.0, 1.6e-9),))
     late = linear_jaw_force(liquid, torque, np.array([1000.0, 2000.0]))[0]
     slow = liquid.rates.real.max()
     assert late[1] / late[0] == pytest.approx(np.exp(1000 * slow), rel=1e-12)
@@ -111,7 +111,7 @@ def test_what_is_left_in_the_end(gripper: Gripper) -> None:
 
 def test_jaws_press_while_the_torque_is_held(gripper: Gripper) -> None:
     """Without inertia nothing overshoots: a first step presses every sample, ever less."""
-    torque = torque_history((held(400.0, 1.6e-9),))
+    torque = torque_history((hold(400.0, 1.6e-9),))
     network = generalized_maxwell(random_samples(1000, 14))
     force = jaw_force(
         gripper, network, torque, np.geomspace(1e-3, 400, 60), nonlinear=False, inertia=False

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from biogrip.arrays import Array
 from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.response.linear import rotation, step_response
@@ -42,7 +42,7 @@ def test_unequal_arms_over_the_whole_search_range(
 
 def test_unequal_torques(gripper: Gripper, unequal_gripper: Gripper) -> None:
     steps = torque_history(
-        (held(50.0, 1.6e-9, 0.9e-9), held(150.0, 0.0, 0.4e-9), held(200.0, 0.32e-9))
+        (hold(50.0, 1.6e-9, 0.9e-9), hold(150.0, 0.0, 0.4e-9), hold(200.0, 0.32e-9))
     )
     for arms in (gripper, unequal_gripper):
         assert worst_error(arms, steps, random_samples(25, 999)) < 1e-10
@@ -56,7 +56,7 @@ def test_mirrored_gripper_swaps_its_arms(unequal_gripper: Gripper) -> None:
         unequal_gripper.right,
         unequal_gripper.left,
     )
-    right_only = torque_history((held(400.0, 0.0, 1.6e-9),))
+    right_only = torque_history((hold(400.0, 0.0, 1.6e-9),))
     network = generalized_maxwell(random_samples(200, 5))
     ours, theirs = (
         rotation(step_response(arms, network, symmetric=False), right_only, TIMES)
@@ -98,7 +98,7 @@ def test_against_radau_with_inertia() -> None:
         )
         state = solved.y[:, -1]
         integrated.append(solved.y[0, 1:])
-    steps = torque_history((held(4.0, 1.6e-9), held(4.0, 0.32e-9)))
+    steps = torque_history((hold(4.0, 1.6e-9), hold(4.0, 0.32e-9)))
     time_s = np.concatenate((grid, 4 + grid[1:]))
     ours = rotation(step_response(gripper, generalized_maxwell(sample)), steps, time_s)[0]
     # Radau's local tolerance, over a few thousand steps.

@@ -17,7 +17,7 @@ from tests.helpers.responses import SAMPLING_TIMES as TIMES
 MANY_BRANCHES = {branches: model_named("generalized_maxwell", branches) for branches in (2, 3, 4)}
 
 
-def posed(
+def case_problem(
     gripper: Gripper, model: SampleModel, protocol: str, times: str, *, nuisance: bool = False
 ) -> Residuals:
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
@@ -66,7 +66,9 @@ def test_rows_and_slopes_are_those_of_one_at_a_time(
     request: pytest.FixtureRequest, arms: str, protocol: str, times: str, nuisance: bool
 ) -> None:
     model = MODELS["generalized_maxwell"]
-    residuals = posed(request.getfixturevalue(arms), model, protocol, times, nuisance=nuisance)
+    residuals = case_problem(
+        request.getfixturevalue(arms), model, protocol, times, nuisance=nuisance
+    )
     assert_alike(residuals, samples(model, 20))
 
 
@@ -76,7 +78,7 @@ def test_every_model(gripper: Gripper, name: str, protocol: str) -> None:
     rng = np.random.default_rng(5)
     middle = np.log(MODEL_PARAMETERS[name])
     x = np.clip(middle + rng.normal(size=(20, len(middle))), *log_range(MODELS[name]))
-    assert_alike(posed(gripper, MODELS[name], protocol, "few"), x)
+    assert_alike(case_problem(gripper, MODELS[name], protocol, "few"), x)
 
 
 @pytest.mark.parametrize("branches", MANY_BRANCHES)
@@ -86,7 +88,7 @@ def test_many_branches(unequal_gripper: Gripper, branches: int) -> None:
     dampers = np.log(np.geomspace(1.0, 1e3, branches))
     x = np.concatenate((np.zeros(branches + 1), dampers, [-3.0]))
     near = x + 0.3 * rng.normal(size=(10, len(x)))
-    assert_alike(posed(unequal_gripper, model, "steps", "few"), near)
+    assert_alike(case_problem(unequal_gripper, model, "steps", "few"), near)
 
 
 @pytest.mark.parametrize("arms", ["gripper", "unequal_gripper"])
@@ -96,10 +98,12 @@ def test_rows_do_not_depend_on_who_else_is_there(
 ) -> None:
     """Byte for byte, for any subset in any order, down to a single one."""
     model = MANY_BRANCHES[2] if name == "two branches" else MODELS[name]
-    residuals = posed(request.getfixturevalue(arms), model, "steps", "few")
+    residuals = case_problem(request.getfixturevalue(arms), model, "steps", "few")
     x = samples(model, 40)
-    together = residuals.condensed_responses(x)
+    combine_misfits = residuals.condensed_responses(x)
     rng = np.random.default_rng(7)
     for count in (1, 1, 1, 2, 3, 7, 23, 40):
         chosen = rng.permutation(40)[:count]
-        np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])
+        np.testing.assert_array_equal(
+            residuals.condensed_responses(x[chosen]), combine_misfits[chosen]
+        )

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from biogrip.experiment.protocol import TorqueHistory, drives, held, sample_times, torque_history
+from biogrip.experiment.protocol import TorqueHistory, drives, hold, sample_times, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
@@ -14,14 +14,14 @@ MODEL = MODELS["generalized_maxwell"]
 TRUTH = np.array([35.0, 12.3, 299.9, 1e-3])
 
 PROTOCOLS = {
-    "paper": ((held(200.0, 1.6e-9), held(200.0, 0.32e-9)), 10.0),
-    "one phase": ((held(300.0, 1.6e-9),), 3.0),
-    "step between samples": ((held(33.37, 1e-9), held(60.0, 2e-9)), 1.7),
+    "paper": ((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)), 10.0),
+    "one phase": ((hold(300.0, 1.6e-9),), 3.0),
+    "step between samples": ((hold(33.37, 1e-9), hold(60.0, 2e-9)), 1.7),
     "phase shorter than a sample": (
-        (held(20.0, 1e-9), held(0.05, 9e-9), held(30.0, 0.0)),
+        (hold(20.0, 1e-9), hold(0.05, 9e-9), hold(30.0, 0.0)),
         2.0,
     ),
-    "unequal torques": ((held(50.0, 1e-9, 2e-9), held(50.0, 2e-9, 0.0)), 5.0),
+    "unequal torques": ((hold(50.0, 1e-9, 2e-9), hold(50.0, 2e-9, 0.0)), 5.0),
 }
 
 
@@ -88,7 +88,7 @@ def test_times_of_steps_are_rounded_to_samples(gripper: Gripper) -> None:
     held_s = [0.1 + 0.2, 0.3, 0.29999999999999993]
     misfits = [
         SeriesMisfit(
-            gripper, MODEL, torque_history((held(t, 1e-9), held(0.5, 2e-9))), 0.1, 1e-6 * trace
+            gripper, MODEL, torque_history((hold(t, 1e-9), hold(0.5, 2e-9))), 0.1, 1e-6 * trace
         )(samples)
         for t in held_s
     ]
@@ -97,7 +97,7 @@ def test_times_of_steps_are_rounded_to_samples(gripper: Gripper) -> None:
 
 @pytest.mark.parametrize("count", [2, 3, 5, 1_000_001])
 def test_few_and_many_samples(count: int, gripper: Gripper) -> None:
-    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
     time_s = np.linspace(0, 400.0, count)
     trace = 1e-5 * np.random.default_rng(11).standard_normal(count)
     samples = np.vstack((TRUTH, random_samples(7, 12)))

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, hold, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.instrument.linkage import rotation_of_tip
 from biogrip.response.linear import RIGHT, rotation, step_response
@@ -88,7 +88,7 @@ def radau(
 def steps_of(torques: list[tuple[float, ...]]) -> TorqueHistory:
     edges = [0.0, *(end for end, _, _ in torques)]
     phases = [
-        held(edges[i + 1] - edges[i], left, right) for i, (_, left, right) in enumerate(torques)
+        hold(edges[i + 1] - edges[i], left, right) for i, (_, left, right) in enumerate(torques)
     ]
     return torque_history(tuple(phases))
 
@@ -202,13 +202,13 @@ def test_with_inertia_against_radau_for_a_damped_gripper() -> None:
         slope, (0, 100), np.zeros(3), "Radau", time_s, rtol=1e-10, atol=[1e-16, 1e-12, 1e-18]
     )
     ours = nonlinear_rotation(
-        gripper, generalized_maxwell(sample), torque_history((held(100.0, torque),)), time_s
+        gripper, generalized_maxwell(sample), torque_history((hold(100.0, torque),)), time_s
     )[0]
     assert np.max(np.abs(ours - solved.y[0])) < 1e-7 * ours.max()
     # The nonlinearity is there to be seen.
     linear = rotation(
         step_response(gripper, generalized_maxwell(sample)),
-        torque_history((held(100.0, torque),)),
+        torque_history((hold(100.0, torque),)),
         time_s,
     )[0]
     assert np.max(np.abs(ours - linear)) > 1e-3 * ours.max()
@@ -220,7 +220,7 @@ def test_energy_balance_closes() -> None:
     gripper = Gripper(1.5e-3, 55.0, arm, arm)
     k, k_p, c, c_p = sample = np.array([2.0, 0.2, 20.0, 1.0])
     ramp, swing = Load(0.0, 2e-9), Load(2e-8, 0.0, 0.0, (Harmonic(8e-9, 1.5, -math.pi / 2),))
-    torque = torque_history((Phase(10.0, ramp, ramp), Phase(10.0, swing, swing), held(10.0, 5e-9)))
+    torque = torque_history((Phase(10.0, ramp, ramp), Phase(10.0, swing, swing), hold(10.0, 5e-9)))
     network = generalized_maxwell(sample)
     found = correction(gripper, network, torque, FINE)
     linear = step_response(gripper, network, inertia=False)
@@ -300,7 +300,7 @@ def test_rotation_of_a_tip_against_50_digits(gripper: Gripper) -> None:
 
 def test_both_arms_of_a_symmetric_gripper_turn_alike(gripper: Gripper) -> None:
     network = generalized_maxwell(np.array([1.0, 1e-4, 10.0, 1e-3]))
-    torque = torque_history((held(100.0, 1e-8),))
+    torque = torque_history((hold(100.0, 1e-8),))
     left = nonlinear_rotation(gripper, network, torque, TIMES[TIMES < 100])
     right = nonlinear_rotation(gripper, network, torque, TIMES[TIMES < 100], RIGHT)
     np.testing.assert_allclose(left, right, rtol=1e-14)
@@ -309,4 +309,4 @@ def test_both_arms_of_a_symmetric_gripper_turn_alike(gripper: Gripper) -> None:
 def test_too_large_a_torque_is_refused(gripper: Gripper) -> None:
     network = generalized_maxwell(np.array([1e-3, 1e-4, 1e-3, 1e-3]))
     with pytest.raises(BiogripError, match="closes the arms so far"):
-        nonlinear_rotation(gripper, network, torque_history((held(100.0, 1e-5),)), TIMES[:10])
+        nonlinear_rotation(gripper, network, torque_history((hold(100.0, 1e-5),)), TIMES[:10])

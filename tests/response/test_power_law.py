@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from biogrip.arrays import Array
 from biogrip.experiment.maxwell_models import generalized_maxwell
 from biogrip.experiment.network import Network
-from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.instrument.gripper import Arm, Gripper
@@ -31,7 +31,7 @@ from tests.helpers.power_law import (
 TAU = 1.6e-9
 TIMES = np.geomspace(SHORTEST_S, LONGEST_S, 21)
 # A trace's: soon after each step, and late.
-SEEN = np.array([0.1, 0.3, 2.0, 30.0, 199.9, 200.1, 201.0, 260.0, 400.0])
+VISIBLE = np.array([0.1, 0.3, 2.0, 30.0, 199.9, 200.1, 201.0, 260.0, 400.0])
 SAMPLES = [
     ("fractional_kelvin_voigt", [0.3, 10.0, 0.4]),
     ("fractional_kelvin_voigt", [1e-3, 0.05, 0.12]),
@@ -48,7 +48,7 @@ def arms_of(stiffness: float, damping: float) -> Gripper:
 
 def creep(gripper: Gripper, model: str, sample: list[float]) -> Array:
     """Rotation after one step, without inertia."""
-    constant = torque_history((held(2 * LONGEST_S, TAU),))
+    constant = torque_history((hold(2 * LONGEST_S, TAU),))
     response = step_response(gripper, MODELS[model].network(sample), inertia=False)
     found: Array = rotation(response, constant, TIMES)[0]
     return found
@@ -102,7 +102,7 @@ def test_relaxation_between_stiff_arms(model: str, exponent: float) -> None:
             modulus * t**-exponent * mittag_leffler(beta, beta, modulus / other * t**beta)
             for t in times
         ])  # fmt: skip
-    constant = torque_history((held(2e4, TAU),))
+    constant = torque_history((hold(2e4, TAU),))
     given = stiff, MODELS[model].network(sample), constant, times
     force = jaw_force(*given, nonlinear=False, inertia=False)[0]
     shortening = 2 * stiff.lever_m * TAU / 1e5
@@ -118,9 +118,9 @@ def test_the_paper_s_gripper_and_protocol_against_inversion(
     gripper: Gripper, steps: TorqueHistory, model: str, sample: list[float], inertia: bool
 ) -> None:
     """Of the response 1e-6, at times of a trace; arms of their own damping and inertia."""
-    exact = rotations(gripper, by_hand(model, sample), steps, SEEN, inertia=inertia)[0]
+    exact = rotations(gripper, by_hand(model, sample), steps, VISIBLE, inertia=inertia)[0]
     response = step_response(gripper, MODELS[model].network(sample), inertia=inertia)
-    np.testing.assert_allclose(rotation(response, steps, SEEN)[0], exact, rtol=1e-6)
+    np.testing.assert_allclose(rotation(response, steps, VISIBLE)[0], exact, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("model", "sample"), SAMPLES)
@@ -129,13 +129,13 @@ def test_arms_driven_differently_against_inversion(
     request: pytest.FixtureRequest, arms: str, model: str, sample: list[float]
 ) -> None:
     given: Gripper = request.getfixturevalue(arms)
-    torque = torque_history((held(200.0, 1.6e-9, 1.0e-9), held(200.0, 0.3e-9, 0.5e-9)))
-    exact = rotations(given, by_hand(model, sample), torque, SEEN[::2], inertia=False)
+    torque = torque_history((hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)))
+    exact = rotations(given, by_hand(model, sample), torque, VISIBLE[::2], inertia=False)
     response = step_response(
         given, MODELS[model].network(sample), symmetric=False, inertia=False, both_arms=True
     )
     for arm in (LEFT, RIGHT):
-        ours = rotation(response, torque, SEEN[::2], arm)[0]
+        ours = rotation(response, torque, VISIBLE[::2], arm)[0]
         np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
@@ -152,7 +152,7 @@ def by_hand(model: str, sample: list[float]) -> Callable[[Any], Any]:
 def test_the_ring_against_inversion(gripper: Gripper) -> None:
     """The first milliseconds, with inertia: the contour is wide enough for the ring."""
     sample = [0.3, 0.02, 0.5]
-    step = torque_history((held(1.0, TAU),))
+    step = torque_history((hold(1.0, TAU),))
     times = np.geomspace(2e-5, 2e-3, 12)
     response = step_response(gripper, MODELS["fractional_kelvin_voigt"].network(sample))
     exact = rotations(
@@ -169,7 +169,7 @@ def test_derivatives_against_those_of_mittag_leffler_functions(exponent: float) 
     gripper, sample = arms_of(4.4e-7, 1e-25), np.array([0.2, 0.5, exponent])
     u = 2 * gripper.lever_m**2
     times = np.geomspace(0.1, 400, 9)
-    constant = torque_history((held(400.0, TAU),))
+    constant = torque_history((hold(400.0, TAU),))
 
     def closed(logarithms: Array) -> Array:
         k_p, modulus, alpha = np.exp(logarithms)
@@ -209,7 +209,7 @@ def test_few_branches_are_solved_like_many(
     given: Gripper = damped if arms == "damped" else request.getfixturevalue(arms)
     network = generalized_maxwell(FEW)
     tau = (1.6e-9,) if symmetric else (1.6e-9, 1.0e-9)
-    torque = torque_history((held(200.0, *tau), held(200.0, *(0.2 * t for t in tau))))
+    torque = torque_history((hold(200.0, *tau), hold(200.0, *(0.2 * t for t in tau))))
     times = np.geomspace(1e-5, 400, 60)
     by_polynomials = step_response(
         given, network, symmetric=symmetric, inertia=inertia, both_arms=True
@@ -244,7 +244,7 @@ def test_equal_branches_add_up(gripper: Gripper, steps: TorqueHistory) -> None:
     few = Network(np.array([0.2]), np.array([0.5]), k[None], c[None])
     for inertia in (False, True):
         ours, theirs = (
-            rotation(step_response(gripper, network, inertia=inertia), steps, SEEN)[0]
+            rotation(step_response(gripper, network, inertia=inertia), steps, VISIBLE)[0]
             for network in (many, few)
         )
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
@@ -275,7 +275,7 @@ def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Grippe
     network = MODELS["fractional_kelvin_voigt"].network([0.02, 0.1, 0.35])
     k_p, c_p, k, rates = network.k_p[0], network.c_p[0], network.k[0], (network.k / network.c)[0]
     arm, hat = gripper.left, np.radians(gripper.reference_angle_deg)
-    torque = torque_history((held(200.0, TAU),))
+    torque = torque_history((hold(200.0, TAU),))
 
     def slope(_: float, state: Array) -> Array:
         phi, dampers = state[0], state[1:]
@@ -285,13 +285,13 @@ def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Grippe
         phi_rate = rest / (arm.damping_Nms_per_rad + 2 * c_p * b * b)
         return np.concatenate(([phi_rate], rates * (2 * u - dampers)))
 
-    linear = rotation(step_response(gripper, network), torque, SEEN[:5])[0]
+    linear = rotation(step_response(gripper, network), torque, VISIBLE[:5])[0]
     scale = 1e-11 * linear.max()
     atol = np.concatenate(([scale], np.full(len(k), scale * gripper.arm_length_m)))
     solved = solve_ivp(
-        slope, (0, 200), np.zeros(1 + len(k)), "Radau", SEEN[:5], rtol=1e-8, atol=atol
+        slope, (0, 200), np.zeros(1 + len(k)), "Radau", VISIBLE[:5], rtol=1e-8, atol=atol
     )
-    ours = nonlinear_rotation(gripper, network, torque, SEEN[:5])[0]
+    ours = nonlinear_rotation(gripper, network, torque, VISIBLE[:5])[0]
     assert np.max(np.abs(ours - linear)) > 1e-4 * linear.max()
     # Radau's own error, after some thousand steps of 1e-8 at most.
     np.testing.assert_allclose(ours, solved.y[0], rtol=1e-6)

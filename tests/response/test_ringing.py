@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, ComplexArray
-from biogrip.experiment.protocol import TorqueHistory, held, torque_history
+from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
 from biogrip.experiment.sample import MODELS, SampleModel, model_named
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.inertia import ringing_s, while_ringing
@@ -22,7 +22,7 @@ from tests.helpers.responses import (
 )
 
 MODEL = MODELS["generalized_maxwell"]
-STEPS = torque_history((held(0.5, 1.6e-9), held(1.0, 0.4e-9), held(5.0, 1e-9), held(100.0, 0.0)))
+STEPS = torque_history((hold(0.5, 1.6e-9), hold(1.0, 0.4e-9), hold(5.0, 1e-9), hold(100.0, 0.0)))
 # From far within the ring's first period to when it is long over, after every step.
 AFTER = np.append(0.0, np.geomspace(1e-7, 0.4, 12))
 TIMES = np.sort(np.concatenate([start + AFTER for start in STEPS.time_s]))
@@ -120,7 +120,7 @@ def _target(
 def test_many_steps(gripper: Gripper) -> None:
     """What is carried on from step to step, against what is superposed."""
     rng = np.random.default_rng(3)
-    torque = torque_history(tuple(held(*pair) for pair in rng.uniform(0, [0.02, 1e-9], (200, 2))))
+    torque = torque_history(tuple(hold(*pair) for pair in rng.uniform(0, [0.02, 1e-9], (200, 2))))
     times = np.sort(rng.uniform(0, torque.end_s, 2000))
     found = ringing_responses(gripper, MODEL, torque, times, DROP[None], slopes=False)[0, 0]
     exact = _target(gripper, MODEL, torque, times, DROP)
@@ -130,10 +130,10 @@ def test_many_steps(gripper: Gripper) -> None:
 def test_a_sample_does_not_depend_on_the_others(gripper: Gripper) -> None:
     samples = np.concatenate(([CELL, DROP], random_samples(40, seed=4)))
     samples[7] = _critically_damped(gripper, CELL)
-    together = ringing_responses(gripper, MODEL, STEPS, TIMES, samples)
+    combine_misfits = ringing_responses(gripper, MODEL, STEPS, TIMES, samples)
     for index in range(len(samples)):
         alone = ringing_responses(gripper, MODEL, STEPS, TIMES, samples[index][None])[0]
-        np.testing.assert_array_equal(together[index], alone)
+        np.testing.assert_array_equal(combine_misfits[index], alone)
 
 
 def test_when_the_ring_is_over_it_is_as_without_inertia(
@@ -153,7 +153,7 @@ def test_when_the_ring_is_over_it_is_as_without_inertia(
 def test_a_trace_that_is_seen_ringing_tells_all_four(gripper: Gripper) -> None:
     """Without noise all parameters come back, c_p too; the misfit is the RMS of the residual."""
     times = np.unique(np.concatenate([start + np.geomspace(1e-5, 4.0, 60) for start in (0.0, 5.0)]))
-    torque = torque_history((held(5.0, 1.6e-9), held(5.0, 0.32e-9)))
+    torque = torque_history((hold(5.0, 1.6e-9), hold(5.0, 0.32e-9)))
     trace = _target(gripper, MODEL, torque, times, CELL)
     problem = problem_alone(
         gripper, MODEL, torque, times, trace, ringing_s=ringing_s(gripper), noise_rad=3e-6
@@ -174,7 +174,7 @@ def test_a_trace_that_is_seen_ringing_tells_all_four(gripper: Gripper) -> None:
 
 def test_the_nonlinear_model_rings_too(gripper: Gripper) -> None:
     """What it has over the linear model is quasi-static, in targets as in what is fitted."""
-    torque = torque_history((held(5.0, 1.6e-9), held(5.0, 0.8e-9)))
+    torque = torque_history((hold(5.0, 1.6e-9), hold(5.0, 0.8e-9)))
     times = np.unique(np.concatenate([start + np.geomspace(1e-5, 4.9, 40) for start in (0.0, 5.0)]))
     sample = np.array([1.0, 0.05, 10.0, 0.5])
     problem = problem_alone(
@@ -209,7 +209,7 @@ def test_no_pole_counts_twice_in_a_chain_of_close_ones(gripper: Gripper) -> None
     dampers = [0.001100299656249389, 0.001100299656249389, 0.0010955884267022612]
     model = model_named("generalized_maxwell", 3)
     sample = np.array([*springs, 0.0007309809396061109, *dampers, 0.024581999807570486])
-    times, torque = np.linspace(0.0, 6.0, 600), torque_history((held(3.0, 1e-9), held(3.0, 2e-10)))
+    times, torque = np.linspace(0.0, 6.0, 600), torque_history((hold(3.0, 1e-9), hold(3.0, 2e-10)))
     phi, _ = rotation_and_sensitivity(gripper, model, torque, times, sample, inertia=True)
     exact = _target(gripper, model, torque, times, sample)
     assert np.max(np.abs(phi - exact)) < 1e-9 * np.abs(exact).max()

@@ -20,7 +20,7 @@ from biogrip.experiment.protocol import (
     Load,
     Phase,
     TorqueHistory,
-    held,
+    hold,
     torque_at,
     torque_history,
 )
@@ -36,10 +36,10 @@ from tests.response.test_protocols import EDGES, TORQUE
 # Slow arms, which an integrator can follow through contact and flight.
 SLOW = Arm(1e-14, 4e-8, 4.4e-7)
 OTHER = Arm(1e-14, 7e-8, 6.0e-7)
-THREE = torque_history((held(20.0, 1.6e-9), held(20.0, 0.2e-9), held(20.0, 2.4e-9)))
+THREE = torque_history((hold(20.0, 1.6e-9), hold(20.0, 0.2e-9), hold(20.0, 2.4e-9)))
 SWING = Load(1e-9, 0.0, 0.0, (Harmonic(0.95e-9, 1.3, 0.4),))
 SWINGING = torque_history(
-    (held(5.0, 1.6e-9), Phase(25.0, SWING, SWING), Phase(10.0, Load(2e-9, -1.5e-10), Load(1e-9)))
+    (hold(5.0, 1.6e-9), Phase(25.0, SWING, SWING), Phase(10.0, Load(2e-9, -1.5e-10), Load(1e-9)))
 )
 
 
@@ -135,7 +135,7 @@ def test_against_lsoda_with_events(
 
 def test_contact_lost_and_regained(gripper: Gripper) -> None:
     """A drop is left when the torque drops, does not move, and is met when it rises again."""
-    torque = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9), held(200.0, 2e-9)))
+    torque = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9), hold(200.0, 2e-9)))
     time_s = np.array([100.0, 199.9, 200.1, 399.9, 400.1, 600.0])
     found = unilateral_response(gripper, generalized_maxwell([9.5, 1e-4, 10, 1e-4]), torque, time_s)
     assert found.touching.tolist() == [True, True, False, False, True, True]
@@ -148,7 +148,7 @@ def test_contact_lost_and_regained(gripper: Gripper) -> None:
 
 
 def test_a_sample_that_recovers_meets_the_jaws_by_itself(gripper: Gripper) -> None:
-    torque = torque_history((held(200.0, 1.6e-9), held(400.0, 0.32e-9)))
+    torque = torque_history((hold(200.0, 1.6e-9), hold(400.0, 0.32e-9)))
     found = unilateral_response(gripper, kelvin_voigt([0.05, 5.0]), torque, np.array([600.0]))
     (parted,), (met,) = found.parted_s, found.met_s
     # It creeps back by e^(-k_p t/c_p) until it reaches the arms.

@@ -9,52 +9,54 @@ from biogrip.experiment.noise_parts import flicker_rates
 from biogrip.experiment.protocol import sample_times
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis, with_uncertain, without
-from biogrip.response.whitening import Colour, Whitening
+from biogrip.response.whitening import NoiseModel, Whitening
 from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
 
 UNEVEN = np.cumsum(np.random.default_rng(3).exponential(1.0, 300))
-COLOURS = [Colour(0.3, 5.0, 0.2), Colour(0.999, 0.2, 0.0), Colour(1e-5, 100.0, 0.9)]
+COLOURS = [NoiseModel(0.3, 5.0, 0.2), NoiseModel(0.999, 0.2, 0.0), NoiseModel(1e-5, 100.0, 0.9)]
 
 
-def correlation(time_s: Array, colour: Colour) -> Array:
+def correlation(time_s: Array, noise_model: NoiseModel) -> Array:
     """The matrix as it is defined."""
     apart = np.abs(np.subtract.outer(time_s, time_s))
     rates = flicker_rates(time_s)
     flicker = np.mean([np.exp(-rate * apart) for rate in rates], axis=0)
     matrix: Array = (
-        colour.white * np.eye(len(time_s))
-        + colour.relaxing * np.exp(-apart / colour.time_s)
-        + colour.flicker * flicker
+        noise_model.white * np.eye(len(time_s))
+        + noise_model.relaxing * np.exp(-apart / noise_model.time_s)
+        + noise_model.flicker * flicker
     )
     return matrix
 
 
-@pytest.mark.parametrize("colour", COLOURS)
-def test_products_are_those_of_the_inverse(colour: Colour) -> None:
+@pytest.mark.parametrize("noise_model", COLOURS)
+def test_products_are_those_of_the_inverse(noise_model: NoiseModel) -> None:
     """Of condition 1e5 at most, so that ten digits are left."""
-    whitening = Whitening(UNEVEN, colour, np.zeros((0, 300)))
+    whitening = Whitening(UNEVEN, noise_model, np.zeros((0, 300)))
     rows = np.random.default_rng(0).standard_normal((2, 4, 300))
-    matrix = correlation(UNEVEN, colour)
+    matrix = correlation(UNEVEN, noise_model)
     white = whitening(rows)
     expected = rows @ np.linalg.solve(matrix, rows[0].T)
     np.testing.assert_allclose(white @ white[0].T, expected, rtol=1e-9, atol=1e-9)
     assert whitening.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
 
 
-@pytest.mark.parametrize("colour", COLOURS)
-def test_noise_of_the_colour_becomes_white(colour: Colour) -> None:
-    root = cholesky(correlation(UNEVEN, colour), lower=True)
-    white = Whitening(UNEVEN, colour, np.zeros((0, 300)))(root.T)
+@pytest.mark.parametrize("noise_model", COLOURS)
+def test_noise_of_the_colour_becomes_white(noise_model: NoiseModel) -> None:
+    root = cholesky(correlation(UNEVEN, noise_model), lower=True)
+    white = Whitening(UNEVEN, noise_model, np.zeros((0, 300)))(root.T)
     np.testing.assert_allclose(white.T @ white, np.eye(300), atol=1e-8)
 
 
 def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:
     """A flat prior is one of a huge variance; the dense matrix has both."""
-    colour, time_s = COLOURS[0], UNEVEN
+    noise_model, time_s = COLOURS[0], UNEVEN
     nuisance = nuisance_basis(time_s, offset=True, drift=True)
     uncertain = 3 * np.random.default_rng(1).standard_normal((2, 300)) / np.sqrt(300)
-    whitening = Whitening(time_s, colour, nuisance, uncertain)
-    matrix = correlation(time_s, colour) + uncertain.T @ uncertain + 1e8 * nuisance.T @ nuisance
+    whitening = Whitening(time_s, noise_model, nuisance, uncertain)
+    matrix = (
+        correlation(time_s, noise_model) + uncertain.T @ uncertain + 1e8 * nuisance.T @ nuisance
+    )
     rows = np.random.default_rng(2).standard_normal((3, 300))
     expected = rows @ np.linalg.solve(matrix, rows.T)
     white = whitening(rows)

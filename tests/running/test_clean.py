@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_of, write_text, written_whole
+from biogrip.files import atomic_write, scratch_path, write_text
 from biogrip.running.clean import clean
 from biogrip.running.journal import JOURNALS, recorded_in
 from biogrip.running.locks import sign_locks
@@ -126,9 +126,9 @@ def test_nothing_is_removed_through_a_link(results: Path) -> None:
 def test_what_a_killed_job_was_writing_goes(results: Path, door: str) -> None:
     """A process that is killed half-way through a file leaves its scratch file on record."""
     code = (
-        "import os; from pathlib import Path; from biogrip.files import written_whole; "
+        "import os; from pathlib import Path; from biogrip.files import atomic_write; "
         "from biogrip.running.journal import recorded_in\n"
-        "with recorded_in(Path('results')), written_whole(Path('results/figures/a.pdf')) as part:\n"
+        "with recorded_in(Path('results')), atomic_write(Path('results/figures/a.pdf')) as part:\n"
         "    part.write_text('half'); os.kill(os.getpid(), 9)"
     )
     subprocess.run([sys.executable, "-c", code], check=False)
@@ -144,8 +144,8 @@ def test_what_a_killed_job_was_writing_goes(results: Path, door: str) -> None:
 
 def test_what_is_being_written_stays(results: Path) -> None:
     file = results / "tables" / "b.csv"
-    with recorded_in(results), written_whole(file) as scratch:
-        assert scratch == scratch_of(file)
+    with recorded_in(results), atomic_write(file) as scratch:
+        assert scratch == scratch_path(file)
         scratch.write_text("b\n")
     assert file.read_text() == "b\n"
     assert not list((results / JOURNALS).glob("*.part"))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from biogrip.errors import BiogripError
-from biogrip.running.journal import sha256_of
+from biogrip.running.journal import hash_file
 from biogrip.running.published import SUMS, publish
 
 
@@ -132,9 +132,9 @@ def test_a_kill_is_made_good_by_publishing_again(
     # As published from another study before.
     sums = Path("published", SUMS).read_text()
     for file in sorted(Path("published/tables").iterdir())[:20]:
-        old = sha256_of(file)
+        old = hash_file(file)
         file.write_text("earlier\n")
-        sums = sums.replace(old, sha256_of(file), 1)
+        sums = sums.replace(old, hash_file(file), 1)
     Path("published", SUMS).write_text(sums)
     done: list[object] = []
     replace = os.replace

@@ -15,9 +15,9 @@ import pytest
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
-from biogrip.running.journal import JOURNALS, journals_in, recorded_in, sha256_of
+from biogrip.running.journal import JOURNALS, hash_file, journals_in, recorded_in
 from biogrip.running.manifest import NAME, Manifest
-from biogrip.running.records import Record, read_sums, refuse_outside, sum_of_lines
+from biogrip.running.records import Record, hash_lines, read_sums, refuse_outside
 
 OUTSIDE = ("../thesis.txt", "../../thesis.txt", "tables/../../thesis.txt", "{}/thesis.txt")
 PLAIN: dict[str, Any] = {
@@ -56,7 +56,7 @@ def hostile_record(rng: random.Random, place: Path) -> dict[str, Any]:
     file = place / "thesis.txt"
     record = {**PLAIN, "path": hostile_path(rng, place), "recorded_ns": 1}
     if rng.random() < 0.5:
-        record |= {"size": file.stat().st_size, "sha256": sha256_of(file)}
+        record |= {"size": file.stat().st_size, "sha256": hash_file(file)}
     return record
 
 
@@ -86,12 +86,12 @@ def manifest(rng: random.Random, place: Path) -> None:
     make = rng.choice([hostile_record, malformed_record])
     text = "".join(json.dumps(make(rng, place)) + "\n" for _ in range(3))
     for copy in (place / "results" / NAME, place / "results" / JOURNALS / NAME):
-        write_text(copy, text + sum_of_lines(text.encode()))
+        write_text(copy, text + hash_lines(text.encode()))
 
 
 def sums(rng: random.Random, place: Path) -> None:
     """Names and hashes of what is said to be published."""
-    true = sha256_of(place / "thesis.txt")
+    true = hash_file(place / "thesis.txt")
     lines = [
         f"{rng.choice([true, '0' * 64, '0000', ''])}  {hostile_path(rng, place)}".encode(),
         rng.choice([b"nothing", b"\xff\xfe  x", true.encode(), f"{true} x".encode(), b""]),

@@ -12,7 +12,7 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
-from biogrip.running.sheet import sheets_of
+from biogrip.running.rules import make_rules
 from biogrip.study.case_blocks import Shared
 from biogrip.study.config import StudyConfig
 from biogrip.study.load import load_study
@@ -118,7 +118,7 @@ def planned(study: Study) -> int:
     """Plan what a study makes; return how many jobs that is."""
     plan = Plan(study, Path("nowhere"))
     count = 0
-    for sheet in sheets_of(products().values(), plan):
+    for sheet in make_rules(products().values(), plan):
         jobs = sheet.jobs
         count += len(jobs)
         for job in jobs[:2] + jobs[-2:]:

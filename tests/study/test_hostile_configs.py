@@ -11,7 +11,7 @@ import yaml
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
-from biogrip.running.sheet import sheets_of
+from biogrip.running.rules import make_rules
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config, read_places
 from biogrip.study.study import Study
@@ -325,7 +325,7 @@ def test_two_thousand_cases_are_planned(tmp_path: Path) -> None:
     file = written(tmp_path, f"cases:\n{cases}\n")
     start = time.process_time()
     plan = Plan(load(file), tmp_path)
-    sheets = {sheet.name: sheet for sheet in sheets_of(products().values(), plan)}
+    sheets = {sheet.name: sheet for sheet in make_rules(products().values(), plan)}
     jobs = [{**job, "method": "genetic"} for job in sheets["target"].jobs]
     names = ("target", "identification")
     digests = [tuple(sheets[name].digest(job) for name in names) for job in jobs]
@@ -344,7 +344,7 @@ def test_the_most_times_fit_into_a_parameter_of_a_job(tmp_path: Path) -> None:
     times = sorted(rng.uniform(1e-5, 9.9e-5) for _ in range(5000))
     case = {"sample": yaml.safe_load(DROP)["sample"], "measurement": {"times_s": times}}
     plan = Plan(load(written(tmp_path, yaml.safe_dump({"cases": {"x": case}}))), tmp_path)
-    (target,) = sheets_of([products()["target"]], plan)
+    (target,) = make_rules([products()["target"]], plan)
     assert len(target.digest({"case": "x"})) + len(target.command({"case": "x"})) < 128
 
 

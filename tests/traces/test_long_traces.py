@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.instrument.gripper import Gripper
-from biogrip.own_traces.one_trace import Wanted, identify_trace, study_of
+from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.verdicts import diagnosis_data
 from biogrip.products.stages import judgement
@@ -34,16 +34,16 @@ def written(path: Path, time_s: Array, rotation_rad: Array) -> Path:
     return path
 
 
-def wanted(path: Path) -> Wanted:
+def options(path: Path) -> IdentifyOptions:
     """A trace to be identified with its own model alone: others take as much memory, and time."""
     config = path.with_suffix(".yaml")
     config.write_text("model_selection: {models: []}\n")
-    return Wanted(path, MODEL.name, ReadAs(), config)
+    return IdentifyOptions(path, MODEL.name, ReadAs(), config)
 
 
 def judged(path: Path, time_s: Array, rotation_rad: Array) -> dict[str, Any]:
     """What `identify_trace` finds of the sample, without a word on other models."""
-    study = study_of(wanted(path))
+    study = study_of(options(path))
     (case,) = study.cases.values()
     fit = judgement.settings_of(study, case).fit(case.problem, time_s, rotation_rad, 0)
     searched, confidence = case.problem.searched, case.confidence
@@ -58,7 +58,7 @@ def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Pat
     with no damper beside it, several times as much as all that follows. Peak memory stays a few
     hundred bytes a sample.
     """
-    torque, time_s = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9))), TIMES[times]
+    torque, time_s = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))), TIMES[times]
     response = step_response(gripper, MODEL.network(TRUTH), symmetric=True)
     clean = rotation(response, torque, time_s)[0]
     trace = clean + 0.1 * clean.max() * _RNG.standard_normal(len(time_s))
@@ -73,9 +73,9 @@ def test_the_answer_is_that_of_means(gripper: Gripper, times: str, tmp_path: Pat
     fewer = judged(path, *means)
     # What libraries take is no part of it.
     few = written(tmp_path / "few.csv", time_s[::2000], trace[::2000])
-    identify_trace(wanted(few), tmp_path / "few.json")
+    identify_trace(options(few), tmp_path / "few.json")
     tracemalloc.start()
-    every = identify_trace(wanted(path), tmp_path / "every.json").data
+    every = identify_trace(options(path), tmp_path / "every.json").data
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 280 * len(time_s)

@@ -13,7 +13,7 @@ from biogrip.experiment.protocol import (
     Load,
     Phase,
     TorqueHistory,
-    held,
+    hold,
     sample_times,
     torque_history,
 )
@@ -37,8 +37,8 @@ SAMPLES = {
     "liquid_drop_2": (1.0, 1.0e-4, 10.0, 1.0e-3),
 }
 PROTOCOLS = {
-    "one hold": (held(60.0, 1e-9),),
-    "ramp": (Phase(100.0, Load(0.0, 2e-11), Load(0.0, 2e-11)), held(50.0, 0.0)),
+    "one hold": (hold(60.0, 1e-9),),
+    "ramp": (Phase(100.0, Load(0.0, 2e-11), Load(0.0, 2e-11)), hold(50.0, 0.0)),
     "sinusoid": (
         Phase(
             200.0,
@@ -46,9 +46,9 @@ PROTOCOLS = {
             Load(0.0, harmonics=(Harmonic(1e-9, 2.0, 0.3),)),
         ),
     ),
-    "one arm": (held(100.0, 1.6e-9, 0.0), held(100.0, 0.0)),
-    "the other arm": (held(100.0, 0.0, 1.6e-9), held(100.0, 0.0)),
-    "opening": (held(100.0, -1.6e-9), held(100.0, 0.0)),
+    "one arm": (hold(100.0, 1.6e-9, 0.0), hold(100.0, 0.0)),
+    "the other arm": (hold(100.0, 0.0, 1.6e-9), hold(100.0, 0.0)),
+    "opening": (hold(100.0, -1.6e-9), hold(100.0, 0.0)),
 }
 
 
@@ -252,7 +252,7 @@ def test_a_constant_is_no_response(
 
 def test_a_constant_is_no_response_to_a_constant_torque_either(gripper: Gripper) -> None:
     times = sample_times(60.0, 1.0)[1:]
-    torque = torque_history((held(60.0, 1e-9),))
+    torque = torque_history((hold(60.0, 1e-9),))
     for value in np.random.default_rng(2).uniform(1e-4, 2e-3, 20):
         said = refusal(recorded(times, np.full(len(times), value)), gripper, torque)
         assert "found no response to the torque" in said
@@ -296,12 +296,12 @@ def test_a_trace_with_a_gap_and_ten_samples_passes(gripper: Gripper, steps: Torq
 @pytest.mark.parametrize(
     ("phases", "largest_rad"),
     [
-        ((held(200.0, 1.6e-9), held(200.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
-        ((held(1.0, -1.6e-9), held(1.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
-        ((held(1.0, 0.0), held(1e-9, 1.6e-9), held(1.0, 0.0)), 1.6e-9 / 4.4e-7),
+        ((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
+        ((hold(1.0, -1.6e-9), hold(1.0, 0.32e-9)), 1.6e-9 / 4.4e-7),
+        ((hold(1.0, 0.0), hold(1e-9, 1.6e-9), hold(1.0, 0.0)), 1.6e-9 / 4.4e-7),
         ((Phase(7.0, Load(0.0, 2e-10), Load(0.0, 2e-10)),), 1.4e-9 / 4.4e-7),
-        ((held(1.0, 0.0, 1.6e-9),), 1.6e-9 / 9.9e-7),
-        ((held(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
+        ((hold(1.0, 0.0, 1.6e-9),), 1.6e-9 / 9.9e-7),
+        ((hold(1.0, 1.0e-9, -1.6e-9),), 2.6e-9 / 9.9e-7),
         (PROTOCOLS["sinusoid"], 1e-9 / 4.4e-7),
     ],
 )
@@ -316,7 +316,7 @@ def test_no_sample_lets_the_arm_turn_further_than_the_free_rotation(
     unequal_gripper: Gripper,
 ) -> None:
     rng = np.random.default_rng(9)
-    for phases in ((held(1e4, 1e-9, 2e-9),), (held(1e4, 2e-9, -1e-9),), (held(1e4, 0.0, 1e-9),)):
+    for phases in ((hold(1e4, 1e-9, 2e-9),), (hold(1e4, 2e-9, -1e-9),), (hold(1e4, 0.0, 1e-9),)):
         torque = torque_history(phases)
         largest = free_rotation(unequal_gripper, torque)
         turned = [
@@ -422,21 +422,21 @@ def sinusoid(duration_s: float, mean_Nm: float, omega_rad_per_s: float) -> Phase
 
 
 PULLING = {
-    "steps": (held(200.0, 1.6e-9), held(200.0, 0.32e-9)),
+    "steps": (hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)),
     "hold": PROTOCOLS["one hold"],
     "ramp": PROTOCOLS["ramp"],
-    "late": (held(50.0, 0.0), held(50.0, 1e-9), held(100.0, 0.0)),
-    "stairs": tuple(held(40.0, 1e-10 * (step + 1)) for step in range(8)),
+    "late": (hold(50.0, 0.0), hold(50.0, 1e-9), hold(100.0, 0.0)),
+    "stairs": tuple(hold(40.0, 1e-10 * (step + 1)) for step in range(8)),
     "sinusoid": (sinusoid(200.0, 1e-9, 2.0),),
     "slow sinusoid": (sinusoid(200.0, 1e-9, 0.05),),
     "one arm": PROTOCOLS["one arm"],
     "the other arm": PROTOCOLS["the other arm"],
     "one after the other": (
-        held(50.0, 1e-9, 0.0),
-        held(50.0, 0.0, 1e-9),
-        held(100.0, 1e-9, 1.2e-9),
+        hold(50.0, 1e-9, 0.0),
+        hold(50.0, 0.0, 1e-9),
+        hold(100.0, 1e-9, 1.2e-9),
     ),
-    "unequal": (held(100.0, 1.0e-9, 1.6e-9), held(100.0, 0.2e-9, 0.1e-9)),
+    "unequal": (hold(100.0, 1.0e-9, 1.6e-9), hold(100.0, 0.2e-9, 0.1e-9)),
 }
 MIRRORED = "found a rotation that goes against the torque"
 

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 import yaml
 
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
@@ -117,7 +117,7 @@ def test_nonlinear_targets_differ_from_linear_ones_as_the_model_says(
     target = pd.read_csv(study / "targets" / "nonlinear.csv")
     linear = rotation(
         step_response(gripper, MODELS["liquid_drop"].network([1, 1e-3, 10])),
-        torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9))),
+        torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9))),
         target["time_s"].to_numpy(float),
     )[0]
     difference = np.abs(target["rotation_rad"] - linear).max() / linear.max()

@@ -244,7 +244,7 @@ def called(
         assert done.returncode == 0, done.stderr
         (folder / "called").write_text(done.stdout)
 
-    said = (built_once("watched", watch, tmp_path_factory, worker_id) / "called").read_text()
+    said = (built_once("watch_writes", watch, tmp_path_factory, worker_id) / "called").read_text()
     lines = [line for line in said.splitlines() if line.startswith("[")]
     return {name: set(files) for name, files in map(json.loads, lines)}
 

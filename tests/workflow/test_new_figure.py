@@ -69,7 +69,7 @@ from pathlib import Path
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.resolved import read_study
-from biogrip.running.sheet import sheets_of
+from biogrip.running.rules import sheets_of
 plan = Plan(read_study(Path("results")), Path("results"))
 found = {
     product.name: [sheet.runtime({}, attempt=2), sheet.megabytes({}, attempt=2), sheet.weight.local]

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from biogrip.experiment.maxwell_models import generalized_maxwell
-from biogrip.experiment.protocol import held, torque_history
+from biogrip.experiment.protocol import hold, torque_history
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.catalogue import products
 from biogrip.products.figures.style import COLUMN_IN
@@ -105,7 +105,7 @@ def test_last_row_is_the_identification_that_its_own_trace_gives(
 ) -> None:
     """Misfit and noise in the file, recomputed from the files alone."""
     results = finished / "results"
-    steps = torque_history((held(200.0, 1.6e-9), held(200.0, 0.32e-9)))
+    steps = torque_history((hold(200.0, 1.6e-9), hold(200.0, 0.32e-9)))
     found = pd.read_csv(results / "identifications" / f"{CASES[0]}.csv").iloc[-1]
     trace = pq.read_table(results / "measurements" / CASES[0] / "seeds_2-3.parquet").to_pandas()
     sample = found[["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]].to_numpy(float)

@@ -13,7 +13,7 @@ from biogrip.products.stages.recording import check_traces
 from biogrip.running.locks import sign_locks
 from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
-from biogrip.running.sheet import files_of, sheets_of
+from biogrip.running.rules import files_of, make_rules
 from biogrip.running.wholeness import Claim, hold_against_record
 from biogrip.study.load import load_study
 from biogrip.study.source import read_places
@@ -53,7 +53,7 @@ if workflow.exec_mode == ExecMode.DEFAULT:
     hold_against_record(
         workflow,
         RESULTS,
-        asked=lambda: ALL_FILES,
+        requested=lambda: ALL_FILES,
         made_otherwise=lambda manifest: Provenance(RESULTS, manifest).made_otherwise(
             SHEETS
         ),
@@ -87,7 +87,7 @@ onerror:
 
 
 PLAN = Plan(STUDY, RESULTS)
-SHEETS = sheets_of(products().values(), PLAN)
+SHEETS = make_rules(products().values(), PLAN)
 ALL_FILES = files_of(SHEETS)
 # The report's captions are looked up by rule: among the parameters, they would make things again.
-config["captions"] = {sheet.name: sheet.caption for sheet in SHEETS}
+config["captions"] = {rule.name: rule.caption for rule in SHEETS}

@@ -1,16 +1,16 @@
-"""A rule for each thing that the study makes, or each sheet of them, as they declare themselves."""
+"""A rule for each thing that the study makes, or each rule of them, as they declare themselves."""
 
 
-def reported(sheet):
-    """The files of a sheet; the pages among them are shown in Snakemake's report."""
-    found = sheet.outputs
-    for product in sheet.products:
+def reported(rule):
+    """The files of a rule; the pages among them are shown in Snakemake's report."""
+    found = rule.outputs
+    for product in rule.products:
         if product.category:
             kind = next(
                 kind for kind in ("png", "html", "page") if kind in product.writes
             )
             labels = {
-                "case": "{case}" if "case" in sheet.wildcards else "all",
+                "case": "{case}" if "case" in rule.wildcards else "all",
                 "item": product.item,
                 "format": {"png": "figure", "html": "table", "page": "page"}[kind],
             }
@@ -23,29 +23,29 @@ def reported(sheet):
     return found
 
 
-for sheet in SHEETS:
+for rule in SHEETS:
 
     rule:
         name:
-            sheet.name
+            rule.name
         input:
-            unpack(sheet.inputs),
+            unpack(rule.inputs),
         output:
-            **reported(sheet),
+            **reported(rule),
         log:
-            sheet.log,
+            rule.log,
         wildcard_constraints:
-            **sheet.constraints,
+            **rule.constraints,
         group:
-            sheet.weight.group
-        localrule: sheet.weight.local
+            rule.weight.group
+        localrule: rule.weight.local
         resources:
-            runtime=sheet.runtime,
-            mem_mb=sheet.megabytes,
+            runtime=rule.runtime,
+            mem_mb=rule.megabytes,
         params:
-            job=sheet.command,
-            made_for=sheet.digest,
+            job=rule.command,
+            made_for=rule.digest,
         message:
-            sheet.message
+            rule.message
         shell:
             "biogrip make {params.job} --made-for {params.made_for} 2> {log:q}"

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.design.cells import Cells
+from biogrip.design.time_bins import TimeBins
 from biogrip.experiment.sampling import Burst
 
 _Run = tuple[int, int, int]
@@ -24,8 +24,8 @@ def whole(samples: Array, capacity: Array) -> IntArray:
     return found
 
 
-def bursts_of(
-    each: Sequence[Cells], starts: IntArray, counts: IntArray, fastest_Hz: float
+def make_bursts(
+    each: Sequence[TimeBins], starts: IntArray, counts: IntArray, fastest_Hz: float
 ) -> tuple[Burst, ...]:
     """Convert readings of cells to bursts; successive full cells share a burst.
 
@@ -58,7 +58,7 @@ def bursts_of(
     )
 
 
-def _once(own: Cells, counts: IntArray) -> Iterator[_Run]:
+def _once(own: TimeBins, counts: IntArray) -> Iterator[_Run]:
     """Yield runs of readings in the middle of successive cells."""
     for first, slots, count in zip(
         own.first.tolist(), own.slots.tolist(), counts.tolist(), strict=True
@@ -68,7 +68,7 @@ def _once(own: Cells, counts: IntArray) -> Iterator[_Run]:
             yield first + (slots - 1 - stride * (count - 1)) // 2, stride, count
 
 
-def _repeated(own: Cells, counts: IntArray) -> list[_Run]:
+def _repeated(own: TimeBins, counts: IntArray) -> list[_Run]:
     """Return runs of readings of cells that repeat in every period, cells in turn if few."""
     slots: list[int] = []
     place, used = -1, 0

@@ -34,13 +34,13 @@ class Criterion:
         One of `CRITERIA`.
     over
         ``"worst"`` for the maximum over the samples, ``"mean"`` for their mean.
-    asked : (n_asked,)
+    targets : (n_asked,)
         Indices of the parameters that are asked for.
     """
 
     name: str
     over: str
-    asked: tuple[int, ...]
+    targets: tuple[int, ...]
 
     def values(self, covariances: Array) -> Array:
         """Return the criterion of every sample, (n,), from covariances (n, n_asked, n_asked)."""
@@ -60,7 +60,7 @@ class Criterion:
         """Return the log criterion with p-norms in place of maxima, as in `weights`."""
         if self.name in ("D", "A"):
             values = self.values(covariances)
-            logs = values / len(self.asked) if self.name == "D" else np.log(values)
+            logs = values / len(self.targets) if self.name == "D" else np.log(values)
         elif self.name == "largest":
             logs = _power_mean(np.diagonal(covariances, axis1=1, axis2=2), sharpness)
         else:
@@ -72,7 +72,7 @@ class Criterion:
     def typical_bound(self, covariances: Array) -> float:
         """Return the criterion as a relative standard deviation, for comparison of designs."""
         values = self.values(covariances)
-        count = len(self.asked) if self.name == "D" else 1
+        count = len(self.targets) if self.name == "D" else 1
         logs = values / count if self.name == "D" else np.log(values)
         log = logs.max() if self.over == "worst" else self._mean_log(logs)
         return float(np.exp(0.5 * log))
@@ -100,10 +100,10 @@ class Criterion:
         if self.name == "D":
             z = np.linalg.inv(covariances).astype(float)
         elif self.name == "A":
-            z = np.broadcast_to(np.eye(len(self.asked)) / len(self.asked), covariances.shape)
+            z = np.broadcast_to(np.eye(len(self.targets)) / len(self.targets), covariances.shape)
         elif self.name == "largest":
             shares = _singled_out(np.diagonal(covariances, axis1=1, axis2=2), sharpness)
-            z = shares[:, :, None] * np.eye(len(self.asked))
+            z = shares[:, :, None] * np.eye(len(self.targets))
         else:
             vectors = np.linalg.eigh(covariances)[1]
             shares = _singled_out(_eigenvalues(covariances), sharpness)
@@ -112,7 +112,7 @@ class Criterion:
         if self.over == "mean":
             return np.full(len(values), 1 / len(values)), z
         # The values of D are logarithms already.
-        scale = values if self.name != "D" else np.exp(values / len(self.asked))
+        scale = values if self.name != "D" else np.exp(values / len(self.targets))
         return _singled_out(scale[None], sharpness)[0], z
 
 
@@ -147,7 +147,7 @@ def inverted(information: Array) -> Array:
     return np.linalg.inv(correlations + _ROUNDING * np.eye(information.shape[1])) / size
 
 
-def whitened(information: Array, told: Array) -> Array:
+def whitened(information: Array, sensitivity: Array) -> Array:
     """Transform sensitivities such that the information becomes the identity matrix.
 
     In directions whose information is only rounding errors, they become tiny.
@@ -155,7 +155,7 @@ def whitened(information: Array, told: Array) -> Array:
     Parameters
     ----------
     information : (n, n_parameters, n_parameters)
-    told : (n, n_parameters, n_cells)
+    sensitivity : (n, n_parameters, n_cells)
 
     Returns
     -------
@@ -165,7 +165,7 @@ def whitened(information: Array, told: Array) -> Array:
     singular = np.linalg.eigvalsh(correlations)[:, 0] < _ROUNDING
     lifted = np.where(singular, _ROUNDING, 0.0)[:, None, None] * np.eye(information.shape[1])
     root = np.linalg.cholesky(correlations + lifted)
-    white: Array = np.linalg.solve(root, told / length[:, :, None])
+    white: Array = np.linalg.solve(root, sensitivity / length[:, :, None])
     return white
 
 

@@ -24,7 +24,7 @@ _NOTHING = 1e-6 * NO_BOUND**-2
 
 
 @dataclass(frozen=True, eq=False)
-class Wanted:
+class DesignInputs:
     """The design problem: simulated system, limits of the experiment, and criterion.
 
     Parameters
@@ -80,12 +80,12 @@ class Wanted:
         """
         found = relative_bounds(information)
         apart = list(self.out_of_reach)
-        told = found[:, apart] ** -2 - NO_BOUND**-2
-        found[:, apart] = np.maximum(told, _NOTHING) ** -0.5
+        sensitivity = found[:, apart] ** -2 - NO_BOUND**-2
+        found[:, apart] = np.maximum(sensitivity, _NOTHING) ** -0.5
         return found
 
 
-def told_at(
+def compute_sensitivities(
     gripper: Gripper,
     model: SampleModel,
     torque: TorqueHistory,
@@ -114,9 +114,9 @@ def told_at(
     return rows[:, 1:] / noise_rad
 
 
-def information_of(told: Array) -> Array:
+def compute_information(sensitivity: Array) -> Array:
     """Return the Fisher information, (n, n_parameters, n_parameters), of sensitivities."""
-    information: Array = told @ told.swapaxes(1, 2)
+    information: Array = sensitivity @ sensitivity.swapaxes(1, 2)
     return information
 
 

@@ -55,7 +55,7 @@ class Optimum:
 
 
 def best_sampling(
-    told: Array,
+    rows: Array,
     capacity: Array,
     samples: int,
     criterion: Criterion,
@@ -68,7 +68,7 @@ def best_sampling(
 
     Parameters
     ----------
-    told : (n, n_parameters, n_cells)
+    rows : (n, n_parameters, n_cells)
         Sensitivities of n plausible samples to their log-parameters, in units of the noise.
     capacity : (n_cells,)
         Largest number of readings in each cell.
@@ -86,25 +86,25 @@ def best_sampling(
     room = min(float(samples), float(capacity.sum()))
     first = _even(capacity, room)
     fillings, shares = [first], np.ones(1)
-    known = _information(told, first)[None]
+    known = _information(rows, first)[None]
     best: Optimum | None = None
     for round_ in range(most):
         sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
         information = np.tensordot(shares, known, 1)
         inverse = inverted(information + before)
-        covariances, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
-        worth = np.einsum("n,npq,npc,nqc->c", of_samples, sensitivity, told, told, optimize=True)
+        covariances, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
+        worth = np.einsum("n,npq,npc,nqc->c", of_samples, sensitivity, rows, rows, optimize=True)
         filling = _filled(worth, capacity, room)
         reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
         gain = float(worth @ filling) - reached
         missing = _gap(criterion, covariances, gain, sharpness)
         if best is None or missing < best.gap:
-            held = np.tensordot(shares, np.array(fillings), 1)
-            best = Optimum(held, covariances, missing)
+            mean_samples = np.tensordot(shares, np.array(fillings), 1)
+            best = Optimum(mean_samples, covariances, missing)
         if missing < gap:
             break
         fillings.append(filling)
-        known = np.concatenate((known, _information(told, filling)[None]))
+        known = np.concatenate((known, _information(rows, filling)[None]))
         shares = np.append(shares * (1 - 1 / len(fillings)), 1 / len(fillings))
         shares = _mixed(known, before, shares, criterion, sharpness)
         kept = shares > _DROPPED
@@ -135,15 +135,17 @@ def _filled(worth: Array, capacity: Array, room: float) -> Array:
     return filling
 
 
-def _information(told: Array, samples: Array) -> Array:
+def _information(rows: Array, samples: Array) -> Array:
     """Return the Fisher information, (n, n_parameters, n_parameters)."""
-    return (told * samples) @ told.swapaxes(1, 2)
+    return (rows * samples) @ rows.swapaxes(1, 2)
 
 
-def _seen(inverse: Array, criterion: Criterion, sharpness: float) -> tuple[Array, Array, Array]:
+def _covariances(
+    inverse: Array, criterion: Criterion, sharpness: float
+) -> tuple[Array, Array, Array]:
     """Return covariances of the parameters asked for, weights of samples, and of information."""
-    columns = inverse[:, :, criterion.asked]
-    covariances = columns[:, criterion.asked]
+    columns = inverse[:, :, criterion.targets]
+    covariances = columns[:, criterion.targets]
     of_samples, z = criterion.weights(covariances, sharpness)
     return covariances, of_samples, columns @ z @ columns.swapaxes(1, 2)
 
@@ -155,7 +157,7 @@ def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float
     """
     values = criterion.values(covariances)
     of_samples, z = criterion.weights(covariances, sharpness)
-    count = len(criterion.asked)
+    count = len(criterion.targets)
     if criterion.name == "D":
         above = values.max() - of_samples @ values if criterion.over == "worst" else 0.0
         return float(np.expm1(0.5 * (gain + above) / count))
@@ -173,11 +175,11 @@ def _mixed(
 
     def at(shares: Array) -> tuple[Array, float]:
         inverse = inverted((shares @ flat).reshape(known.shape[1:]) + before)
-        covariances = inverse[:, :, criterion.asked][:, criterion.asked]
+        covariances = inverse[:, :, criterion.targets][:, criterion.targets]
         return inverse, criterion.smooth(covariances, sharpness)
 
     def worth_of(inverse: Array) -> Array:
-        _, of_samples, sensitivity = _seen(inverse, criterion, sharpness)
+        _, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
         found: Array = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
         return found
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.design.bursts import bursts_of, whole
-from biogrip.design.cells import Cells, cells, swinging_cells
-from biogrip.design.experiment import Wanted, information_of, told_at
-from biogrip.design.few_cells import in_few_cells
+from biogrip.design.bursts import make_bursts, whole
+from biogrip.design.experiment import DesignInputs, compute_information, compute_sensitivities
+from biogrip.design.few_bins import in_few_bins
 from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
 from biogrip.design.set_values import set_values
+from biogrip.design.time_bins import TimeBins, periodic_time_bins, time_bins
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
@@ -73,24 +73,24 @@ class SamplingProblem:
         Cells after each step.
     starts : (n_steps,)
         Slots at which steps begin.
-    told : (n, n_parameters, n_cells)
+    sensitivity : (n, n_parameters, n_cells)
         Sensitivities to the log-parameters in units of the noise.
     capacity : (n_cells,)
         Largest number of readings in each cell.
     """
 
-    each: tuple[Cells, ...]
+    each: tuple[TimeBins, ...]
     starts: IntArray
-    told: Array
+    sensitivity: Array
     capacity: Array
 
 
-def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
+def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
     """Find the best sampling of the first torque with which the jaws press throughout.
 
     Parameters
     ----------
-    wanted
+    inputs
         Design problem.
     torques
         From `best_torques`, which checks contact at fewer instants.
@@ -101,62 +101,65 @@ def planned(wanted: Wanted, torques: Sequence[Torque]) -> Plan:
         If with all of them the jaws would have to pull.
     """
     for torque in torques:
-        phases = set_values(wanted, torque)
-        if presses(wanted, phases):
-            return _sampled(wanted, phases)
+        phases = set_values(inputs, torque)
+        if presses(inputs, phases):
+            return _sampled(inputs, phases)
     raise BiogripError(
         "design: with all torques that were found the jaws would have to pull at some instant; "
         "allowed are more torques to be tried (`tried`)."
     )
 
 
-def presses(wanted: Wanted, phases: Sequence[Phase]) -> bool:
+def presses(inputs: DesignInputs, phases: Sequence[Phase]) -> bool:
     """Return True if the jaws press all plausible samples at all instants that are checked."""
-    network = wanted.model.network(wanted.parameters)
-    _, force = forces(wanted.gripper, network, phases)
+    network = inputs.model.network(inputs.parameters)
+    _, force = forces(inputs.gripper, network, phases)
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
-def sampling_problem(wanted: Wanted, phases: tuple[Phase, ...]) -> SamplingProblem:
+def sampling_problem(inputs: DesignInputs, phases: tuple[Phase, ...]) -> SamplingProblem:
     """Divide the time of an experiment into cells, and compute the sensitivities there."""
-    slots = [round(phase.duration_s * wanted.fastest_Hz) for phase in phases]
+    slots = [round(phase.duration_s * inputs.fastest_Hz) for phase in phases]
     each = tuple(
-        _cells(count, phase, wanted.fastest_Hz) for count, phase in zip(slots, phases, strict=True)
+        _time_bins(count, phase, inputs.fastest_Hz)
+        for count, phase in zip(slots, phases, strict=True)
     )
     starts = np.cumsum([0, *slots[:-1]])
     middle = np.concatenate([start + own.middle for start, own in zip(starts, each, strict=True)])
     order = np.argsort(middle, kind="stable")
-    told = np.empty((*wanted.parameters.shape, len(middle)))
-    times_s = middle[order] / wanted.fastest_Hz
-    told[..., order] = _told(wanted, torque_history(phases), times_s)
+    sensitivity = np.empty((*inputs.parameters.shape, len(middle)))
+    times_s = middle[order] / inputs.fastest_Hz
+    sensitivity[..., order] = _compute_sensitivities(inputs, torque_history(phases), times_s)
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
-    return SamplingProblem(each, starts, told, capacity)
+    return SamplingProblem(each, starts, sensitivity, capacity)
 
 
-def _cells(slots: int, phase: Phase, fastest_Hz: float) -> Cells:
+def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
     for harmonic in phase.left.harmonics:
-        return swinging_cells(slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS)
-    return cells(slots, _GROWTH)
+        return periodic_time_bins(
+            slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS
+        )
+    return time_bins(slots, _GROWTH)
 
 
-def _sampled(wanted: Wanted, phases: tuple[Phase, ...]) -> Plan:
-    problem = sampling_problem(wanted, phases)
-    told, capacity = problem.told, problem.capacity
+def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
+    problem = sampling_problem(inputs, phases)
+    sensitivity, capacity = problem.sensitivity, problem.capacity
     best = best_sampling(
-        told,
+        sensitivity,
         capacity,
-        wanted.samples,
-        wanted.criterion,
+        inputs.samples,
+        inputs.criterion,
         gap=_GAP,
         most=_FILLINGS,
-        before=wanted.before,
+        before=inputs.before,
     )
-    few = in_few_cells(told, best.samples, capacity, _late(problem.each), wanted.before)
+    few = in_few_bins(sensitivity, best.samples, capacity, _late(problem.each), inputs.before)
     counts = whole(few, capacity)
-    bursts = bursts_of(problem.each, problem.starts, counts, wanted.fastest_Hz)
+    bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
     history = torque_history(phases)
-    seen = _told(wanted, history, Sampling(bursts=bursts).over(history.end_s))
-    information = information_of(seen) + wanted.before
+    rows = _compute_sensitivities(inputs, history, Sampling(bursts=bursts).over(history.end_s))
+    information = compute_information(rows) + inputs.before
     return Plan(phases, bursts, information, best.gap)
 
 
@@ -194,12 +197,12 @@ def _swings(period_s: float, duration_s: float) -> Array:
     return period_s * inside
 
 
-def _late(each: Sequence[Cells]) -> Array:
+def _late(each: Sequence[TimeBins]) -> Array:
     """Return the relative positions of cells within their steps, from 0 to 1."""
     return np.concatenate([np.arange(len(own.first)) / len(own.first) for own in each])
 
 
-def _told(wanted: Wanted, history: TorqueHistory, time_s: Array) -> Array:
-    return told_at(
-        wanted.gripper, wanted.model, history, time_s, wanted.parameters, wanted.noise_rad
+def _compute_sensitivities(inputs: DesignInputs, history: TorqueHistory, time_s: Array) -> Array:
+    return compute_sensitivities(
+        inputs.gripper, inputs.model, history, time_s, inputs.parameters, inputs.noise_rad
     )

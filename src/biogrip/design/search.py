@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.cells import cells
-from biogrip.design.experiment import Wanted
-from biogrip.design.looked import Looked, looked
+from biogrip.design.cell_responses import CellResponses, compute_cell_responses
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.sampling import best_sampling
 from biogrip.design.shapes import SHAPES, Shape
+from biogrip.design.time_bins import time_bins
 from biogrip.design.views import Views
 from biogrip.design.waveform import Waveform
 from biogrip.errors import BiogripError
@@ -52,58 +52,60 @@ class TorqueSearch:
 
     Parameters
     ----------
-    wanted
+    inputs
         Design problem.
     shape
         Family of torques.
     """
 
-    def __init__(self, wanted: Wanted, shape: Shape) -> None:
-        self._wanted, self._shape = wanted, shape
-        self._cells = cells(round(wanted.limits.longest_s * wanted.fastest_Hz), _GROWTH)
-        elapsed_s = self._cells.middle / wanted.fastest_Hz
-        self._views = Views(wanted.gripper, wanted.model, wanted.parameters, elapsed_s)
+    def __init__(self, inputs: DesignInputs, shape: Shape) -> None:
+        self._inputs, self._shape = inputs, shape
+        self._time_bins = time_bins(round(inputs.limits.longest_s * inputs.fastest_Hz), _GROWTH)
+        elapsed_s = self._time_bins.middle / inputs.fastest_Hz
+        self._views = Views(inputs.gripper, inputs.model, inputs.parameters, elapsed_s)
 
     def torque(self, shares: Array) -> Torque:
         """Return the torque of some shares, as large as limits of torque and stroke allow."""
-        waveform = self._shape.waveform(shares, self._wanted.limits)
-        return self._scaled(waveform, self._looked(waveform))
+        waveform = self._shape.waveform(shares, self._inputs.limits)
+        return self._scaled(waveform, self._compute_responses(waveform))
 
     def logarithm(self, shares: Array) -> float:
         """Return the log of the typical relative bound; where contact is lost, a larger penalty."""
-        wanted = self._wanted
-        waveform = self._shape.waveform(shares, wanted.limits)
+        inputs = self._inputs
+        waveform = self._shape.waveform(shares, inputs.limits)
         if not waveform.highest:
             return 2 * _LOST
-        seen = self._looked(waveform)
-        if seen.pull > 0:
-            return _LOST * (1 + seen.pull)
-        scale = self._scaled(waveform, seen).largest_Nm / waveform.highest / wanted.noise_rad
+        responses = self._compute_responses(waveform)
+        if responses.pull > 0:
+            return _LOST * (1 + responses.pull)
+        scale = self._scaled(waveform, responses).largest_Nm / waveform.highest / inputs.noise_rad
         best = best_sampling(
-            scale * seen.sensitivity,
-            seen.capacity,
-            wanted.samples,
-            wanted.criterion,
+            scale * responses.sensitivity,
+            responses.capacity,
+            inputs.samples,
+            inputs.criterion,
             gap=_GAP,
             most=_FILLINGS,
-            before=wanted.before,
+            before=inputs.before,
         )
-        bound = wanted.criterion.typical_bound(best.covariances)
+        bound = inputs.criterion.typical_bound(best.covariances)
         return round(float(np.log(bound)), _DECIMALS) if bound > 0 else _LOST
 
-    def _looked(self, waveform: Waveform) -> Looked:
-        return looked(self._views, self._cells, waveform, self._wanted.fastest_Hz)
+    def _compute_responses(self, waveform: Waveform) -> CellResponses:
+        return compute_cell_responses(
+            self._views, self._time_bins, waveform, self._inputs.fastest_Hz
+        )
 
-    def _scaled(self, waveform: Waveform, seen: Looked) -> Torque:
-        stroke, highest = self._wanted.stroke_rad, waveform.highest
+    def _scaled(self, waveform: Waveform, responses: CellResponses) -> Torque:
+        stroke, highest = self._inputs.stroke_rad, waveform.highest
         allowed = min(
-            self._wanted.largest_Nm / highest if highest else 0.0, stroke / seen.turned_rad
+            self._inputs.largest_Nm / highest if highest else 0.0, stroke / responses.turned_rad
         )
         return Torque(waveform.in_shares, allowed * highest)
 
 
 def best_torques(
-    wanted: Wanted,
+    inputs: DesignInputs,
     tried: int,
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
@@ -112,7 +114,7 @@ def best_torques(
 
     Parameters
     ----------
-    wanted
+    inputs
         Design problem.
     tried
         Approximate number of torques to try, as many of each shape.
@@ -128,13 +130,13 @@ def best_torques(
     """
     from scipy.optimize import differential_evolution
 
-    rounds = max(1, round(tried / len(wanted.shapes) / _CROWD))
+    rounds = max(1, round(tried / len(inputs.shapes) / _CROWD))
     count, lowest = 0, np.inf
     found: list[tuple[float, TorqueSearch, Array]] = []
     for name, shape in SHAPES.items():
-        if name not in wanted.shapes:
+        if name not in inputs.shapes:
             continue
-        search = TorqueSearch(wanted, shape)
+        search = TorqueSearch(inputs, shape)
 
         def objective(shares: Array, search: TorqueSearch = search) -> float:
             nonlocal count, lowest

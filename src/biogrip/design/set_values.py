@@ -2,24 +2,24 @@
 
 import numpy as np
 
-from biogrip.design.experiment import Wanted
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.search import Torque
 from biogrip.experiment.protocol import Phase, load
 
 _DIGITS = 4
 
 
-def set_values(wanted: Wanted, torque: Torque) -> tuple[Phase, ...]:
+def set_values(inputs: DesignInputs, torque: Torque) -> tuple[Phase, ...]:
     """Round a torque to values that can be set, both arms alike; no torque becomes larger.
 
     Parameters
     ----------
-    wanted
+    inputs
         Design problem, which gives the fastest sampling rate.
     torque
         Torque to be rounded.
     """
-    waveform, rate = torque.waveform, wanted.fastest_Hz
+    waveform, rate = torque.waveform, inputs.fastest_Hz
     levels, ends, amplitudes = (
         [_rounded_down(torque.largest_Nm * share) for share in shares]
         for shares in (waveform.levels, waveform.ends, waveform.amplitudes)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.waveform import Limits, Waveform, held, until_the_end
+from biogrip.design.waveform import Limits, Waveform, hold, until_the_end
 
 # Largest ratio of the lengths of the last and the first cycle of a train, or its reciprocal.
 _STRETCHED = 1e3
@@ -32,7 +32,7 @@ def steps(shares: Array, limits: Limits) -> Waveform:
     whole = limits.longest_s - limits.shortest_s
     durations, high, low = cycles(shares[1:8], count, 2 * limits.shortest_s * count, whole)
     levels = np.stack((high, low), axis=1).ravel()
-    return until_the_end(held(durations.ravel(), levels), shares[8], limits)
+    return until_the_end(hold(durations.ravel(), levels), shares[8], limits)
 
 
 def how_many(share: float, most: int) -> int:

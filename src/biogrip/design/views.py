@@ -168,7 +168,7 @@ class Moving:
         self.last_force: Array = force.T / views.lever_m
         """Jaw force at the end of each step, (n, n_steps)."""
 
-    def seen(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
+    def respond(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
         """Compute the responses after some steps.
 
         Parameters
@@ -195,8 +195,8 @@ class Moving:
 
         def rows(name: str) -> ComplexArray:
             g, by_rate, moved = (getattr(factors, name) for factors in (growth, slope, pushed))
-            told = by_growth * g + by_slope * by_rate
-            return np.concatenate((told, weights * g, -pulling * g - inert * moved), axis=1)
+            sensitivity = by_growth * g + by_slope * by_rate
+            return np.concatenate((sensitivity, weights * g, -pulling * g - inert * moved), axis=1)
 
         # (n, rows, n_seen, 3 m): of e^(r e) - 1, e^(r e) and e e^(r e).
         mixing = np.concatenate([rows(name) for name in ("growing", "decaying", "lasting")], axis=3)

@@ -76,7 +76,7 @@ class Waveform:
 _TORQUES = ("levels", "ends", "amplitudes")
 
 
-def held(durations_s: Array, levels: Array) -> Waveform:
+def hold(durations_s: Array, levels: Array) -> Waveform:
     """Return a waveform that holds torques one after the other."""
     return linear(durations_s, levels, levels)
 

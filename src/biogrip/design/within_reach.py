@@ -12,28 +12,28 @@ from dataclasses import replace
 import numpy as np
 
 from biogrip.design.criteria import inverted
-from biogrip.design.experiment import NO_BOUND, Wanted, relative_bounds
+from biogrip.design.experiment import NO_BOUND, DesignInputs, relative_bounds
 from biogrip.design.schedule import Plan, planned
 from biogrip.design.search import best_torques
 from biogrip.errors import BiogripError
 
 
-def planned_within_reach(
-    wanted: Wanted,
+def plan_within_reach(
+    inputs: DesignInputs,
     tried: int,
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
-) -> tuple[Wanted, Plan]:
+) -> tuple[DesignInputs, Plan]:
     """Design an experiment, removing parameters from the criterion that no torque determines.
 
     Parameters
     ----------
-    wanted, tried, rng, progress
+    inputs, tried, rng, progress
         As in `best_torques`.
 
     Returns
     -------
-    wanted
+    inputs
         Design problem with the remaining parameters.
     plan
         Experiment in which all parameters asked for have a bound.
@@ -44,33 +44,33 @@ def planned_within_reach(
         If no torque keeps contact, or none determines any parameter asked for.
     """
     while True:
-        plan = planned(wanted, best_torques(wanted, tried, rng, progress))
-        bounds = relative_bounds(plan.information)[:, wanted.criterion.asked]
+        plan = planned(inputs, best_torques(inputs, tried, rng, progress))
+        bounds = relative_bounds(plan.information)[:, inputs.criterion.targets]
         if bounds.max() <= NO_BOUND:
-            return wanted, plan
-        wanted = _without_worst(wanted, plan)
+            return inputs, plan
+        inputs = _without_worst(inputs, plan)
 
 
-def _without_worst(wanted: Wanted, plan: Plan) -> Wanted:
+def _without_worst(inputs: DesignInputs, plan: Plan) -> DesignInputs:
     """Remove the worst determined parameter from the criterion, whether asked for or not."""
     # Parameters that trade off against it have no bound either, but vary less.
     variances = np.diagonal(inverted(plan.information), axis1=1, axis2=2).max(axis=0)
-    variances[list(wanted.out_of_reach)] = 0.0
+    variances[list(inputs.out_of_reach)] = 0.0
     worst = int(np.argmax(variances))
-    asked = tuple(index for index in wanted.criterion.asked if index != worst)
-    if not asked:
-        names = ", ".join(wanted.model.names[index] for index in wanted.criterion.asked)
+    targets = tuple(index for index in inputs.criterion.targets if index != worst)
+    if not targets:
+        names = ", ".join(inputs.model.names[index] for index in inputs.criterion.targets)
         raise BiogripError(
-            f"design: found no torque of {', '.join(wanted.shapes)} with which readings at "
-            f"{wanted.fastest_Hz:g} Hz tell {names}, even to a factor of e to the {NO_BOUND:g}; "
+            f"design: found no torque of {', '.join(inputs.shapes)} with which readings at "
+            f"{inputs.fastest_Hz:g} Hz tell {names}, even to a factor of e to the {NO_BOUND:g}; "
             "allowed are a faster camera (`fastest_Hz`), more torque or less noise, other `shapes` "
             "or other `quantities`."
         )
     known = np.zeros_like(plan.information[0])
     known[worst, worst] = NO_BOUND**-2
     return replace(
-        wanted,
-        criterion=replace(wanted.criterion, asked=asked),
-        before=wanted.before + known,
-        out_of_reach=(*wanted.out_of_reach, worst),
+        inputs,
+        criterion=replace(inputs.criterion, targets=targets),
+        before=inputs.before + known,
+        out_of_reach=(*inputs.out_of_reach, worst),
     )

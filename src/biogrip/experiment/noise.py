@@ -12,8 +12,8 @@ from biogrip.experiment.noise_parts import (
     Flicker,
     Outliers,
     Relaxing,
+    draw_ornstein_uhlenbeck,
     flicker_rates,
-    remembering,
 )
 from biogrip.keys import Key, Problem
 
@@ -120,10 +120,10 @@ def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generat
     unit = np.sqrt(max(0.0, 1 - sum(shares))) * unit
     if noise.relaxing is not None:
         weight, rate = np.array([noise.relaxing.share]), np.array([1 / noise.relaxing.time_s])
-        unit += remembering(time_s, weight, rate, rng)
+        unit += draw_ornstein_uhlenbeck(time_s, weight, rate, rng)
     if noise.flicker is not None:
         rates = flicker_rates(time_s)
-        unit += remembering(
+        unit += draw_ornstein_uhlenbeck(
             time_s, np.full(len(rates), noise.flicker.share / len(rates)), rates, rng
         )
     if noise.drift is not None:

@@ -68,7 +68,7 @@ class Outliers:
     ]
 
 
-def remembering(
+def draw_ornstein_uhlenbeck(
     time_s: Array, weights: Array, rates_per_s: Array, rng: np.random.Generator
 ) -> Array:
     """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times.

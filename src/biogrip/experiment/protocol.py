@@ -152,7 +152,7 @@ class TorqueHistory:
         return not ramps and len(self.harmonic_time_s) == 0
 
 
-def held(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None = None) -> Phase:
+def hold(duration_s: float, torque_left_Nm: float, torque_right_Nm: float | None = None) -> Phase:
     """Return a phase that holds a torque, the same on both arms unless a right one is given."""
     right = torque_left_Nm if torque_right_Nm is None else torque_right_Nm
     return Phase(duration_s, Load(torque_left_Nm), Load(right))
@@ -261,8 +261,8 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
     torque = np.zeros_like(t)
     for start, (value, slope, curvature) in zip(history.time_s, getattr(history, arm), strict=True):
         elapsed = t - start
-        rise = value + slope * elapsed + curvature * elapsed**2 / 2
-        torque += np.where(elapsed >= 0, rise, 0.0)
+        gain = value + slope * elapsed + curvature * elapsed**2 / 2
+        torque += np.where(elapsed >= 0, gain, 0.0)
     amplitudes = getattr(history, f"harmonic_{arm}")
     for start, omega, a in zip(
         history.harmonic_time_s, history.omega_rad_per_s, amplitudes, strict=True

@@ -121,8 +121,8 @@ class SampleModel:
     @property
     def quantities(self) -> list[list[Parameter]]:
         """Rows of tables: every parameter, and the sum of the exchangeable ones."""
-        together = [p for p in self.parameters if p.name in self.exchangeable]
-        return [[p] for p in self.parameters] + ([together] if together else [])
+        exchangeable = [p for p in self.parameters if p.name in self.exchangeable]
+        return [[p] for p in self.parameters] + ([exchangeable] if exchangeable else [])
 
     @property
     def free_branches(self) -> tuple[tuple[int, int], ...]:

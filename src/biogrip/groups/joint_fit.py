@@ -29,7 +29,7 @@ from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
 
 # Relative convergence tolerance, far below the accuracy 1/sqrt(2 n) of a noise level.
-_SETTLED = 1e-9
+_CONVERGED = 1e-9
 _MOST_ROUNDS = 100
 _MOST_OPTIMA = 5
 # p value below which replicates count as traces of different samples.
@@ -81,27 +81,27 @@ def fitted_jointly(
     if len(problems) == 1:
         (problem,) = problems
         found = identify(problem)
-        told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
-        return JointFit(told, (told.likelihood.noise_rad,), None)
+        diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+        return JointFit(diagnosis, (diagnosis.likelihood.noise_rad,), None)
     levels = [noise_rad or problem.residuals.noise_scale_rad for problem in problems]
     joint = joint_problem(problems, levels)
     found = identify(joint)
     for _ in range(_MOST_OPTIMA):
         if noise_rad is None:
             joint, found, levels = _reweighted(problems, joint, found, levels)
-        told = diagnose(joint, model, found, confidence=confidence, noise_rad=noise_rad)
-        best = np.exp(told.likelihood.best)
+        diagnosis = diagnose(joint, model, found, confidence=confidence, noise_rad=noise_rad)
+        best = np.exp(diagnosis.likelihood.best)
         if noise_rad is not None or np.array_equal(best, found.parameters):
             break
         # A profile found a lower optimum, which has other noise levels.
-        found = replace(found, parameters=best, misfit_rad=told.likelihood.misfit_rad)
-    agreement = _agreement(problems, told.likelihood.best, noise_rad)
+        found = replace(found, parameters=best, misfit_rad=diagnosis.likelihood.misfit_rad)
+    agreement = _agreement(problems, diagnosis.likelihood.best, noise_rad)
     if agreement < _DISAGREE:
-        told.notes.append(
+        diagnosis.notes.append(
             "The traces do not tell of one and the same sample (replicates of one would differ as "
             f"much {one_in(agreement)}): the cell changed, or the intervals are too narrow."
         )
-    return JointFit(told, tuple(levels), agreement)
+    return JointFit(diagnosis, tuple(levels), agreement)
 
 
 def _reweighted(
@@ -118,7 +118,7 @@ def _reweighted(
         joint = joint_problem(problems, levels)
         found = found.at(fit := fit_from([joint], x))
         x = fit.x[0]
-        if max(abs(log(now / then)) for now, then in zip(levels, before, strict=True)) < _SETTLED:
+        if max(abs(log(now / then)) for now, then in zip(levels, before, strict=True)) < _CONVERGED:
             break
     return joint, found, levels
 

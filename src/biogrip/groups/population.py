@@ -117,7 +117,7 @@ class Population:
         return exp(self.centre + self.reach * self.deviation)
 
 
-def population_of(estimates: Estimates, confidence: float) -> Population:
+def estimate_population(estimates: Estimates, confidence: float) -> Population:
     """Estimate the population of the cells of a dish.
 
     Parameters

@@ -59,7 +59,7 @@ def _power(size: float, cells: int, confidence: float) -> float:
 
 
 def cells_needed(
-    ratio: float, wanted: float, spread: float, error: float, confidence: float = 0.95
+    ratio: float, target: float, spread: float, error: float, confidence: float = 0.95
 ) -> int:
     """Return the number of cells per dish needed to detect a difference with a given power.
 
@@ -69,27 +69,27 @@ def cells_needed(
     ----------
     ratio, spread, error, confidence
         Arguments of `power`; the ratio is not 1.
-    wanted
+    target
         Power, e.g. 0.8.
     """
     most = FEWEST_CELLS
-    while power(ratio, most, spread, error, confidence) < wanted:
+    while power(ratio, most, spread, error, confidence) < target:
         most *= 2
     allowed = range(max(FEWEST_CELLS, most // 2), most + 1)
     # More cells show more.
     return allowed[
-        bisect_left(allowed, wanted, key=lambda n: power(ratio, n, spread, error, confidence))
+        bisect_left(allowed, target, key=lambda n: power(ratio, n, spread, error, confidence))
     ]
 
 
-def ratio_seen(
-    cells: int, wanted: float, spread: float, error: float, confidence: float = 0.95
+def detectable_ratio(
+    cells: int, target: float, spread: float, error: float, confidence: float = 0.95
 ) -> float:
     """Return the smallest ratio above 1 detected with a given power; see `cells_needed`."""
     from scipy.optimize import brentq
 
     large = 1.0
-    while _power(large, cells, confidence) < wanted:
+    while _power(large, cells, confidence) < target:
         large *= 2
-    size = brentq(lambda size: _power(size, cells, confidence) - wanted, 0.0, large, xtol=1e-12)
+    size = brentq(lambda size: _power(size, cells, confidence) - target, 0.0, large, xtol=1e-12)
     return exp(float(size) * hypot(spread, error))

@@ -13,7 +13,7 @@ import numpy as np
 from arviz_stats.base import array_stats
 
 from biogrip.arrays import Array
-from biogrip.identifiability.straightened import Straightened
+from biogrip.identifiability.valley_coordinates import ValleyCoordinates
 
 MOST_R_HAT = 1.02
 """Largest R-hat of samples that have converged.
@@ -52,20 +52,20 @@ class Convergence:
 
     def words(self) -> str:
         """Describe the diagnostics in a sentence."""
-        told = (
+        numbers = (
             f"R-hat is {self.r_hat:.3f}, and the effective sample size is {self.bulk:.2g}, in the "
             f"tails {self.tail:.2g}"
         )
         if self.reached:
-            return f"The samples have converged: {told}."
+            return f"The samples have converged: {numbers}."
         return (
-            f"The samples have not converged: {told}; wanted are at most {MOST_R_HAT:g} and at "
+            f"The samples have not converged: {numbers}; wanted are at most {MOST_R_HAT:g} and at "
             f"least {FEWEST}. Do not rely on them: raise posterior.most_steps, or narrow the "
             "search range or the prior."
         )
 
 
-def convergence_of(log_parameters: Array, axes: Straightened) -> Convergence:
+def diagnose_convergence(log_parameters: Array, axes: ValleyCoordinates) -> Convergence:
     """Compute convergence diagnostics over all parameters and straightened coordinates.
 
     Parameters

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.identifiability.held_fits import HeldFits
+from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identify.local_fits import FAIR
 
 _MOST_FITS = 40
@@ -28,10 +28,10 @@ class Brackets:
     Parameters
     ----------
     profile : (n,)
-        Index of the profile in `HeldFits`.
+        Index of the profile in `ConstrainedFits`.
     values : (2, n)
         Logarithms of the quantity at the inner end, below the threshold, and the outer, above.
-    rises : (2, n)
+    increases : (2, n)
         Increases of chi^2 there.
     x : (2, n, n_parameters)
         Log-parameters fitted there.
@@ -41,12 +41,14 @@ class Brackets:
 
     profile: IntArray
     values: Array
-    rises: Array
+    increases: Array
     x: Array
     elsewhere: Array | None = None
 
 
-def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: float) -> Array:
+def crossings(
+    fits: ConstrainedFits, brackets: Brackets, tolerance: float, accuracy: float
+) -> Array:
     """Find the values of quantities at which the increase of chi^2 equals the threshold.
 
     Parameters
@@ -67,9 +69,9 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         threshold at the outer end, so that the crossing lies further out.
     """
     profile, threshold = brackets.profile, fits.threshold[brackets.profile]
-    wanted = np.sqrt(threshold)
+    root_threshold = np.sqrt(threshold)
     ends, x = brackets.values.copy(), brackets.x.copy()
-    excess = np.sqrt(np.maximum(brackets.rises, 0.0)) - wanted
+    excess = np.sqrt(np.maximum(brackets.increases, 0.0)) - root_threshold
     moved = np.full(len(profile), -1)
     found = ends[1].copy()
     left = np.arange(len(profile))
@@ -85,12 +87,12 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
         if not tries and brackets.elsewhere is not None:
             _, deepest = fits.from_each(profile, tried, brackets.elsewhere, FAIR)
             starts = np.concatenate((starts, deepest[None]))
-        rises, fitted = fits.from_each(profile[left], tried, starts, tolerance)
-        over = np.sqrt(np.maximum(np.min(rises, axis=0), 0.0)) - wanted[left]
+        increases, fitted = fits.from_each(profile[left], tried, starts, tolerance)
+        over = np.sqrt(np.maximum(np.min(increases, axis=0), 0.0)) - root_threshold[left]
         # A basin deeper than that of the outer end may be deeper at the outer end, too.
-        deeper = np.sqrt(np.maximum(rises[2], 0.0)) - wanted[left] > over + accuracy
-        _lower(fits, brackets, left[deeper], fitted[deeper], tolerance)
-        void = brackets.rises[1, left] < threshold[left]
+        missed = np.sqrt(np.maximum(increases[2], 0.0)) - root_threshold[left] > over + accuracy
+        _lower(fits, brackets, left[missed], fitted[missed], tolerance)
+        void = brackets.increases[1, left] < threshold[left]
         found[left] = np.where(void, np.nan, tried)
         side = (over > 0).astype(np.int64)
         ends[side, left], excess[side, left], x[side, left] = tried, over, fitted
@@ -105,11 +107,11 @@ def crossings(fits: HeldFits, brackets: Brackets, tolerance: float, accuracy: fl
 
 
 def _lower(
-    fits: HeldFits, brackets: Brackets, which: IntArray, starts: Array, tolerance: float
+    fits: ConstrainedFits, brackets: Brackets, which: IntArray, starts: Array, tolerance: float
 ) -> None:
     """Fit the outer ends of brackets from other starts and keep, in place, the lower fits."""
     if not len(which):
         return
-    rises, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, tolerance)
-    lower = rises < brackets.rises[1, which]
-    brackets.rises[1, which[lower]], brackets.x[1, which[lower]] = rises[lower], x[lower]
+    increases, x = fits.at(brackets.profile[which], brackets.values[1, which], starts, tolerance)
+    lower = increases < brackets.increases[1, which]
+    brackets.increases[1, which[lower]], brackets.x[1, which[lower]] = increases[lower], x[lower]

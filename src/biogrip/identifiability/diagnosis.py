@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
-from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
-from biogrip.identifiability.verdicts import Finding, Trade, findings_of, trades_of
+from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
@@ -73,23 +73,25 @@ def diagnose(
         Standard deviation of the noise, if it is known; else that of the residual.
     """
     while True:
-        likelihood = likelihood_of(
+        likelihood = make_likelihood(
             problem,
             np.log(found.parameters),
             found.misfit_rad,
             confidence=confidence,
             noise_rad=noise_rad,
         )
-        findings = findings_of(likelihood, parameters_and_sum(model))
-        trades = trades_of(likelihood, model, findings)
+        findings = compute_findings(likelihood, parameters_and_sum(model))
+        trades = find_trade_offs(likelihood, model, findings)
         profiled = [*findings, *(trade.finding for trade in trades)]
-        lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.rises.min()))
-        if lowest.rises.min() > -MISSED:
+        lowest = min(
+            (finding.profile for finding in profiled), key=lambda p: float(p.increases.min())
+        )
+        if lowest.increases.min() > -MISSED:
             break
-        deeper = found.at(fit_from([problem], lowest.lowest))
-        if likelihood.rise(deeper.misfit_rad) > -MISSED:
+        missed = found.at(fit_from([problem], lowest.lowest))
+        if likelihood.increase(missed.misfit_rad) > -MISSED:
             break
-        found = deeper
+        found = missed
     grip = problem.residuals.grip(likelihood.best)
     notes = [
         f"The confidence set of {finding.quantity.label} has {1 + len(finding.gaps)} separate "

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.identifiability.mixture import mixture_of
+from biogrip.identifiability.mixture import fit_mixture
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.sampling import Samples
-from biogrip.identifiability.straightened import straightened
+from biogrip.identifiability.valley_coordinates import valley_coordinates
 
 MOST_K_HAT = 0.7
 """Largest Pareto k-hat of importance weights with a reliable mean [2]."""
@@ -47,7 +47,7 @@ class Evidence:
         return self.k_hat <= MOST_K_HAT
 
 
-def evidence_of(posterior: Posterior, samples: Samples, rng: np.random.Generator) -> Evidence:
+def compute_evidence(posterior: Posterior, samples: Samples, rng: np.random.Generator) -> Evidence:
     """Compute the evidence with points drawn from a mixture that is fitted to the samples.
 
     Parameters
@@ -59,9 +59,9 @@ def evidence_of(posterior: Posterior, samples: Samples, rng: np.random.Generator
     """
     from arviz_stats.base import array_stats
 
-    axes = straightened(posterior.problem.residuals.model)
+    axes = valley_coordinates(posterior.problem.residuals.model)
     visited = samples.log_parameters.reshape(-1, samples.log_parameters.shape[2])
-    mixture = mixture_of(axes.of(visited), rng)
+    mixture = fit_mixture(axes.of(visited), rng)
     points = mixture.draw(_DRAWN, rng)
     weights = posterior.log_density(axes.back(points)) - mixture.log_density(points)
     largest = np.max(weights)

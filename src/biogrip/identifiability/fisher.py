@@ -48,18 +48,18 @@ def covariance(sensitivity: Array, noise_rad: float | Array) -> Array:
     if not scale:
         return np.zeros((len(sensitivity), len(sensitivity)))
     relative = sensitivity / scale
-    told = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
+    informed = np.flatnonzero(np.sum(relative**2, axis=1) > 1)
     found = np.diag(np.full(len(sensitivity), np.inf))
-    if len(told) == 0:
+    if len(informed) == 0:
         return found
-    j = relative[told]
+    j = relative[informed]
     # Rows of length one, for parameters may differ by decades in their information.
     length = np.sqrt(np.sum(j**2, axis=1))
     j = j / length[:, None]
     inverse = np.linalg.pinv(j @ j.T, hermitian=True, rcond=1e-12)
     scattered = j * (sigma / scale)
     within = inverse @ (scattered @ scattered.T) @ inverse / np.outer(length, length)
-    found[np.ix_(told, told)] = within
+    found[np.ix_(informed, informed)] = within
     return found
 
 

@@ -61,7 +61,7 @@ class Likelihood:
     threshold: float
     certainty: float
 
-    def rise(self, misfit_rad: float) -> float:
+    def increase(self, misfit_rad: float) -> float:
         """Return the increase of chi^2 over the optimum."""
         excess = misfit_rad**2 - self.misfit_rad**2
         return float(self.problem.residuals.samples * excess / self.noise_rad**2)
@@ -80,7 +80,7 @@ class Likelihood:
         return float(np.sqrt(slope @ np.linalg.solve(information, slope)))
 
 
-def likelihood_of(
+def make_likelihood(
     problem: Problem,
     best: Array,
     misfit_rad: float,

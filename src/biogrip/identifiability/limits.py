@@ -9,8 +9,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.identifiability.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.identifiability.crossings import Brackets, crossings
-from biogrip.identifiability.held_fits import CLOSE, HeldFits
 from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.local_fits import alike
@@ -21,7 +21,7 @@ _ACCURACY = 1e-3
 _FIRST_STEP, _MOST_DOUBLINGS = 2.2, 12
 
 
-def limits_and_deeper(
+def find_limits(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
 ) -> tuple[Array, dict[int, Array]]:
     """Find the confidence limits of quantities by profile likelihood, and optima that were missed.
@@ -37,22 +37,22 @@ def limits_and_deeper(
     -------
     limits : (n_traces, n_quantities, 2)
         Logarithms of the lower and upper limits; NaN where the profile stays below the threshold.
-    deeper
+    missed
         By trace, log-parameters whose chi^2 is clearly below that of its optimum, which is
         not the global one.
     """
     limits = np.empty((len(likelihoods), len(quantities), 2))
-    deeper: dict[int, Array] = {}
+    missed: dict[int, Array] = {}
     if not quantities:
-        return limits, deeper
+        return limits, missed
     for group in alike([likelihood.problem for likelihood in likelihoods]):
-        fits = HeldFits([likelihoods[index] for index in group], quantities)
+        fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
         limits[group] = _limits(fits).reshape(len(group), -1, 2)
-        deeper.update({int(group[trace]): x for trace, (_, x) in fits.deeper.items()})
-    return limits, deeper
+        missed.update({int(group[trace]): x for trace, (_, x) in fits.missed.items()})
+    return limits, missed
 
 
-def _limits(fits: HeldFits) -> Array:
+def _limits(fits: ConstrainedFits) -> Array:
     """Return the lower and upper limit of each profile in turn, (2 n_profiles,)."""
     profile, upper = (index.ravel() for index in np.indices((len(fits.best), 2)))
     stride = _FIRST_STEP * (2 * upper - 1) * fits.deviations()[profile]
@@ -60,23 +60,26 @@ def _limits(fits: HeldFits) -> Array:
     ends = np.stack((fits.at_best[profile], np.full(len(profile), np.nan)))
     low, high = fits.ranges()[:, profile]
     low, high = np.minimum(low, ends[0]), np.maximum(high, ends[0])
-    rises, x = np.zeros_like(ends), np.stack((fits.best[profile], fits.best[profile]))
+    increases, x = np.zeros_like(ends), np.stack((fits.best[profile], fits.best[profile]))
     limits = np.full(len(profile), np.nan)
     left = np.arange(len(profile))
     for _ in range(_MOST_DOUBLINGS):
         if not len(left):
             break
         tried = np.clip(ends[0, left] + stride[left], low[left], high[left])
-        rise, found = fits.at(profile[left], tried, x[0, left], CLOSE)
-        side = (rise >= fits.threshold[profile[left]]).astype(np.int64)
-        ends[side, left], rises[side, left], x[side, left] = tried, rise, found
+        increase, found = fits.at(profile[left], tried, x[0, left], CLOSE)
+        side = (increase >= fits.threshold[profile[left]]).astype(np.int64)
+        ends[side, left], increases[side, left], x[side, left] = tried, increase, found
         closed = left[side == 1]
         # No additional starts: limits are those of the optimum's own basin.
-        brackets = Brackets(profile[closed], ends[:, closed], rises[:, closed], x[:, closed])
+        brackets = Brackets(profile[closed], ends[:, closed], increases[:, closed], x[:, closed])
         limits[closed] = crossings(fits, brackets, CLOSE, _ACCURACY)
         # If another basin is below the threshold at the outer end, the search continues there.
         on = np.isnan(limits[closed])
-        ends[0, closed[on]], rises[0, closed[on]] = brackets.values[1, on], brackets.rises[1, on]
+        ends[0, closed[on]], increases[0, closed[on]] = (
+            brackets.values[1, on],
+            brackets.increases[1, on],
+        )
         x[0, closed[on]] = brackets.x[1, on]
         stride[left] *= 2
         left = left[np.isnan(limits[left]) & (tried > low[left]) & (tried < high[left])]

@@ -30,7 +30,7 @@ class Marginal:
     inner, outer
         Equal-tailed credible intervals, of 50 % and of the confidence that was asked for.
     share
-        Share of the samples that fulfil the conditions of the quantity, its `hinges`;
+        Share of the samples that fulfil the conditions of the quantity, its `penalties`;
         the others do not count.
     """
 
@@ -70,15 +70,15 @@ class Marginal:
             )
         ends = {"lower": low, "upper": high}
         free = " and ".join(name for name, limit in ends.items() if limit is None)
-        told = [f"{name} {limit:.2g}" for name, limit in ends.items() if limit is not None]
-        limit = f" (its {told[0]})" if told else ""
+        texts = [f"{name} {limit:.2g}" for name, limit in ends.items() if limit is not None]
+        limit = f" (its {texts[0]})" if texts else ""
         return (
             f"{label}: the profile has no {free} limit{limit}. There the interval ends where the "
             "prior does, and another search range or prior would give another one."
         )
 
 
-def marginals_of(
+def compute_marginals(
     log_parameters: Array, quantities: Sequence[Quantity], duration_s: float, confidence: float
 ) -> list[Marginal]:
     """Compute the marginal posteriors of quantities from samples.
@@ -97,7 +97,7 @@ def marginals_of(
     levels = [0.5, *(0.5 * (1 + way * share) for share in (_INNER, confidence) for way in (-1, 1))]
     found, (count, size) = [], log_parameters.shape
     for quantity in quantities:
-        late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.hinges]
+        late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.penalties]
         holds = np.all(np.less_equal(late, 0.0).reshape(-1, count), axis=0)
         # If no sample fulfils the conditions, all count.
         counted = log_parameters[holds] if np.any(holds) else log_parameters

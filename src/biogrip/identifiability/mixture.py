@@ -78,7 +78,7 @@ class Mixture:
         return drawn
 
 
-def mixture_of(points: Array, rng: np.random.Generator) -> Mixture:
+def fit_mixture(points: Array, rng: np.random.Generator) -> Mixture:
     """Fit a mixture to a cloud of points.
 
     Parameters

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identifiability.held_fits import CLOSE, HeldFits
+from biogrip.identifiability.constrained_fits import CLOSE, ConstrainedFits
 from biogrip.identify.local_fits import FAIR
 
 HIGHEST = 16.0
@@ -32,19 +32,19 @@ class Points:
     ----------
     profile : (n_points,)
         Index of the profile of each point.
-    values, rises : (n_points,)
+    values, increases : (n_points,)
         Logarithms of the quantity, and increases of chi^2.
     x : (n_points, n_parameters)
         Log-parameters fitted there.
     """
 
-    def __init__(self, fits: HeldFits, grids: Sequence[Array]) -> None:
+    def __init__(self, fits: ConstrainedFits, grids: Sequence[Array]) -> None:
         self.fits = fits
         self.profile = np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
         self.values = np.concatenate(grids)
         self.x = fits.best[self.profile]
         self._optimum = self.values == fits.at_best[self.profile]
-        self.rises = np.where(self._optimum, 0.0, np.inf)
+        self.increases = np.where(self._optimum, 0.0, np.inf)
 
     def from_optimum(self) -> None:
         """Fit every point but the optimum, starting from the optimum."""
@@ -65,15 +65,15 @@ class Points:
     def _try(self, point: IntArray, start: IntArray, tolerance: float) -> BoolArray:
         """Fit points from other points' fits; return a mask of those that have improved much."""
         profile, targets = self.profile[point], self.values[point]
-        rises, x = self.fits.at(profile, targets, self.x[start], tolerance)
+        increases, x = self.fits.at(profile, targets, self.x[start], tolerance)
         news = np.zeros(len(self.values), dtype=bool)
         # A point may be fitted from both sides, so one side after the other.
         for side in (point <= start, point > start):
-            before, after = self.rises[point[side]], rises[side]
+            before, after = self.increases[point[side]], increases[side]
             news[point[side]] |= after < before - NEWS * (1 + np.abs(after))
             better = after < before
             at = point[side][better]
-            self.rises[at], self.x[at] = after[better], x[side][better]
+            self.increases[at], self.x[at] = after[better], x[side][better]
         return news
 
     def ends(self) -> IntArray:
@@ -106,7 +106,7 @@ class Points:
         new = self.values[left + 1] != values
         self._add(left[new], values[new])
         for _ in range(_MOST_ROUNDS):
-            roots = np.sqrt(np.clip(self.rises, 0.0, HIGHEST))
+            roots = np.sqrt(np.clip(self.increases, 0.0, HIGHEST))
             left = np.flatnonzero((np.abs(np.diff(roots)) > _STEP) & (np.diff(self.profile) == 0))
             self._add(left, 0.5 * (self.values[left] + self.values[left + 1]))
 
@@ -115,8 +115,8 @@ class Points:
         if not len(left):
             return
         profile, right = self.profile[left], left + 1
-        rises, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
+        increases, x = self.fits.from_each(profile, values, self.x[np.stack((left, right))], CLOSE)
         self.profile = np.insert(self.profile, right, profile)
         self.values = np.insert(self.values, right, values)
-        self.rises = np.insert(self.rises, right, np.min(rises, axis=0))
+        self.increases = np.insert(self.increases, right, np.min(increases, axis=0))
         self.x = np.insert(self.x, right, x, axis=0)

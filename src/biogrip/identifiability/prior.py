@@ -64,9 +64,9 @@ class Prior:
         share = rng.random((count, len(self.low)))
         below, above = self._within
         drawn = self.low + share * (self.high - self.low)
-        told = self.precision > 0
-        z = ndtri(below + share * (above - below))[:, told]
-        drawn[:, told] = self.centre[told] + z / self.precision[told]
+        informed = self.precision > 0
+        z = ndtri(below + share * (above - below))[:, informed]
+        drawn[:, informed] = self.centre[informed] + z / self.precision[informed]
         drawn = np.clip(drawn, self.low, self.high)
         return np.take_along_axis(drawn, self.model.in_order(np.exp(drawn)), axis=1)
 
@@ -83,14 +83,18 @@ class Prior:
     def _largest(self) -> float:
         """Logarithm of the prior density at its centre."""
         below, above = self._within
-        told = self.precision > 0
-        of_normal = np.log(self.precision[told] / np.sqrt(2 * np.pi) / (above - below)[told])
-        of_uniform = -np.log((self.high - self.low)[~told])
+        informed = self.precision > 0
+        of_normal = np.log(
+            self.precision[informed] / np.sqrt(2 * np.pi) / (above - below)[informed]
+        )
+        of_uniform = -np.log((self.high - self.low)[~informed])
         orders = factorial(max(len(self.model.free_branches), 1))
         return float(np.sum(of_normal) + np.sum(of_uniform) + np.log(orders))
 
 
-def prior_of(model: SampleModel, low: Array, high: Array, told: Mapping[str, LogNormal]) -> Prior:
+def make_prior(
+    model: SampleModel, low: Array, high: Array, informed: Mapping[str, LogNormal]
+) -> Prior:
     """Return the prior of a model's parameters.
 
     Parameters
@@ -99,12 +103,12 @@ def prior_of(model: SampleModel, low: Array, high: Array, told: Mapping[str, Log
         Sample model.
     low, high : (n_parameters,)
         Logarithms of the ends of the search range.
-    told
+    informed
         Log-normal priors by parameter name; the others are log-uniform.
     """
     centre, precision = 0.5 * (low + high), np.zeros(len(low))
     for index, name in enumerate(model.names):
-        if name in told:
-            centre[index] = np.log(told[name].median)
-            precision[index] = 1 / told[name].spread
+        if name in informed:
+            centre[index] = np.log(informed[name].median)
+            precision[index] = 1 / informed[name].spread
     return Prior(model, low, high, centre, precision)

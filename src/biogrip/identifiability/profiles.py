@@ -20,8 +20,8 @@ from itertools import pairwise
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identifiability.crossings import Brackets, crossings
-from biogrip.identifiability.held_fits import HeldFits
 from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.points import Points
 from biogrip.identifiability.quantities import Quantity
@@ -43,7 +43,7 @@ class Profile:
 
     Parameters
     ----------
-    log_values, rises : (n_points,)
+    log_values, increases : (n_points,)
         Ascending values, and the increase of chi^2 at each.
     best
         Value at the optimum.
@@ -56,7 +56,7 @@ class Profile:
     """
 
     log_values: Array
-    rises: Array
+    increases: Array
     best: float
     low: float | None
     high: float | None
@@ -64,7 +64,7 @@ class Profile:
     gaps: tuple[tuple[float, float], ...] = ()
 
 
-def profiles_of(
+def compute_profiles(
     likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity], *, smooth: bool = True
 ) -> list[list[Profile]]:
     """Compute profile likelihoods over the whole ranges of quantities, and confidence limits.
@@ -86,14 +86,14 @@ def profiles_of(
     found: dict[int, list[Profile]] = {}
     count = len(quantities)
     for group in alike([likelihood.problem for likelihood in likelihoods]):
-        fits = HeldFits([likelihoods[index] for index in group], quantities)
+        fits = ConstrainedFits([likelihoods[index] for index in group], quantities)
         own = _profiles(fits, smooth=smooth)
         for place, index in enumerate(group.tolist()):
             found[index] = own[place * count : (place + 1) * count]
     return [found[index] for index in range(len(likelihoods))]
 
 
-def _profiles(fits: HeldFits, *, smooth: bool) -> list[Profile]:
+def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
     grids = [_grid(each, quantity) for each in fits.likelihoods for quantity in fits.quantities]
     points = Points(fits, grids)
     points.from_optimum()
@@ -104,11 +104,13 @@ def _profiles(fits: HeldFits, *, smooth: bool) -> list[Profile]:
     found = []
     for index, ends in enumerate(limits.tolist()):
         own = points.profile == index
-        values, rises, x = points.values[own], points.rises[own], points.x[own]
+        values, increases, x = points.values[own], points.increases[own], points.x[own]
         low, high = (None if np.isnan(end) else end for end in ends)
-        gaps = gaps_of(values, rises, float(fits.threshold[index]))
-        lowest = x[int(np.argmin(rises))]
-        found.append(Profile(values, rises, float(fits.at_best[index]), low, high, lowest, gaps))
+        gaps = find_gaps(values, increases, float(fits.threshold[index]))
+        lowest = x[int(np.argmin(increases))]
+        found.append(
+            Profile(values, increases, float(fits.at_best[index]), low, high, lowest, gaps)
+        )
     return found
 
 
@@ -126,32 +128,34 @@ def _limits(points: Points) -> Array:
     """Find the limits, where profiles cross the threshold, (2, n_profiles); NaN without limit."""
     fits, ends = points.fits, points.ends()
     crossed = np.full(ends.shape, np.nan)
-    end, profile = np.nonzero(points.rises[ends] > fits.certainty)
+    end, profile = np.nonzero(points.increases[ends] > fits.certainty)
     while len(profile):
-        below = np.flatnonzero(points.rises < fits.threshold[points.profile])
+        below = np.flatnonzero(points.increases < fits.threshold[points.profile])
         own = points.profile[below]
         first, last = np.searchsorted(own, profile), np.searchsorted(own, profile, "right") - 1
         inside = below[np.where(end == 0, first, last)]
         outside = np.where(end == 0, inside - 1, inside + 1)
         both = np.stack((inside, outside))
-        values, rises, x = points.values[both], points.rises[both], points.x[both]
+        values, increases, x = points.values[both], points.increases[both], points.x[both]
         elsewhere = points.extremes()[:, fits.trace[profile]]
-        brackets = Brackets(profile, values, rises, x, elsewhere)
+        brackets = Brackets(profile, values, increases, x, elsewhere)
         found = crossings(fits, brackets, FINE, _ACCURACY)
         crossed[end, profile] = found
-        points.rises[both], points.x[both] = brackets.rises, brackets.x
+        points.increases[both], points.x[both] = brackets.increases, brackets.x
         # Where the outer point has come below the threshold, the next bracket is further out.
         on = np.isnan(found) & (outside != ends[end, profile])
         end, profile = end[on], profile[on]
     return crossed
 
 
-def gaps_of(log_values: Array, rises: Array, threshold: float) -> tuple[tuple[float, float], ...]:
+def find_gaps(
+    log_values: Array, increases: Array, threshold: float
+) -> tuple[tuple[float, float], ...]:
     """Find the stretches of a profile above the threshold that lie between points below it.
 
     Parameters
     ----------
-    log_values, rises : (n_points,)
+    log_values, increases : (n_points,)
         A profile.
     threshold
         Increase of chi^2 at the limits.
@@ -161,19 +165,19 @@ def gaps_of(log_values: Array, rises: Array, threshold: float) -> tuple[tuple[fl
     tuple of (float, float)
         Both ends of each, interpolated linearly in the square root of the increase.
     """
-    inside = np.flatnonzero(rises < threshold).tolist()
+    inside = np.flatnonzero(increases < threshold).tolist()
     found = []
     for start, end in pairwise(inside):
-        if end > start + 1 and rises[start + 1 : end].max() > _CLEARLY * threshold:
-            begins = _crossing(log_values, rises, threshold, start, start + 1)
-            found.append((begins, _crossing(log_values, rises, threshold, end, end - 1)))
+        if end > start + 1 and increases[start + 1 : end].max() > _CLEARLY * threshold:
+            begins = _crossing(log_values, increases, threshold, start, start + 1)
+            found.append((begins, _crossing(log_values, increases, threshold, end, end - 1)))
     return tuple(found)
 
 
 def _crossing(
-    log_values: Array, rises: Array, threshold: float, inside: int, outside: int
+    log_values: Array, increases: Array, threshold: float, inside: int, outside: int
 ) -> float:
-    ends = np.sqrt(np.maximum(rises[[inside, outside]], 0.0))
+    ends = np.sqrt(np.maximum(increases[[inside, outside]], 0.0))
     if ends[1] <= ends[0]:
         return float(log_values[outside])
     share = min((np.sqrt(threshold) - ends[0]) / (ends[1] - ends[0]), 1.0)

@@ -18,7 +18,7 @@ _WITHIN, _IN_ORDER = 10.0, 100.0
 
 
 @dataclass(frozen=True)
-class Hinge:
+class BranchPenalty:
     """A penalty residual that is zero while a branch relaxes early enough.
 
     Parameters
@@ -67,7 +67,7 @@ class Quantity:
     form
         ``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of
         reciprocals.
-    hinges
+    penalties
         Conditions for the quantity to be meaningful. A sum requires that branches relax
         within the experiment: the damper of a branch too weak and slow to be seen could
         have any size. Parameters of several branches require that these relax in order:
@@ -80,12 +80,12 @@ class Quantity:
     members: tuple[int, ...]
     form: str = "product"
     sign: tuple[int, ...] = (1,)
-    hinges: tuple[Hinge, ...] = ()
+    penalties: tuple[BranchPenalty, ...] = ()
 
     @property
     def provided(self) -> str | None:
         """Assumption about the sample, in words, if there is one."""
-        count = sum(hinge.before is None for hinge in self.hinges)
+        count = sum(penalty.before is None for penalty in self.penalties)
         if not count:
             return None
         return f"the {'branch relaxes' if count == 1 else 'branches relax'} within the experiment"
@@ -136,19 +136,19 @@ def parameters_and_sum(model: SampleModel) -> list[Quantity]:
     """Return every parameter, and the sum of those that the model calls exchangeable."""
     ordered = _ordered(model)
     single = [
-        Quantity(p.name, p.symbol, p.unit, (index,), hinges=ordered)
+        Quantity(p.name, p.symbol, p.unit, (index,), penalties=ordered)
         for index, p in enumerate(model.parameters)
     ]
-    together = tuple(
+    exchangeable = tuple(
         index for index, p in enumerate(model.parameters) if p.name in model.exchangeable
     )
-    if len(together) < 2:
+    if len(exchangeable) < 2:
         return single
-    within = tuple(Hinge(branch) for branch in model.free_branches)
-    return [*single, replace(_sum(model, together), hinges=within)]
+    within = tuple(BranchPenalty(branch) for branch in model.free_branches)
+    return [*single, replace(_sum(model, exchangeable), penalties=within)]
 
 
-def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
+def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
     """Return combinations of two parameters that may be determined if neither is alone.
 
     Two springs or two dampers have their sum (in parallel) and their series combination,
@@ -167,11 +167,11 @@ def combinations_of(model: SampleModel, members: list[int]) -> list[Quantity]:
             pair = (a, b) if first.kind == "damping" else (b, a)
             names, symbols, _ = _named(model, pair)
             found.append(Quantity("/".join(names), "/".join(symbols), "s", pair, sign=(1, -1)))
-    return [replace(quantity, hinges=ordered) for quantity in found]
+    return [replace(quantity, penalties=ordered) for quantity in found]
 
 
-def _ordered(model: SampleModel) -> tuple[Hinge, ...]:
-    return tuple(Hinge(branch, later) for branch, later in pairwise(model.free_branches))
+def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
+    return tuple(BranchPenalty(branch, later) for branch, later in pairwise(model.free_branches))
 
 
 def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:
@@ -181,7 +181,7 @@ def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:
 
 def _series(model: SampleModel, members: tuple[int, ...]) -> Quantity:
     names, symbols, unit = _named(model, members)
-    label, symbol = (" + ".join(f"1/{each}" for each in told) for told in (names, symbols))
+    label, symbol = (" + ".join(f"1/{each}" for each in texts) for texts in (names, symbols))
     return Quantity(f"1/({label})", f"$1/($ {symbol} $)$", unit, members, "series")
 
 

@@ -23,11 +23,11 @@ from emcee.moves import DEMove, MHMove
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.identifiability.convergence import Convergence, convergence_of
-from biogrip.identifiability.mixture import Mixture, mixture_of
+from biogrip.identifiability.convergence import Convergence, diagnose_convergence
+from biogrip.identifiability.mixture import Mixture, fit_mixture
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import PosteriorSettings
-from biogrip.identifiability.straightened import Straightened, straightened
+from biogrip.identifiability.valley_coordinates import ValleyCoordinates, valley_coordinates
 from biogrip.identify.answer import Progress
 from biogrip.identify.local_fits import FAIR, LocalFits
 
@@ -88,7 +88,7 @@ def sampled(
     BiogripError
         If the model has no response in most of the search range.
     """
-    axes = straightened(posterior.problem.residuals.model)
+    axes = valley_coordinates(posterior.problem.residuals.model)
     walkers = _starts(posterior, settings.walkers, rng)
     # The sampler draws from NumPy's older generator, whose streams never change.
     seed = np.random.RandomState(np.random.MT19937(int(rng.integers(2**63)))).get_state()
@@ -97,12 +97,12 @@ def sampled(
     for power in _POWERS:
         wider = ensemble.recent
         ensemble.walk(_STRETCH, moves, power)
-        moves = _moves(posterior, axes, mixture_of(axes.of(ensemble.recent), rng))
+        moves = _moves(posterior, axes, fit_mixture(axes.of(ensemble.recent), rng))
     left = settings.most_steps - len(_POWERS) * _STRETCH
     # Samples from before the last fit of the mixture are not kept.
     for length in (*_LEARNING, left):
         learnt = np.concatenate([ensemble.recent, wider[: len(ensemble.recent) // _WIDER]])
-        moves = _moves(posterior, axes, mixture_of(axes.of(learnt), rng))
+        moves = _moves(posterior, axes, fit_mixture(axes.of(learnt), rng))
         stretches: list[Stretch] = []
         while len(stretches) < length:
             stretches.append(ensemble.walk(_STRETCH, moves))
@@ -114,10 +114,10 @@ def sampled(
     return found
 
 
-def _samples(stretches: Sequence["Stretch"], axes: Straightened) -> Samples:
+def _samples(stretches: Sequence["Stretch"], axes: ValleyCoordinates) -> Samples:
     chains, accepted = zip(*stretches, strict=True)
-    together = np.concatenate(chains)
-    return Samples(together, float(np.mean(accepted)), convergence_of(together, axes))
+    exchangeable = np.concatenate(chains)
+    return Samples(exchangeable, float(np.mean(accepted)), diagnose_convergence(exchangeable, axes))
 
 
 def _starts(posterior: Posterior, count: int, rng: np.random.Generator) -> Array:
@@ -196,7 +196,7 @@ class _Sampler(emcee.EnsembleSampler):  # type: ignore[misc]
 class _AlongValley(DEMove):  # type: ignore[misc]
     """Differential evolution moves in coordinates whose Jacobian determinant is one."""
 
-    def __init__(self, axes: Straightened, gamma0: float | None = None) -> None:
+    def __init__(self, axes: ValleyCoordinates, gamma0: float | None = None) -> None:
         super().__init__(gamma0=gamma0)
         self._axes = axes
 
@@ -209,9 +209,9 @@ class _AlongValley(DEMove):  # type: ignore[misc]
         return _gridded(self._axes.back(proposed)), factors
 
 
-def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = None) -> Moves:
+def _moves(posterior: Posterior, axes: ValleyCoordinates, mixture: Mixture | None = None) -> Moves:
     """Return the moves: differences, single coordinates, and draws of a mixture if there is one."""
-    prior, plain = posterior.prior, Straightened(())
+    prior, plain = posterior.prior, ValleyCoordinates(())
     found: list[tuple[emcee.moves.Move, float]] = [
         (_AlongValley(plain), 0.15),
         (_AlongValley(axes), 0.15),
@@ -225,7 +225,7 @@ def _moves(posterior: Posterior, axes: Straightened, mixture: Mixture | None = N
 
 
 def _one_anew(
-    axes: Straightened, low: Array, high: Array, walkers: Array, random: np.random.RandomState
+    axes: ValleyCoordinates, low: Array, high: Array, walkers: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
     """Propose for each walker a uniform draw of one coordinate, chosen at random."""
     proposed = axes.of(walkers)
@@ -236,7 +236,7 @@ def _one_anew(
 
 
 def _of_mixture(
-    axes: Straightened, mixture: Mixture, walkers: Array, random: np.random.RandomState
+    axes: ValleyCoordinates, mixture: Mixture, walkers: Array, random: np.random.RandomState
 ) -> tuple[Array, Array]:
     """Propose draws from a mixture, independent of the walkers' points."""
     drawn = _gridded(axes.back(mixture.draw(len(walkers), random)))

@@ -9,8 +9,8 @@ import numpy as np
 
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.likelihood import Likelihood
-from biogrip.identifiability.profiles import Profile, profiles_of
-from biogrip.identifiability.quantities import Quantity, combinations_of
+from biogrip.identifiability.profiles import Profile, compute_profiles
+from biogrip.identifiability.quantities import Quantity, find_combinations
 
 DETERMINED = "determined"
 BOUNDED_BELOW = "bounded below"
@@ -69,7 +69,7 @@ class Finding:
         return [(math.exp(start), math.exp(end)) for start, end in self.profile.gaps]
 
     @property
-    def told(self) -> bool:
+    def is_bounded(self) -> bool:
         """True if the trace bounds the quantity on at least one side."""
         return self.verdict != NOT_DETERMINED
 
@@ -123,16 +123,18 @@ class Trade:
         )
 
 
-def findings_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Finding]:
+def compute_findings(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Finding]:
     """Profile quantities and reach a verdict on each."""
-    (profiles,) = profiles_of([likelihood], quantities)
+    (profiles,) = compute_profiles([likelihood], quantities)
     return [
         Finding(quantity, profile, likelihood.deviation(quantity))
         for quantity, profile in zip(quantities, profiles, strict=True)
     ]
 
 
-def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding]) -> list[Trade]:
+def find_trade_offs(
+    likelihood: Likelihood, model: SampleModel, findings: list[Finding]
+) -> list[Trade]:
     """Find determined combinations of parameters that are not determined themselves."""
     open_ones = [
         finding.quantity.members[0]
@@ -146,11 +148,11 @@ def trades_of(likelihood: Likelihood, model: SampleModel, findings: list[Finding
             found.append((members, finding))
             open_ones = [index for index in open_ones if index not in members]
     for pair in combinations(open_ones, 2):
-        candidates = combinations_of(model, list(pair))
+        candidates = find_combinations(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
         if min(deviations, default=np.inf) < _WORTH_A_LOOK:
             best = candidates[int(np.argmin(deviations))]
-            found += [(list(pair), finding) for finding in findings_of(likelihood, [best])]
+            found += [(list(pair), finding) for finding in compute_findings(likelihood, [best])]
     return [
         Trade(tuple(model.parameters[index].name for index in members), finding)
         for members, finding in found

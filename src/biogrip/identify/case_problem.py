@@ -11,7 +11,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.problem import Problem, problem_of, searched
+from biogrip.identify.problem import Problem, make_problem, searched
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
@@ -19,8 +19,8 @@ from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
 from biogrip.response.misfit import Misfit
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
-from biogrip.response.residuals import noise_of
-from biogrip.response.whitening import Colour, Whitening
+from biogrip.response.residuals import estimate_noise
+from biogrip.response.whitening import NoiseModel, Whitening
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class CaseProblem:
     Parameters
     ----------
     gripper, ranges, noise_rad
-        As in `problem_of`.
+        As in `make_problem`.
     nonlinear
         True to simulate the nonlinear model.
     offset, drift
@@ -126,7 +126,7 @@ class CaseProblem:
             if sampled not in self._condensed:
                 self._condensed[sampled] = self._condense(time_s, self.nuisance(time_s), shown)
             condensed = self._condensed[sampled]
-        return problem_of(
+        return make_problem(
             self.gripper,
             model or self.searched,
             self.torque,
@@ -148,7 +148,7 @@ class CaseProblem:
         # Ringing that does not show even without noise needs no estimate of the noise.
         if not inertia_shows(change, rotation_rad, 0.0):
             return False
-        noise_rad = noise_rad or self.noise_rad or noise_of(rotation_rad)
+        noise_rad = noise_rad or self.noise_rad or estimate_noise(rotation_rad)
         return inertia_shows(change, rotation_rad, noise_rad)
 
     def for_model(self, problem: Problem, model: SampleModel) -> Problem:
@@ -164,7 +164,7 @@ class CaseProblem:
         return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
 
     def in_noise(
-        self, time_s: Array, colour: Colour | None, uncertain: Array, *, inertia: bool
+        self, time_s: Array, noise_model: NoiseModel | None, uncertain: Array, *, inertia: bool
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
 
@@ -172,7 +172,7 @@ class CaseProblem:
         ----------
         time_s : (n_samples,)
             Ascending sampling times.
-        colour
+        noise_model
             Autocorrelation model of the noise; None if it is white.
         uncertain : (n_functions, n_samples)
             Functions added with a random amplitude, see `with_uncertain`.
@@ -180,8 +180,8 @@ class CaseProblem:
             True to include the inertia of the arms.
         """
         nuisance, whitening = self.nuisance(time_s), None
-        if colour is not None:
-            whitening = Whitening(time_s, colour, nuisance, uncertain)
+        if noise_model is not None:
+            whitening = Whitening(time_s, noise_model, nuisance, uncertain)
         return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)
 
     def _condense(

@@ -13,7 +13,7 @@ from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import Genome
 from biogrip.identify.problem import Problem
 from biogrip.identify.selection import Ranking, best
-from biogrip.response.misfit import Misfits, together
+from biogrip.response.misfit import Misfits, combine_misfits
 
 
 def identify_many(
@@ -31,7 +31,7 @@ def identify_many(
 
     `progress` is called after every generation, for all problems together.
     """
-    evolutions = evolved(problems, settings, rngs, progress)
+    evolutions = evolve(problems, settings, rngs, progress)
     return [evolution.identification for evolution in evolutions]
 
 
@@ -52,14 +52,14 @@ class Evolution:
     last_survivors: Array
 
 
-def evolved(
+def evolve(
     problems: Sequence[Problem],
     settings: GeneticSettings,
     rngs: Sequence[np.random.Generator],
     progress: Progress = silent,
 ) -> list[Evolution]:
     """Identify samples as `identify_many` does, and return the survivors as well."""
-    misfits = together([problem.misfit for problem in problems])
+    misfits = combine_misfits([problem.misfit for problem in problems])
     return evolve_many(misfits, problems[0].genome, settings, rngs, progress)
 
 

@@ -35,8 +35,8 @@ def cross(
     (n_words, n_populations, n_children)
     """
     words, populations, count = parents.shape
-    wanted = settings.population - settings.survivors
-    pairs = -(-wanted // 2)
+    n_children = settings.population - settings.survivors
+    pairs = -(-n_children // 2)
     first, last = (
         min(cut if cut > 0 else genome.genes + cut, genome.genes - 1)
         for cut in (settings.first_cut, settings.last_cut)
@@ -49,7 +49,7 @@ def cross(
     drawn += count * np.arange(populations)[:, None, None]
     mated = parents.reshape(words, -1).take(drawn.swapaxes(1, 2), axis=1)
     children = genome.crossed(mated, cut).reshape(words, populations, -1)
-    return np.ascontiguousarray(children[:, :, :wanted])
+    return np.ascontiguousarray(children[:, :, :n_children])
 
 
 def _mates(

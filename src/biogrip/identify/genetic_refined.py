@@ -12,7 +12,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
-from biogrip.identify.genetic import Evolution, evolved
+from biogrip.identify.genetic import Evolution, evolve
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.multi_start import best_of_starts
 from biogrip.identify.problem import Problem
@@ -52,7 +52,7 @@ def identify_many(
 
     `progress` is called after every generation, for all problems together, and finally for each.
     """
-    evolutions = evolved(problems, settings.genetic, rngs, progress)
+    evolutions = evolve(problems, settings.genetic, rngs, progress)
     starts, before = zip(*(_survivors(e, settings.polishing) for e in evolutions), strict=True)
     fine = best_of_starts(problems, starts, before, progress)
     coarse = [evolution.identification for evolution in evolutions]

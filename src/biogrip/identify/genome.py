@@ -253,10 +253,10 @@ def _values(low: tuple[int, ...], high: tuple[int, ...]) -> _Values:
     if len(exponents) * len(mantissas) <= _LARGEST_TABLE:
         table = (mantissas * multiplier[:, None] / divisor[:, None]).ravel()
 
-        def looked_up(which: IntArray, out: Array) -> None:
+        def look_up(which: IntArray, out: Array) -> None:
             table.take(which, out=out, mode="clip")
 
-        return looked_up
+        return look_up
 
     def computed(which: IntArray, out: Array) -> None:
         exponent = which // len(mantissas)
@@ -289,7 +289,7 @@ _MULTIPLIER = np.array([10.0 ** max(power, 0) for power in _POWERS])
 _DIVISOR = np.array([10.0 ** max(-power, 0) for power in _POWERS])
 
 
-def genome_of(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
+def make_genome(model: SampleModel, ranges: Mapping[str, GeneRange]) -> Genome:
     """Return the genome of a sample model.
 
     Parameters
@@ -310,8 +310,8 @@ def nearest_encodable(value: float, genes: GeneRange) -> float:
     mantissas = _mantissas(genes.least[1:], genes.most[1:])
     found = []
     for exponent in range(genes.exponent[0], genes.exponent[1] + 1):
-        wanted = value / 10.0 ** (exponent - genes.digits)
-        nearest = mantissas[np.argmin(np.abs(mantissas - wanted))]
+        scaled = value / 10.0 ** (exponent - genes.digits)
+        nearest = mantissas[np.argmin(np.abs(mantissas - scaled))]
         found.append(float(f"{nearest:.0f}e{exponent - genes.digits}"))
     return min(found, key=lambda candidate: abs(candidate - value))
 

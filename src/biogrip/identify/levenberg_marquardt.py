@@ -136,7 +136,7 @@ class _State(Rows):
     growth: Array
 
 
-def minimized(
+def minimize(
     objective: Objective,
     starts: Array,
     low: Array,
@@ -243,9 +243,9 @@ def bounded_step(normal: Normal, damping: Array, below: Array, above: Array) -> 
     """
     gradient, information = normal.gradient, normal.information
     fixed = ((below >= 0) & (gradient > 0)) | ((above <= 0) & (gradient < 0))
-    wanted = _free_step(gradient, information, damping, fixed)
-    step = np.clip(wanted, below, above)
-    outside = step != wanted
+    unbounded = _free_step(gradient, information, damping, fixed)
+    step = np.clip(unbounded, below, above)
+    outside = step != unbounded
     again = np.flatnonzero(np.any(outside, axis=1))
     if len(again):
         information = information[again]

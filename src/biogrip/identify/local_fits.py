@@ -11,9 +11,9 @@ from typing import Protocol
 import numpy as np
 
 from biogrip.arrays import Array, IntArray, parts
-from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, minimized
+from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, minimize
 from biogrip.identify.problem import Problem
-from biogrip.identify.refreshed_fits import minimized_with_refreshes
+from biogrip.identify.refreshed_fits import minimize_with_refreshes
 
 PRIOR_WIDTH = 100.0
 """Standard deviation, in e-folds, of the Gaussian prior about the middle of each range.
@@ -36,7 +36,7 @@ _APART = 1e-4
 _AT_ONCE = 1_000_000
 
 
-class Held(Constraint, Protocol):
+class FitConstraint(Constraint, Protocol):
     """A constraint between parameters that fits keep, with residuals of its own if it has any."""
 
     def started(self, x: Array) -> Array:
@@ -173,7 +173,7 @@ class LocalFits:
         trace: IntArray,
         tolerance: float = FINE,
         *,
-        held: Held | None = None,
+        constraint: FitConstraint | None = None,
         low: Array | None = None,
         high: Array | None = None,
     ) -> Minima:
@@ -187,7 +187,7 @@ class LocalFits:
             Index of the trace that each is fitted to.
         tolerance
             `ROUGH`, `FAIR` or `FINE`.
-        held
+        constraint
             Constraint that the fits keep.
         low, high : (n, n_parameters) or (n_parameters,)
             Bounds instead of the search range; equal bounds fix a parameter.
@@ -195,8 +195,8 @@ class LocalFits:
         low = np.broadcast_to(self.low if low is None else low, starts.shape)
         high = np.broadcast_to(self.high if high is None else high, starts.shape)
         starts = np.clip(starts, low, high)
-        if held is not None:
-            starts = held.started(starts)
+        if constraint is not None:
+            starts = constraint.started(starts)
 
         def rows_of(x: Array, correction: Array | None = None) -> Array:
             rows = self._residuals.condensed_linear(x)
@@ -206,11 +206,11 @@ class LocalFits:
 
         def objective(x: Array, fit: IntArray, *correction: Array) -> Normal:
             normal = self._in_parts(rows_of, x, trace[fit], *correction)
-            return normal if held is None else held.added(normal, x, fit)
+            return normal if constraint is None else constraint.added(normal, x, fit)
 
         if self._residuals.nonlinear:
             correction = self._residuals.condensed_corrections
-            return minimized_with_refreshes(
-                objective, correction, starts, low, high, tolerance, held
+            return minimize_with_refreshes(
+                objective, correction, starts, low, high, tolerance, constraint
             )
-        return minimized(objective, starts, low, high, tolerance, held)
+        return minimize(objective, starts, low, high, tolerance, constraint)

@@ -23,7 +23,7 @@ WORTH_A_MENTION = 2.0
 
 
 @dataclass(frozen=True)
-class Tried:
+class FittedModel:
     """A sample model fitted to a trace.
 
     Parameters
@@ -65,18 +65,20 @@ def aic_and_bic(
     return square + 2 * counted, square + counted * np.log(samples)
 
 
-def ranked(candidates: Sequence[str], misfits_rad: Sequence[float], samples: int) -> list[Tried]:
+def ranked(
+    candidates: Sequence[str], misfits_rad: Sequence[float], samples: int
+) -> list[FittedModel]:
     """Compare the best fits of several models to one trace by AIC and BIC, keeping their order."""
     counts = [len(CANDIDATES[name].model.names) for name in candidates]
     criteria = aic_and_bic(misfits_rad, samples, counts)
     aic, bic = (values - values.min() for values in criteria)
     return [
-        Tried(name, misfit, float(a), float(b))
+        FittedModel(name, misfit, float(a), float(b))
         for name, misfit, a, b in zip(candidates, misfits_rad, aic, bic, strict=True)
     ]
 
 
-def advice(tried: Sequence[Tried], chosen: str) -> str:
+def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     """State in a sentence whether BIC prefers another model to the chosen one.
 
     Parameters

@@ -17,8 +17,8 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
 from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.local_fits import ROUGH, LocalFits, alike
+from biogrip.identify.newton_refinement import refine_optima
 from biogrip.identify.problem import Problem
-from biogrip.identify.settling import settled
 
 # Changes of the springs' logarithms in additional starts for ringing arms.
 _STIFFER = np.array([0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3])
@@ -76,7 +76,7 @@ def _best_of_alike(
     if problems[0].residuals.inertia:
         fine, trace_of_fine = _beside_the_best(fits, fine, trace_of_fine)
     winners = np.concatenate([_best(fine, trace_of_fine == own, 1) for own in traces])
-    best = settled(fits, fine[winners], traces)
+    best = refine_optima(fits, fine[winners], traces)
     answers = []
     for own, first_row in enumerate(before):
         rows = _descents(rough[trace == own], first_row)
@@ -167,7 +167,7 @@ def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
     Minima
         The optimum of every trace.
     """
-    return _fit_alike(problems, starts, settled)
+    return _fit_alike(problems, starts, refine_optima)
 
 
 def descend_from(problems: Sequence[Problem], starts: Array) -> Minima:

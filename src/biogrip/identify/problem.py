@@ -8,10 +8,10 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
-from biogrip.identify.genome import GeneRange, Genome, genome_of
+from biogrip.identify.genome import GeneRange, Genome, make_genome
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
-from biogrip.response.misfit import Misfit, misfit_of
+from biogrip.response.misfit import Misfit, make_misfit
 from biogrip.response.residuals import Residuals
 
 
@@ -45,7 +45,7 @@ class Problem:
         return replace(self, misfit=quiet.condensed_misfit, residuals=quiet)
 
 
-def problem_of(
+def make_problem(
     gripper: Gripper,
     model: SampleModel,
     torque: TorqueHistory,
@@ -74,17 +74,17 @@ def problem_of(
     residuals = Residuals(
         gripper, model, torque, time_s, rotation_rad, condensed, noise_rad=noise_rad
     )
-    misfit = misfit_of(residuals, gripper, torque, time_s, rotation_rad)
+    misfit = make_misfit(residuals, gripper, torque, time_s, rotation_rad)
     return searched(misfit, residuals, ranges)
 
 
 def searched(misfit: Misfit, residuals: Residuals, ranges: Mapping[str, GeneRange]) -> Problem:
-    """Set up a problem from its misfit and residuals, with `ranges` as in `problem_of`."""
+    """Set up a problem from its misfit and residuals, with `ranges` as in `make_problem`."""
     chosen = [ranges[parameter.range_name] for parameter in residuals.model.parameters]
     return Problem(
         misfit,
         residuals,
-        genome_of(residuals.model, ranges),
+        make_genome(residuals.model, ranges),
         np.log([genes.low for genes in chosen]),
         np.log([genes.high for genes in chosen]),
     )

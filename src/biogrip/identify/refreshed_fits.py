@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, Rows, minimized
+from biogrip.identify.levenberg_marquardt import Constraint, Minima, Normal, Rows, minimize
 
 # Most fits need two or three.
 _MOST_ROUNDS = 12
@@ -59,17 +59,17 @@ class Expansion(Rows):
 class _Some:
     """The constraint of a subset of the problems."""
 
-    held: Constraint
+    own_constraint: Constraint
     which: IntArray
 
     def eliminated(self, normal: Normal, x: Array, problem: IntArray) -> tuple[Normal, BoolArray]:
-        return self.held.eliminated(normal, x, self.which[problem])
+        return self.own_constraint.eliminated(normal, x, self.which[problem])
 
     def restored(self, x: Array, problem: IntArray, eliminated: BoolArray) -> Array:
-        return self.held.restored(x, self.which[problem], eliminated)
+        return self.own_constraint.restored(x, self.which[problem], eliminated)
 
 
-def minimized_with_refreshes(
+def minimize_with_refreshes(
     objective: Objective,
     correction: Correction,
     starts: Array,
@@ -78,9 +78,9 @@ def minimized_with_refreshes(
     tolerance: float,
     constraint: Constraint | None = None,
 ) -> Minima:
-    """Minimize as `minimized` does, with the correction expanded about a few points only.
+    """Minimize as `minimize` does, with the correction expanded about a few points only.
 
-    The other arguments are those of `minimized`.
+    The other arguments are those of `minimize`.
     """
     best = Minima.none_yet(starts, evaluations=0)
     lowest, foreseen = np.full(len(starts), np.inf), np.full(len(starts), np.nan)
@@ -107,7 +107,7 @@ def minimized_with_refreshes(
         ) -> Normal:
             return objective(points, which[problem], of.at(points, problem))
 
-        held = None if constraint is None else _Some(constraint, left)
-        x[left] = minimized(expanded, x[left], low[left], high[left], tolerance, held).x
+        own_constraint = None if constraint is None else _Some(constraint, left)
+        x[left] = minimize(expanded, x[left], low[left], high[left], tolerance, own_constraint).x
         foreseen[left] = expanded(x[left], np.arange(len(left))).square_sum
     return best

@@ -19,7 +19,7 @@ def typical(found: pd.DataFrame) -> pd.Series:
     return found.loc[ranked[(len(ranked) - 1) // 2]]
 
 
-def chi_square_rise(found: pd.DataFrame, samples: int) -> Array:
+def chi_square_increase(found: pd.DataFrame, samples: int) -> Array:
     """Return the increase of each identification's chi^2 over the lowest of its trace, (n,).
 
     The lowest is that of any method, or that of the true parameters where these are
@@ -35,8 +35,8 @@ def chi_square_rise(found: pd.DataFrame, samples: int) -> Array:
     misfit = found["misfit_rad"]
     lowest = misfit.groupby(found["seed"]).transform("min")
     lowest = np.fmin(lowest, found["noise_rms_rad"].where(found["noise_rms_rad"] > 0))
-    rise: Array = samples * ((misfit / lowest) ** 2 - 1).to_numpy(float)
-    return rise
+    increase: Array = samples * ((misfit / lowest) ** 2 - 1).to_numpy(float)
+    return increase
 
 
 def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
@@ -44,7 +44,7 @@ def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
 
     Such a fit looks right in a plot. With thousands of readings it need not be an optimum:
     a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
-    `chi_square_rise`.
+    `chi_square_increase`.
     """
     misfit, noise = (found[name].to_numpy(float) for name in ("misfit_rad", "noise_rms_rad"))
     reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise

@@ -16,15 +16,15 @@ from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.multi_start import fit_from
-from biogrip.identify.noise_colour import ColourLikelihood
+from biogrip.identify.noise_model_fit import NoiseModelLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
-from biogrip.response.whitening import MOST_SAMPLES, Colour
+from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
 
 _ROUNDS = 5
 # Changes of noise shares and times below this change no confidence limit in its third digit.
-_SETTLED = 1e-2
+_CONVERGED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
@@ -43,7 +43,7 @@ class TraceFit:
         The trace without outliers; its residuals are white.
     found
         Its global optimum.
-    colour
+    noise_model
         Autocorrelation model of the noise; None if the noise was assumed to be white.
     outliers : (n_samples,)
         True for readings that were left out.
@@ -51,14 +51,14 @@ class TraceFit:
 
     problem: Problem
     found: Identification
-    colour: Colour | None
+    noise_model: NoiseModel | None
     outliers: BoolArray
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return the estimated noise model as plain data; None if noise was assumed white."""
-        if self.colour is None:
+        if self.noise_model is None:
             return None
-        shares = {"white": self.colour.white, **vars(self.colour)}
+        shares = {"white": self.noise_model.white, **vars(self.noise_model)}
         return {
             **{name: rounded(share) for name, share in shares.items()},
             "degrees_of_freedom": rounded(self.problem.residuals.freedom),
@@ -67,14 +67,16 @@ class TraceFit:
 
     def notes(self) -> list[str]:
         """Describe the estimated noise model in sentences."""
-        if self.colour is None:
+        if self.noise_model is None:
             return []
-        colour, left_out = self.colour, int(np.count_nonzero(self.outliers))
-        parts = [f"{_percent(colour.white)} white"]
-        if colour.relaxing >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.relaxing)} correlated over some {colour.time_s:.2g} s")
-        if colour.flicker >= _WORTH_SAYING:
-            parts.append(f"{_percent(colour.flicker)} 1/f")
+        noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
+        parts = [f"{_percent(noise_model.white)} white"]
+        if noise_model.relaxing >= _WORTH_SAYING:
+            parts.append(
+                f"{_percent(noise_model.relaxing)} correlated over some {noise_model.time_s:.2g} s"
+            )
+        if noise_model.flicker >= _WORTH_SAYING:
+            parts.append(f"{_percent(noise_model.flicker)} 1/f")
         said = [
             f"Noise model: of the variance {', '.join(parts)}; an offset and a drift of the "
             "instrument are fitted along, and the intervals allow for all of it."
@@ -85,7 +87,9 @@ class TraceFit:
         return said
 
 
-def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find) -> TraceFit:
+def trace_fit(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+) -> TraceFit:
     """Fit a trace and, if wanted, estimate the model of its noise.
 
     With a coloured noise model, outliers are removed, an offset and a drift are fitted as
@@ -94,7 +98,7 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
 
     Parameters
     ----------
-    posed
+    case_problem
         Assumptions of the identification.
     time_s, rotation_rad : (n_samples,)
         The trace, times ascending.
@@ -107,10 +111,10 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
         If the trace has too many readings for a coloured noise model.
     """
     kept = np.ones(len(time_s), dtype=bool)
-    if not posed.coloured:
-        plain = posed.of(time_s, rotation_rad)
+    if not case_problem.coloured:
+        plain = case_problem.of(time_s, rotation_rad)
         found = find(plain)
-        if posed.plain:
+        if case_problem.plain:
             return TraceFit(plain, found, None, ~kept)
     else:
         if len(time_s) > MOST_SAMPLES:
@@ -118,68 +122,74 @@ def trace_fit(posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
                 f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
                 "noise model: average neighbouring samples."
             )
-        posed = replace(posed, offset=True, drift=True)
-        kept, plain, found = _without_outliers(posed, time_s, rotation_rad, find)
+        case_problem = replace(case_problem, offset=True, drift=True)
+        kept, plain, found = _without_outliers(case_problem, time_s, rotation_rad, find)
     time_s, rotation_rad = time_s[kept], rotation_rad[kept]
-    problem, found, colour = _in_turn(posed, time_s, rotation_rad, plain, found)
+    problem, found, noise_model = _in_turn(case_problem, time_s, rotation_rad, plain, found)
     # Slow deviations now weigh less, so that another basin may be the deepest.
     other = find(problem)
     if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
         found = other
-    return TraceFit(problem, found, colour, ~kept)
+    return TraceFit(problem, found, noise_model, ~kept)
 
 
 def _without_outliers(
-    posed: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, find: Find
 ) -> tuple[BoolArray, Problem, Identification]:
     kept = np.ones(len(time_s), dtype=bool)
     for _ in range(_ROUNDS):
-        plain = posed.of(time_s[kept], rotation_rad[kept])
+        plain = case_problem.of(time_s[kept], rotation_rad[kept])
         found = find(plain)
         struck = outliers_of(plain.residuals(np.log(found.parameters))[0])
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
-    return kept, posed.of(time_s[kept], rotation_rad[kept]), found
+    return kept, case_problem.of(time_s[kept], rotation_rad[kept]), found
 
 
 def _in_turn(
-    posed: CaseProblem, time_s: Array, rotation_rad: Array, plain: Problem, found: Identification
-) -> tuple[Problem, Identification, Colour | None]:
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    plain: Problem,
+    found: Identification,
+) -> tuple[Problem, Identification, NoiseModel | None]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
-    problem, colour = plain, None
+    problem, noise_model = plain, None
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
         inertia = problem.residuals.inertia
-        uncertain = gripper_functions(posed, time_s, found.parameters, inertia=inertia)
+        uncertain = gripper_functions(case_problem, time_s, found.parameters, inertia=inertia)
         left = problem.residuals.free - len(found.parameters)
-        noise_rad = posed.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
-        before: Colour | None = colour
-        if posed.coloured:
-            nuisance = posed.nuisance(time_s)
+        noise_rad = case_problem.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
+        before: NoiseModel | None = noise_model
+        if case_problem.coloured:
+            nuisance = case_problem.nuisance(time_s)
             directions = np.vstack((sensitivity, nuisance, uncertain))
-            likelihood = ColourLikelihood(time_s, residual, directions)
-            colour = likelihood.best(near=before)
-        condensed = posed.in_noise(time_s, colour, uncertain / noise_rad, inertia=inertia)
-        problem = posed.of(time_s, rotation_rad, condensed=condensed)
+            likelihood = NoiseModelLikelihood(time_s, residual, directions)
+            noise_model = likelihood.best(near=before)
+        condensed = case_problem.in_noise(
+            time_s, noise_model, uncertain / noise_rad, inertia=inertia
+        )
+        problem = case_problem.of(time_s, rotation_rad, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))
         slopes = problem.residuals.condensed_responses(fit.x)[0, 1:]
         moved = np.linalg.norm((fit.x[0] - start) @ slopes) / noise_rad
-        if moved < _STAYED and _alike(before, colour):
+        if moved < _STAYED and _alike(before, noise_model):
             break
-    if colour is not None:
-        freedom = likelihood.freedom(colour, sensitivity / noise_rad, nuisance)
+    if noise_model is not None:
+        freedom = likelihood.freedom(noise_model, sensitivity / noise_rad, nuisance)
         problem = replace(problem, residuals=problem.residuals.with_freedom(freedom))
-    return problem, found, colour
+    return problem, found, noise_model
 
 
-def _alike(one: Colour | None, other: Colour | None) -> bool:
+def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
     shares = abs(one.relaxing - other.relaxing) + abs(one.flicker - other.flicker)
     times = min(one.relaxing, other.relaxing) * abs(np.log(one.time_s / other.time_s))
-    return bool(shares + times < _SETTLED)
+    return bool(shares + times < _CONVERGED)
 
 
 def _percent(share: float) -> str:

@@ -14,7 +14,7 @@ _WITHOUT_RING = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
 
 
 def gripper_functions(
-    posed: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
+    case_problem: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
 ) -> Array:
     """Compute the change of a rotation by one standard uncertainty of each arm property.
 
@@ -23,7 +23,7 @@ def gripper_functions(
 
     Parameters
     ----------
-    posed
+    case_problem
         Assumptions of the identification.
     time_s : (n_times,)
         Ascending times.
@@ -42,14 +42,16 @@ def gripper_functions(
     .. [1] JCGM 100:2008, Evaluation of measurement data: guide to the expression of uncertainty
        in measurement, section 5.1.3, note 2.
     """
-    network = posed.searched.network(parameters)
+    network = case_problem.searched.network(parameters)
 
     def simulated(gripper: Gripper) -> Array:
-        rows = simulated_rotation(gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear)
+        rows = simulated_rotation(
+            gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
+        )
         return rows[0]
 
     properties = (*_WITHOUT_RING, "inertia_kgm2") if inertia else _WITHOUT_RING
-    pairs = _pairs(posed.gripper, posed.uncertainty, properties)
+    pairs = _pairs(case_problem.gripper, case_problem.uncertainty, properties)
     found = [0.5 * (simulated(above) - simulated(below)) for above, below in pairs]
     return np.reshape(found, (len(found), len(time_s)))
 

@@ -70,7 +70,7 @@ def voltage(comb: CombDrive, torque_Nm: ArrayLike) -> Array:
     ValueError
         If a torque is negative: a comb drive only pulls.
     """
-    wanted = np.asarray(torque_Nm, dtype=float)
-    if np.any(wanted < 0):
-        raise ValueError(f"a comb drive only pulls: torque {wanted.min()} N m is negative")
-    return np.sqrt(2 * wanted / capacitance_slope(comb))
+    torques = np.asarray(torque_Nm, dtype=float)
+    if np.any(torques < 0):
+        raise ValueError(f"a comb drive only pulls: torque {torques.min()} N m is negative")
+    return np.sqrt(2 * torques / capacitance_slope(comb))

@@ -27,7 +27,7 @@ def _case(found: Designed) -> Iterator[str]:
         keys = ", ".join(f"{key}: {_number(value)}" for key, value in _keys(phase))
         yield f"        - {{ {keys} }}"
     yield "    measurement:"
-    yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.wanted.noise_rad)} }}"
+    yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.inputs.noise_rad)} }}"
     yield "      bursts:"
     for burst in found.plan.bursts:
         start, rate = _number(burst.from_s), _number(burst.rate_Hz)

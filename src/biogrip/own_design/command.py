@@ -8,7 +8,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
 from biogrip.own_design.as_config import as_config
 from biogrip.own_design.designed import designed, in_words, percent
-from biogrip.own_design.earlier import Recorded, told_by_recorded
+from biogrip.own_design.earlier import Recorded, estimate_from_recordings
 from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.progress import Progress
@@ -67,12 +67,14 @@ def design(
     with Progress("designs", len(chosen), live=True) as progress:
         for case in chosen:
             traces = [_recorded(files, own, case.name) for own in after]
-            told = told_by_recorded(traces, read_as, study.study_seed) if traces else None
+            earlier = (
+                estimate_from_recordings(traces, read_as, study.study_seed) if traces else None
+            )
 
             def tried(count: int, bound: float, title: str = case.title) -> None:
                 progress.doing(f"{title}: {count} torques tried, bound {percent(bound)}")
 
-            found.append(designed(case, study.study_seed, tried, told))
+            found.append(designed(case, study.study_seed, tried, earlier))
             progress.done()
     # Imported lazily: Matplotlib takes a second.
     from biogrip.own_design.page import write_page

@@ -7,13 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import NO_BOUND, Wanted, information_of, told_at
+from biogrip.design.earlier_traces import Earlier
+from biogrip.design.experiment import (
+    NO_BOUND,
+    DesignInputs,
+    compute_information,
+    compute_sensitivities,
+)
 from biogrip.design.schedule import Plan, forces
-from biogrip.design.told import Earlier
-from biogrip.design.within_reach import planned_within_reach
+from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.random_streams import stream
-from biogrip.study.asked_design import wanted_of
+from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.study import Case
 
 
@@ -25,7 +30,7 @@ class Designed:
     ----------
     case
         Case that the experiment is for.
-    wanted
+    inputs
         Inputs of the design, without parameters that no torque determines.
     plan
         The designed experiment.
@@ -37,7 +42,7 @@ class Designed:
     """
 
     case: Case
-    wanted: Wanted
+    inputs: DesignInputs
     plan: Plan
     before: Array
     after: Array
@@ -70,37 +75,37 @@ def designed(
     BiogripError
         If no torque keeps the jaws pressing throughout and determines the quantities.
     """
-    asked = case.block.design
-    assert asked is not None
+    block = case.block.design
+    assert block is not None
     rng = stream(study_seed, case.name, 0, "design")
-    wanted, plan = planned_within_reach(wanted_of(case, earlier), asked.tried, rng, progress)
+    inputs, plan = plan_within_reach(make_design_inputs(case, earlier), block.tried, rng, progress)
     history = torque_history(case.phases)
-    told = told_at(
-        wanted.gripper,
-        wanted.model,
+    sensitivity = compute_sensitivities(
+        inputs.gripper,
+        inputs.model,
         history,
         case.sampling.over(history.end_s),
-        wanted.parameters,
-        wanted.noise_rad,
+        inputs.parameters,
+        inputs.noise_rad,
     )
-    before = wanted.bounds(information_of(told) + wanted.before)
-    network = wanted.model.network(wanted.parameters)
-    time_s, force_N = forces(wanted.gripper, network, plan.phases)
-    after = wanted.bounds(plan.information)
-    return Designed(case, wanted, plan, before, after, time_s, force_N)
+    before = inputs.bounds(compute_information(sensitivity) + inputs.before)
+    network = inputs.model.network(inputs.parameters)
+    time_s, force_N = forces(inputs.gripper, network, plan.phases)
+    after = inputs.bounds(plan.information)
+    return Designed(case, inputs, plan, before, after, time_s, force_N)
 
 
 def in_words(found: Designed) -> str:
     """Return a design in words: settings, and bounds before and after."""
-    plan, model = found.plan, found.wanted.model
+    plan, model = found.plan, found.inputs.model
     lines = [f"{found.case.title}: {_setting(found)}."]
     worst = [np.max(bounds, axis=0) for bounds in (found.before, found.after)]
     several = f", worst of {len(found.after)} plausible samples" if len(found.after) > 1 else ""
     lines.append(f"  bound (1 standard deviation{several}): as configured | designed")
     for name, before, after in zip(model.names, *worst, strict=True):
         lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
-    if found.wanted.out_of_reach:
-        lines.append(f"  {left_out(found.wanted)}")
+    if found.inputs.out_of_reach:
+        lines.append(f"  {left_out(found.inputs)}")
     lines.append(
         f"  no other sampling of this torque is better by more than {100 * plan.gap:.2g} %; the "
         f"jaws press throughout, with at most {1e6 * found.force_N.max():.3g} µN"
@@ -108,12 +113,12 @@ def in_words(found: Designed) -> str:
     return "\n".join(lines)
 
 
-def left_out(wanted: Wanted) -> str:
+def left_out(inputs: DesignInputs) -> str:
     """Return a sentence on parameters that no torque determines, and on remedies."""
-    names = ", ".join(wanted.model.names[index] for index in sorted(wanted.out_of_reach))
+    names = ", ".join(inputs.model.names[index] for index in sorted(inputs.out_of_reach))
     return (
         "left out, as no torque that was tried determines it with readings at "
-        f"{wanted.fastest_Hz:g} Hz: {names}; the other bounds allow for a factor of e to the "
+        f"{inputs.fastest_Hz:g} Hz: {names}; the other bounds allow for a factor of e to the "
         f"{NO_BOUND:g} in it. A faster camera (fastest_Hz), more torque or other shapes may help."
     )
 

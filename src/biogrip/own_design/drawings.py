@@ -58,12 +58,12 @@ def _draw_torque(axes: Axes, found: Designed) -> None:
     axes.plot([*times, times[-1]], [*torques, 0.0], lw=0.8)
 
 
-def draw_told(found: Designed) -> Figure:
+def draw_sensitivities(found: Designed) -> Figure:
     """Draw sensitivities in units of the noise after the steps with the most readings.
 
     For a sinusoid the last whole period is drawn, with all readings folded into it.
     """
-    plan, wanted = found.plan, found.wanted
+    plan, inputs = found.plan, found.inputs
     history, times = plan.torque, plan.time_s
     step = history.time_s.searchsorted(times, side="left") - 1
     chosen = sorted(np.argsort(-np.bincount(step, minlength=len(history.time_s)))[:3].tolist())
@@ -74,7 +74,7 @@ def draw_told(found: Designed) -> Figure:
         read = times[step == k] - start_s
         period_s = _period_s(phase)
         if period_s is None:
-            shown = after = np.geomspace(0.3 / wanted.fastest_Hz, phase.duration_s, _AFTER)
+            shown = after = np.geomspace(0.3 / inputs.fastest_Hz, phase.duration_s, _AFTER)
             axes.set_xscale("log")
             axes.set_xlabel("time since the step (s)")
         else:
@@ -83,15 +83,15 @@ def draw_told(found: Designed) -> Figure:
             read = read % period_s / period_s
             axes.set_xlabel("part of the period")
         rows = ringing_responses(
-            wanted.gripper,
-            wanted.model,
+            inputs.gripper,
+            inputs.model,
             history,
             start_s + after * (1 - 1e-12),
-            wanted.parameters[:1],
+            inputs.parameters[:1],
         )[0]
-        for index, name in enumerate(wanted.model.names):
-            told = np.abs(rows[1 + index]) / wanted.noise_rad
-            axes.semilogy(shown, told, color=_COLOURS[index % len(_COLOURS)], label=name)
+        for index, name in enumerate(inputs.model.names):
+            sensitivity = np.abs(rows[1 + index]) / inputs.noise_rad
+            axes.semilogy(shown, sensitivity, color=_COLOURS[index % len(_COLOURS)], label=name)
         lowest = axes.get_ylim()[0]
         axes.plot(read, np.full(len(read), lowest), "|", color=BLACK, ms=5)
         axes.set_title(f"{kind(phase)} {k + 1}: {counted(len(read), 'reading')}")
@@ -117,5 +117,5 @@ def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
     yield (
         "Sensitivity of a reading to each parameter over the noise, after the steps with the "
         "most readings (ticks); in the last period of a sinusoid",
-        draw_told(found),
+        draw_sensitivities(found),
     )

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from biogrip.design.told import Earlier, told_by
+from biogrip.design.earlier_traces import Earlier, estimate_from_traces
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.groups.replicates import joint_problem
@@ -12,7 +12,7 @@ from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.study.asked_design import plausible_ends
+from biogrip.study.design_inputs import plausible_ends
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 
@@ -36,7 +36,9 @@ class Recorded:
     file: Path
 
 
-def told_by_recorded(traces: Sequence[Recorded], read_as: ReadAs, study_seed: int) -> Earlier:
+def estimate_from_recordings(
+    traces: Sequence[Recorded], read_as: ReadAs, study_seed: int
+) -> Earlier:
     """Fit the traces of one sample jointly, adding one after another.
 
     Parameters
@@ -56,40 +58,40 @@ def told_by_recorded(traces: Sequence[Recorded], read_as: ReadAs, study_seed: in
         With the option, or file and line, if a trace cannot be used or contradicts the configs.
     """
     case = traces[0].case
-    asked = case.block.design
-    assert asked is not None
+    block = case.block.design
+    assert block is not None
     read_as.check()
-    noise_rad = read_as.noise_rad or asked.noise_rad
-    problems = [_posed(each, read_as, noise_rad) for each in traces]
+    noise_rad = read_as.noise_rad or block.noise_rad
+    problems = [_make_problem(each, read_as, noise_rad) for each in traces]
     rng = stream(study_seed, case.name, 0, "after")
 
     def identify(problem: Problem) -> Identification:
         return best_fit(problem, case.method("least_squares"), rng, silent)
 
-    told, ends = None, plausible_ends(case)
+    earlier, ends = None, plausible_ends(case)
     for count, recorded in enumerate(traces, 1):
         joint = joint_problem(problems[:count], count * [noise_rad])
-        told = told_by(joint, noise_rad, identify, ends, asked.drawn, rng, told)
-        if told.misfit_rad > _UNLIKE * noise_rad:
+        earlier = estimate_from_traces(joint, noise_rad, identify, ends, block.drawn, rng, earlier)
+        if earlier.misfit_rad > _UNLIKE * noise_rad:
             raise BiogripError(
-                f"--after: {recorded.file}: found {told.misfit_rad:.3g} rad that the best fit "
+                f"--after: {recorded.file}: found {earlier.misfit_rad:.3g} rad that the best fit "
                 f"leaves, allowed is at most {_UNLIKE:g} times the noise of {noise_rad:.3g} rad "
                 "(--noise, else design.noise_rad): is it of this sample, and was it recorded as "
                 "the configs say?"
             )
-    assert told is not None
-    return told
+    assert earlier is not None
+    return earlier
 
 
-def _posed(recorded: Recorded, read_as: ReadAs, noise_rad: float) -> Problem:
+def _make_problem(recorded: Recorded, read_as: ReadAs, noise_rad: float) -> Problem:
     if wrong := trace_file_problem(recorded.file):
         raise BiogripError(f"--after: {wrong}")
     problem = recorded.case.problem
-    posed = replace(
+    case_problem = replace(
         problem,
         noise_rad=noise_rad,
         offset=problem.offset or read_as.offset,
         drift=problem.drift or read_as.drift,
     )
-    trace = read_as.read(recorded.file, recorded.case.gripper, posed)
-    return posed.of(trace.time_s, trace.rotation_rad[0])
+    trace = read_as.read(recorded.file, recorded.case.gripper, case_problem)
+    return case_problem.of(trace.time_s, trace.rotation_rad[0])

@@ -74,21 +74,22 @@ def write_page(designs: Iterable[Designed], page: Path) -> None:
     template = Path(__file__).with_name("designed.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        designs=[_told(found) for found in designs], written_by=f"{WRITTEN_BY} {__version__}"
+        designs=[_compute_sensitivities(found) for found in designs],
+        written_by=f"{WRITTEN_BY} {__version__}",
     )
     write_text(page, text)
 
 
-def _told(found: Designed) -> dict[str, Any]:
-    plan, wanted = found.plan, found.wanted
+def _compute_sensitivities(found: Designed) -> dict[str, Any]:
+    plan, inputs = found.plan, found.inputs
     with styled():
         figures = [(title, embedded(drawn)) for title, drawn in drawings(found)]
     kinds = {kind(phase) for phase in plan.phases}
     shown = [column for column in _COLUMNS if column.only in (None, *kinds)]
     return {
         "title": found.case.title,
-        "names": wanted.model.names,
-        "in_print": [f"{p.name} ({p.unit})" if p.unit else p.name for p in wanted.model.parameters],
+        "names": inputs.model.names,
+        "in_print": [f"{p.name} ({p.unit})" if p.unit else p.name for p in inputs.model.parameters],
         "samples": [
             {
                 "values": [f"{value:.3g}" for value in values],
@@ -96,14 +97,14 @@ def _told(found: Designed) -> dict[str, Any]:
                 "after": [percent(bound) for bound in after],
             }
             for values, before, after in zip(
-                wanted.parameters, found.before, found.after, strict=True
+                inputs.parameters, found.before, found.after, strict=True
             )
         ],
-        "left_out": left_out(wanted) if wanted.out_of_reach else "",
+        "left_out": left_out(inputs) if inputs.out_of_reach else "",
         "figures": figures,
         "gap": f"{100 * plan.gap:.2g}",
         "force_uN": f"{1e6 * found.force_N.max():.3g}",
-        "noise_urad": f"{1e6 * wanted.noise_rad:.3g}",
+        "noise_urad": f"{1e6 * inputs.noise_rad:.3g}",
         "readings": len(plan.time_s),
         "end_s": f"{plan.torque.end_s:g}",
         "in_numbers": in_numbers(plan.phases),

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
-from biogrip.own_traces.many_traces import Told, identify_traces, write_table
-from biogrip.own_traces.one_trace import Wanted, check_trace_file, study_of
+from biogrip.own_traces.many_traces import Outcome, identify_traces, write_table
+from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file, study_of
 from biogrip.own_traces.outputs import SAMPLES, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import in_words, side_by_side
@@ -33,13 +33,13 @@ def identify(
     traces
         CSV files.
     model, read_as, config
-        Fields of `Wanted`.
+        Fields of `IdentifyOptions`.
     output
         JSON file for a single trace. By default each trace has one beside it.
     report, table
         HTML and CSV file to write, if any.
     posterior
-        Field of `Wanted`.
+        Field of `IdentifyOptions`.
     force
         If true, replace even files that biogrip did not write.
 
@@ -60,11 +60,11 @@ def identify(
     problems = {trace: trace_file_problem(trace) for trace in traces}
     absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
     there = [trace for trace in traces if str(trace) not in absent]
-    wanted = Wanted((there or traces)[0], model, read_as, config, posterior)
+    options = IdentifyOptions((there or traces)[0], model, read_as, config, posterior)
     samples = posterior
     if there and (len(traces) > 1 or config is not None):
         # Errors of options and config concern all traces: raise them once, here.
-        (case,) = study_of(wanted).cases.values()
+        (case,) = study_of(options).cases.values()
         samples = case.posterior is not None
     outputs = {trace: output or trace.with_suffix(".identified.json") for trace in there}
     drawn = [path.with_suffix(SAMPLES) for path in outputs.values()] if samples else []
@@ -79,21 +79,21 @@ def identify(
         from biogrip.own_traces.page import Page
 
         page = Page()
-    told = identify_traces(wanted, outputs, page)
-    told.refused.update(absent)
-    if len(traces) == 1 and told.refused:
-        raise BiogripError(next(iter(told.refused.values())))
+    outcome = identify_traces(options, outputs, page)
+    outcome.refused.update(absent)
+    if len(traces) == 1 and outcome.refused:
+        raise BiogripError(next(iter(outcome.refused.values())))
     if table is not None:
-        write_table(told, table)
+        write_table(outcome, table)
     if page is not None and report is not None:
-        page.write(told.refused, report)
-    print(in_words(told.found[0]) if len(traces) == 1 else _of_many(told))
-    said = [outputs[Path(each["trace"])] for each in told.found]
+        page.write(outcome.refused, report)
+    print(in_words(outcome.found[0]) if len(traces) == 1 else _of_many(outcome))
+    said = [outputs[Path(each["trace"])] for each in outcome.found]
     said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     print(f"Written to {', '.join(map(visible, said))}.")
-    return 1 if told.refused else 0
+    return 1 if outcome.refused else 0
 
 
-def _of_many(told: Told) -> str:
-    return side_by_side(told.found, told.refused)
+def _of_many(outcome: Outcome) -> str:
+    return side_by_side(outcome.found, outcome.refused)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
-from biogrip.own_traces.one_trace import Identified, Wanted, identify_trace
+from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
@@ -21,7 +21,7 @@ _OF_QUANTITY = ("verdict", "value", "low", "high")
 
 
 @dataclass(frozen=True)
-class Told:
+class Outcome:
     """Results of several traces.
 
     Parameters
@@ -36,12 +36,14 @@ class Told:
     refused: dict[str, str]
 
 
-def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | None") -> Told:
+def identify_traces(
+    options: IdentifyOptions, outputs: Mapping[Path, Path], page: "Page | None"
+) -> Outcome:
     """Identify traces one after the other, and collect the errors of those that cannot be used.
 
     Parameters
     ----------
-    wanted
+    options
         Options for all traces; its own trace is ignored.
     outputs
         JSON file to write for each CSV file.
@@ -51,7 +53,7 @@ def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | 
     found, refused = [], {}
     for number, (trace, output) in enumerate(outputs.items(), start=1):
         try:
-            identified: Identified = identify_trace(replace(wanted, trace=trace), output)
+            identified: Identified = identify_trace(replace(options, trace=trace), output)
         except BiogripError as error:
             refused[str(trace)] = str(error)
         else:
@@ -60,12 +62,12 @@ def identify_traces(wanted: Wanted, outputs: Mapping[Path, Path], page: "Page | 
                 page.add(identified)
         if len(outputs) > 1:
             print(f"{number} of {len(outputs)}: {visible(trace)}", file=sys.stderr, flush=True)
-    return Told(found, refused)
+    return Outcome(found, refused)
 
 
-def write_table(told: Told, table: Path) -> None:
+def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV."""
-    quantities = labels_of(told.found)
+    quantities = labels_of(outcome.found)
     columns = ["trace", "problem", "model", "samples", "noise_rad", "misfit_rad"]
     columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
     rows = [
@@ -81,10 +83,10 @@ def write_table(told: Told, table: Path) -> None:
             each["advice"] or "",
             each[WRITTEN_BY],
         )
-        for each in map(rounded_numbers, told.found)
+        for each in map(rounded_numbers, outcome.found)
     ]
     rows += [
-        (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in told.refused.items()
+        (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in outcome.refused.items()
     ]
     write_rows(table, (*columns, "doubts", "advice", WRITTEN_BY), rows)
 

@@ -18,7 +18,7 @@ from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
-from biogrip.own_traces.models_tried import judged_again, models_tried
+from biogrip.own_traces.fitted_models import judge_again, models_tried
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.second_opinion import second_opinion
@@ -36,7 +36,7 @@ from biogrip.study.trace_file import trace_file_problem
 
 
 @dataclass(frozen=True)
-class Wanted:
+class IdentifyOptions:
     """A recorded trace, and the options to identify it with.
 
     Parameters
@@ -82,12 +82,12 @@ class Identified:
     samples: Array | None = None
 
 
-def identify_trace(wanted: Wanted, output: Path) -> Identified:
+def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     """Identify the sample in a recorded trace by least squares, and compute confidence limits.
 
     Parameters
     ----------
-    wanted
+    options
         The trace and the options.
     output
         JSON file to write; posterior samples are written beside it as Parquet.
@@ -97,44 +97,50 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
     BiogripError
         With file, line and column or key, if trace or config cannot be used.
     """
-    study = study_of(wanted)
+    study = study_of(options)
     (case,) = study.cases.values()
     pieces = 5 + (case.posterior is not None)
-    with Progress(str(wanted.trace), pieces, live=True) as progress:
-        recorded = wanted.read_as.read(wanted.trace, case.gripper, case.problem)
+    with Progress(str(options.trace), pieces, live=True) as progress:
+        recorded = options.read_as.read(options.trace, case.gripper, case.problem)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
-        settings, posed = judgement.settings_of(study, case), case.problem
-        fit = settings.fit(posed, recorded.time_s, recorded.rotation_rad[0], 0, progress.within)
+        settings, case_problem = judgement.settings_of(study, case), case.problem
+        fit = settings.fit(
+            case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
+        )
         progress.done()
         progress.doing("finding confidence limits")
         confidence = case.confidence
-        told = diagnose(
-            fit.problem, posed.searched, fit.found, confidence=confidence, noise_rad=posed.noise_rad
+        diagnosis = diagnose(
+            fit.problem,
+            case_problem.searched,
+            fit.found,
+            confidence=confidence,
+            noise_rad=case_problem.noise_rad,
         )
         progress.done()
         progress.doing("trying other sample models")
         models = models_tried(
-            study, case, fit, told, lambda: None, named=names_models(wanted.config)
+            study, case, fit, diagnosis, lambda: None, named=names_models(options.config)
         )
-        told, doubts = judged_again(fit, told, models, confidence, posed.noise_rad)
+        diagnosis, doubts = judge_again(fit, diagnosis, models, confidence, case_problem.noise_rad)
         progress.done()
         progress.doing("trying an offset and a drift")
-        doubts += second_opinion(study, case, recorded, told, progress.within)
-        said = exact_data(told)
+        doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
+        said = exact_data(diagnosis)
         data = {
             WRITTEN_BY: __version__,
-            "trace": str(wanted.trace),
-            "model": posed.model.name,
-            "model_title": posed.model.title,
+            "trace": str(options.trace),
+            "model": case_problem.model.name,
+            "model_title": case_problem.model.title,
             "confidence": confidence,
-            **_instrument(posed, recorded, np.exp(told.likelihood.best)),
+            **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
             "notes": [*recording.notes_on_gaps(recorded), *fit.notes(), *said["notes"], *doubts],
             "noise_model": fit.noise_data(),
             **models.data(),
             "assumed": assumed(case),
-            "by_default": by_default(wanted.config),
+            "by_default": by_default(options.config),
             "versions": versions(),
         }
         samples = None
@@ -143,16 +149,16 @@ def identify_trace(wanted: Wanted, output: Path) -> Identified:
             progress.doing("sampling the posterior")
             data["posterior"], drawn = posterior.posterior_of_trace(
                 posterior.settings_of(study, case),
-                posed,
-                partial(posed.for_model, fit.problem),
+                case_problem,
+                partial(case_problem.for_model, fit.problem),
                 limits_in(said),
                 progress.within,
             )
             words = {WRITTEN_BY: __version__}
-            write_samples(output.with_suffix(SAMPLES), posed.searched, drawn, words)
+            write_samples(output.with_suffix(SAMPLES), case_problem.searched, drawn, words)
             samples = np.exp(drawn)
     write_text(output, json.dumps(_written(data), indent=1) + "\n")
-    return Identified(data, posed, recorded, samples)
+    return Identified(data, case_problem, recorded, samples)
 
 
 def _written(data: dict[str, Any]) -> dict[str, Any]:
@@ -173,7 +179,7 @@ def check_trace_file(trace: Path) -> None:
         raise BiogripError(f"TRACE: {problem}")
 
 
-def study_of(wanted: Wanted) -> Study:
+def study_of(options: IdentifyOptions) -> Study:
     """Return a study that has the trace as its only case.
 
     Raises
@@ -181,20 +187,20 @@ def study_of(wanted: Wanted) -> Study:
     BiogripError
         With option, or file, line and key, if options or config cannot be used for any trace.
     """
-    check_trace_file(wanted.trace)
-    wanted.read_as.check()
-    if wanted.model not in CANDIDATES:
-        hint, names = nearest(wanted.model, CANDIDATES), ", ".join(CANDIDATES)
-        raise BiogripError(f"--model: found '{wanted.model}'.{hint} Allowed: {names}.")
-    sample = CANDIDATES[wanted.model]
-    files = [default_config(), *([wanted.config] if wanted.config else [])]
+    check_trace_file(options.trace)
+    options.read_as.check()
+    if options.model not in CANDIDATES:
+        hint, names = nearest(options.model, CANDIDATES), ", ".join(CANDIDATES)
+        raise BiogripError(f"--model: found '{options.model}'.{hint} Allowed: {names}.")
+    sample = CANDIDATES[options.model]
+    files = [default_config(), *([options.config] if options.config else [])]
     merged = read_configs(files)
-    name = re.sub(r"[^A-Za-z0-9_-]", "_", wanted.trace.stem)[:60]
+    name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    measurement = {**wanted.read_as.block, "file": str(wanted.trace)}
+    measurement = {**options.read_as.block, "file": str(options.trace)}
     # Cases of the config are meant for the workflow.
     merged.pop("only", None)
-    if wanted.posterior:
+    if options.posterior:
         merged.setdefault("posterior", {})
     merged["cases"] = {
         case: {
@@ -205,19 +211,21 @@ def study_of(wanted: Wanted) -> Study:
     return load_study(merged, files, command_line=["cases"], for_workflow=False)
 
 
-def _instrument(posed: CaseProblem, recorded: Measurements, parameters: Array) -> dict[str, Any]:
+def _instrument(
+    case_problem: CaseProblem, recorded: Measurements, parameters: Array
+) -> dict[str, Any]:
     """Return offset and drift of the instrument in the best fit, as far as they were fitted."""
-    if not (posed.offset or posed.drift):
+    if not (case_problem.offset or case_problem.drift):
         return {}
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]
-    network = posed.searched.network(parameters)
+    network = case_problem.searched.network(parameters)
     simulated = simulated_rotation(
-        posed.gripper, network, posed.torque, time_s, nonlinear=posed.nonlinear
+        case_problem.gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
     )[0]
-    basis = posed.nuisance(time_s)
+    basis = case_problem.nuisance(time_s)
     added = within(basis, measured - simulated)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     start = float(added[0] - slope * time_s[0])
-    return ({"offset_rad": start} if posed.offset else {}) | (
-        {"drift_rad_per_s": slope} if posed.drift else {}
+    return ({"offset_rad": start} if case_problem.offset else {}) | (
+        {"drift_rad_per_s": slope} if case_problem.drift else {}
     )

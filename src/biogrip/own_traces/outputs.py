@@ -5,7 +5,7 @@ import os
 from pathlib import Path
 
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_of
+from biogrip.files import scratch_path
 from biogrip.products.files.parquet import column_names
 from biogrip.terminal import visible
 
@@ -40,7 +40,7 @@ def check_output(output: Path, *, force: bool) -> None:
             f"{visible(output)}: cannot be written; allowed is a file in a folder that you "
             "may write to."
         )
-    for place in (output, scratch_of(output)):
+    for place in (output, scratch_path(output)):
         try:
             os.lstat(place)
         except FileNotFoundError:

@@ -17,7 +17,7 @@ from biogrip.study.study import Case, Study
 
 
 def second_opinion(
-    study: Study, case: Case, recorded: Measurements, told: Diagnosis, progress: Progress
+    study: Study, case: Case, recorded: Measurements, diagnosis: Diagnosis, progress: Progress
 ) -> list[str]:
     """Fit an offset and a drift along, and return a warning if they lower chi^2 significantly.
 
@@ -29,7 +29,7 @@ def second_opinion(
     ----------
     study, case, recorded
         The trace and the case it is identified as.
-    told
+    diagnosis
         Diagnosis without the added terms.
     progress
         Callback for progress.
@@ -39,15 +39,15 @@ def second_opinion(
     list of str
         At most one sentence. Empty if both terms are declared already, or the model is nonlinear.
     """
-    posed = case.problem
-    added = 2 - posed.offset - posed.drift
-    if not added or posed.nonlinear:
+    case_problem = case.problem
+    added = 2 - case_problem.offset - case_problem.drift
+    if not added or case_problem.nonlinear:
         return []
-    also = replace(posed, offset=True, drift=True)
+    also = replace(case_problem, offset=True, drift=True)
     problem = also.of(recorded.time_s, recorded.rotation_rad[0])
     rng = stream(study.study_seed, case.name, 0, "instrument")
     found = best_fit(problem, case.method("least_squares"), rng, progress)
-    likelihood = told.likelihood
+    likelihood = diagnosis.likelihood
     # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
     from_there = found.at(fit_from([problem], likelihood.best))
     found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))
@@ -55,17 +55,17 @@ def second_opinion(
         problem.residuals.samples,
         likelihood.misfit_rad,
         found.misfit_rad,
-        likelihood.noise_rad if posed.noise_rad is not None else None,
+        likelihood.noise_rad if case_problem.noise_rad is not None else None,
     )
     chance = float(chdtrc(added, max(fall, 0.0)))
     if chance >= FALSE_ALARM:
         return []
     other = diagnose(
-        problem, also.searched, found, confidence=case.confidence, noise_rad=posed.noise_rad
+        problem, also.searched, found, confidence=case.confidence, noise_rad=case_problem.noise_rad
     )
     changed = [
         f"{after.quantity.label} would be {after.words()}"
-        for before, after in zip(told.findings, other.findings, strict=True)
+        for before, after in zip(diagnosis.findings, other.findings, strict=True)
         if _differ(before, after)
     ]
     return [
@@ -100,4 +100,4 @@ def _differ(before: Finding, after: Finding) -> bool:
     if before.verdict != after.verdict:
         return True
     low, high = before.low or 0.0, before.high or np.inf
-    return bool(before.told and not low <= after.value <= high)
+    return bool(before.is_bounded and not low <= after.value <= high)

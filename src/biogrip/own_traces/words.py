@@ -51,20 +51,24 @@ def in_words(found: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _posterior(told: Mapping[str, Any]) -> list[str]:
+def _posterior(posterior: Mapping[str, Any]) -> list[str]:
     """Return sentences and a table about the posterior samples."""
-    width = max(len(item["quantity"]) for item in told["quantities"])
+    width = max(len(item["quantity"]) for item in posterior["quantities"])
     prior = (
-        f"prior: {', '.join(told['prior'])} as given, else log-uniform over the search range"
-        if told["prior"]
+        f"prior: {', '.join(posterior['prior'])} as given, else log-uniform over the search range"
+        if posterior["prior"]
         else "prior: log-uniform over the search range"
     )
     return [
-        f"Posterior, median and {100 * told['confidence']:g} % interval ({prior}):",
-        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in told["quantities"]),
-        *(f"  {item['why']}" for item in told["quantities"] if item["against_profile"] != AGREES),
-        told["in_words"],
-        *evidence_in_words(told["evidence"]),
+        f"Posterior, median and {100 * posterior['confidence']:g} % interval ({prior}):",
+        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in posterior["quantities"]),
+        *(
+            f"  {item['why']}"
+            for item in posterior["quantities"]
+            if item["against_profile"] != AGREES
+        ),
+        posterior["in_words"],
+        *evidence_in_words(posterior["evidence"]),
     ]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Experiment, information_of, relative_bounds
+from biogrip.design.experiment import Experiment, compute_information, relative_bounds
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
@@ -57,13 +57,13 @@ def settings(study: Study) -> dict[str, CaseSettings]:
     found = {}
     for name in designed_cases(study):
         case = study.cases[name]
-        asked = case.block.design
-        assert asked is not None
+        block = case.block.design
+        assert block is not None
         found[name] = CaseSettings(
             case.gripper,
             case.problem.searched,
             case.parameters,
-            asked.noise_rad,
+            block.noise_rad,
             before,
             (case.phases, case.sampling),
             case.title,
@@ -102,6 +102,6 @@ def bounds(case: CaseSettings, experiment: Experiment, parameters: Array) -> Arr
     found = []
     for start in range(0, len(parameters), _AT_ONCE):
         some = parameters[start : start + _AT_ONCE]
-        told = ringing_responses(case.gripper, case.model, torque, times, some)[:, 1:]
-        found.append(relative_bounds(information_of(told) / case.noise_rad**2))
+        sensitivity = ringing_responses(case.gripper, case.model, torque, times, some)[:, 1:]
+        found.append(relative_bounds(compute_information(sensitivity) / case.noise_rad**2))
     return np.concatenate(found)

@@ -94,13 +94,13 @@ class Product:
         Input files by name.
     weight
         Resources of a job.
-    sheet
+    rule
         Products of a sheet are made by one job, as start-up takes longer than most of them.
     category, item, caption
         Place and caption in the report; a product without category is not in it.
     modules
         Function of the wildcards that names further modules whose code the product depends on.
-    asked
+    by_default
         True if a run makes it by default.
     """
 
@@ -112,12 +112,12 @@ class Product:
     message: str
     reads: Mapping[str, Reads] = field(default_factory=dict)
     weight: Weight = LIGHT
-    sheet: str = ""
+    rule: str = ""
     category: str = ""
     item: str = ""
     caption: str = ""
     modules: Callable[[Wildcards], tuple[str, ...]] = lambda _: ()
-    asked: bool = True
+    by_default: bool = True
 
     @property
     def module(self) -> str:

@@ -48,14 +48,14 @@ def source_files(*modules: str) -> list[str]:
     modules
         For example ``"biogrip.products.stages.target"``.
     """
-    seen: set[str] = set()
+    visited: set[str] = set()
     waiting = list(modules)
     while waiting:
         name = waiting.pop()
-        if name not in seen:
-            seen.add(name)
+        if name not in visited:
+            visited.add(name)
             waiting += _imports(name)
-    return sorted(str(_file(name)) for name in seen)
+    return sorted(str(_file(name)) for name in visited)
 
 
 def _file(module: str) -> Path | None:

@@ -25,7 +25,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.dense_samples import DenseSamples
-from biogrip.response.mode_growth import growth_of_modes
+from biogrip.response.mode_growth import compute_growth
 from biogrip.response.mode_rows import ModeRows
 from biogrip.response.nonlinear import COARSE, STAGES, mesh, mesh_functions
 from biogrip.response.nuisance import without
@@ -111,11 +111,11 @@ class Condensed:
 
     def of_trace(self, rotation_rad: Array) -> Array:
         """Return rows of a trace without nuisance, (n_rows,); no response reaches the last."""
-        seen, rest = self.dense.rows_of_samples(rotation_rad)
+        projected, rest = self.dense.rows_of_samples(rotation_rad)
         if not self.reduced:
-            return np.append(seen, rest)
-        rows = seen @ self._basis
-        return np.append(rows, np.hypot(np.linalg.norm(seen - self._basis @ rows), rest))
+            return np.append(projected, rest)
+        rows = projected @ self._basis
+        return np.append(rows, np.hypot(np.linalg.norm(projected - self._basis @ rows), rest))
 
     @cached_property
     def time_s(self) -> Array:
@@ -179,7 +179,7 @@ class Condensed:
         return np.pad(rows, ((0, 0), (0, 1)))
 
     @cached_property
-    def _seen_nuisance(self) -> Array:
+    def _nuisance_rows(self) -> Array:
         """The nuisance as rows of the nodes, (n_functions, n_nodes)."""
         rows = [self.dense.rows_of_samples(function)[0] for function in self.nuisance]
         return np.reshape(rows, (len(rows), len(self.dense.time_s)))
@@ -193,14 +193,14 @@ class Condensed:
         rates = -np.expm1(np.append(_SLOWEST, np.arange(_SPACING, last, _SPACING))) / end_s
         growth, slope = (
             self.dense.rows_of_values(of[0])
-            for of in growth_of_modes(rates[None], self._torque, time_s)
+            for of in compute_growth(rates[None], self._torque, time_s)
         )
         size = np.linalg.norm(growth, axis=2, keepdims=True)
         size[size == 0] = 1.0
         family = np.concatenate((growth / size, rates[:, None] * slope / size))
         weights = np.linalg.norm(self._corrections, axis=1)
-        seen = self._corrections[weights > 0] / weights[weights > 0, None]
-        family = np.concatenate((family.reshape(-1, len(time_s)), seen))
+        projected = self._corrections[weights > 0] / weights[weights > 0, None]
+        family = np.concatenate((family.reshape(-1, len(time_s)), projected))
         basis, triangle = np.linalg.qr(family.T)
         turned, share, _ = np.linalg.svd(triangle)
         span: Array = basis @ turned[:, share > _RANK * share[0]]
@@ -226,4 +226,4 @@ class Condensed:
         """Project out nuisance and whiten as `cleared` does, with rows of the nodes."""
         if self._whitening is not None:
             return self._whitening(rows)
-        return without(self._seen_nuisance, rows)
+        return without(self._nuisance_rows, rows)

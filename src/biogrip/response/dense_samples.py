@@ -130,10 +130,10 @@ class DenseSamples:
             if piece.triangle is None:
                 parts.append(own)
                 continue
-            seen = np.zeros(_NODES)
+            products = np.zeros(_NODES)
             for block, series in self._blocks(piece.first, piece.stop):
-                seen += samples[block] @ series
-            part = np.asarray(np.linalg.solve(piece.triangle, seen), np.float64)
+                products += samples[block] @ series
+            part = np.asarray(np.linalg.solve(piece.triangle, products), np.float64)
             smooth = np.linalg.solve(piece.triangle.T, part)
             for block, series in self._blocks(piece.first, piece.stop):
                 rest += float(np.sum((samples[block] - series @ smooth) ** 2))

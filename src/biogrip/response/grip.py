@@ -45,7 +45,9 @@ class Grip:
         )
 
 
-def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool) -> Grip:
+def compute_grip(
+    gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool
+) -> Grip:
     """Compute the extreme forces of the jaws on one sample, without inertia.
 
     Parameters
@@ -62,14 +64,14 @@ def grip_of(gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlin
     """
     time_s = _instants(torque)
     force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]
-    least_told = _NOTHING * float(np.abs(force).max()) or 1.0
-    told = np.round(force / least_told)
-    most, negative = int(np.argmax(told)), np.flatnonzero(told < 0)
+    least_shown = _NOTHING * float(np.abs(force).max()) or 1.0
+    shown = np.round(force / least_shown)
+    most, negative = int(np.argmax(shown)), np.flatnonzero(shown < 0)
     first = 0 if len(negative) else most
-    least = first + int(np.argmin(told[first:]))
+    least = first + int(np.argmin(shown[first:]))
     return Grip(
-        float(told[most] * least_told),
-        float(told[least] * least_told),
+        float(shown[most] * least_shown),
+        float(shown[least] * least_shown),
         float(time_s[least]),
         float(time_s[negative[0]]) if len(negative) else None,
     )

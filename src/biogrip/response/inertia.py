@@ -66,13 +66,13 @@ def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) ->
     time_s : (n_samples,)
         Ascending sampling times.
     """
-    seen = time_s[while_ringing(gripper, torque, time_s)]
-    if not len(seen):
+    ringing = time_s[while_ringing(gripper, torque, time_s)]
+    if not len(ringing):
         return 0.0
     springs = np.append(0.0, _STIFFNESS) * gripper.jaw_stiffness_N_per_m
     none = np.zeros((len(springs), 0))
     network = Network(k_p=springs, c_p=np.zeros_like(springs), k=none, c=none)
-    change = np.linalg.norm(ring(gripper, network, torque, seen), axis=1)
+    change = np.linalg.norm(ring(gripper, network, torque, ringing), axis=1)
     some_s = time_s[np.linspace(0, len(time_s) - 1, min(_SOME, len(time_s))).astype(np.int64)]
     without = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
     size = np.sqrt(np.mean(rotation(without, torque, some_s) ** 2, axis=1))

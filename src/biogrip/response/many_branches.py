@@ -204,7 +204,7 @@ def modes_of_many(
 
 
 def modes_with_slopes(
-    gripper: Gripper, tilted: Network, tilt: float, count: int, *, symmetric: bool
+    gripper: Gripper, complex_step_network: Network, tilt: float, count: int, *, symmetric: bool
 ) -> tuple[Array, Array, Array, Array]:
     """Compute rates and weights of the left arm, with derivatives by the log-parameters.
 
@@ -214,7 +214,7 @@ def modes_with_slopes(
     ----------
     gripper, symmetric
         As in `modes_of_many`.
-    tilted
+    complex_step_network
         n samples, and after them the same with each of `count` parameters tilted into the
         complex plane by the share `tilt`.
 
@@ -226,7 +226,7 @@ def modes_with_slopes(
     weight_slopes : (n_parameters, n_drives, n_modes, n)
     """
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    given = arms.with_sample(separated(tilted))
+    given = arms.with_sample(separated(complex_step_network))
     parts = [
         of.reshape(*of.shape[:-1], count + 1, -1)
         for of in (given.weights, given.rates, given.level)

@@ -18,7 +18,7 @@ from biogrip.arrays import Array, ComplexArray
 from biogrip.experiment.network import Network
 from biogrip.instrument.gripper import Arm, Gripper
 from biogrip.interlacing import Zeros
-from biogrip.response.roots import roots, swept
+from biogrip.response.roots import find_zeros, roots
 
 # Factor that moves starts off the real axis, which no iteration from a real start would leave.
 _ASIDE = 1 + 1e-3j
@@ -46,7 +46,7 @@ class Ringing:
         self._k, self._rates = network.k[:, None], (network.k / network.c)[:, None]
         origin, beyond = self._begin(zeros)
         between = origin[:, None] - origin[..., None]
-        beyond = swept(beyond, lambda points: self._newton_step(origin, points), between)
+        beyond = find_zeros(beyond, lambda points: self._newton_step(origin, points), between)
         self.rates = s = beyond - origin
         """Roots of E in 1/s, (n, n_modes)."""
         inverse = 1 / ((self._rates - origin[..., None]) + beyond[..., None])
@@ -87,13 +87,15 @@ class Ringing:
 
     def _ring(self) -> Array:
         """Return E with a spring and a damper as sample, ascending powers, (n, terms)."""
-        held = self._b_2 * np.concatenate((self._k_p + self._k.sum(axis=2), self._c_p), axis=1)
+        spring_and_damper = self._b_2 * np.concatenate(
+            (self._k_p + self._k.sum(axis=2), self._c_p), axis=1
+        )
         z_2, z_4 = (_polynomial(arm) for arm in self._arms)
         arms, factor = (z_2, np.array([2.0])) if self._alike else (np.convolve(z_2, z_4), z_2 + z_4)
         return np.array(
             [
                 arms + np.pad(product, (0, len(arms) - len(product)))
-                for product in (np.convolve(factor, of_one) for of_one in held)
+                for product in (np.convolve(factor, of_one) for of_one in spring_and_damper)
             ]
         )
 

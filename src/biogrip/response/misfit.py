@@ -17,7 +17,7 @@ Misfits = Callable[[Array, IntArray], Array]
 """The same from (n_populations, n, n_parameters) and trace indices to (n_populations, n)."""
 
 
-def misfit_of(
+def make_misfit(
     residuals: Residuals,
     gripper: Gripper,
     torque: TorqueHistory,
@@ -42,7 +42,7 @@ def misfit_of(
     return residuals.condensed_misfit
 
 
-def together(misfits: Sequence[Misfit]) -> Misfits:
+def combine_misfits(misfits: Sequence[Misfit]) -> Misfits:
     """Combine the misfit functions of several traces into one of a population for each trace.
 
     Its results equal those of the single functions to the last bit.

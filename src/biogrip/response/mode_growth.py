@@ -13,7 +13,7 @@ from biogrip.response.linear import phi_function
 _DECAYED = 40.0
 
 
-def growth_of_modes(
+def compute_growth(
     rates: NDArray[Any], torque: TorqueHistory, time_s: Array
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Compute responses of modes of unit weight to a protocol, and derivatives by the rate.
@@ -61,9 +61,9 @@ def growth_of_modes(
         # In the same order as elsewhere, so that the last bits agree.
         decayed = reached[..., j] - (reached[..., j] + levels)
         growth[:, :, j], slope[:, :, j] = decayed.take(phase, axis=2), 0.0
-        seen = np.flatnonzero(live)
-        growth[:, :, j, seen], slope[:, :, j, seen] = _carried_on(
-            rates[:, j], reached[..., j], slanted[..., j], levels, phase[seen], elapsed[seen]
+        alive = np.flatnonzero(live)
+        growth[:, :, j, alive], slope[:, :, j, alive] = _carried_on(
+            rates[:, j], reached[..., j], slanted[..., j], levels, phase[alive], elapsed[alive]
         )
     return growth, slope
 
@@ -86,16 +86,19 @@ def _from_phase_to_phase(
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], starts[k + 1]) - start
         decay = 1 + _expm1(rate * elapsed)
-        grown, tilted = reached * decay, (slanted + reached * elapsed) * decay
+        grown, complex_step_network = reached * decay, (slanted + reached * elapsed) * decay
         for order, heights in enumerate(powers[k].T[..., None, None]):
             if heights.any():
                 one, its_slope = _growth(order, rate, elapsed)
-                grown, tilted = grown + heights * one, tilted + heights * its_slope
+                grown, complex_step_network = (
+                    grown + heights * one,
+                    complex_step_network + heights * its_slope,
+                )
         for omega, amplitudes in swings[k]:
             swung = _swing(omega, rate, elapsed, amplitudes[:, None, None])
-            grown, tilted = grown + swung[0], tilted + swung[1]
-        growth[..., here], slope[..., here] = grown[..., :-1], tilted[..., :-1]
-        reached, slanted = grown[..., -1:], tilted[..., -1:]
+            grown, complex_step_network = grown + swung[0], complex_step_network + swung[1]
+        growth[..., here], slope[..., here] = grown[..., :-1], complex_step_network[..., :-1]
+        reached, slanted = grown[..., -1:], complex_step_network[..., -1:]
     return growth, slope
 
 

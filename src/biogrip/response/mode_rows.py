@@ -18,7 +18,7 @@ from numpy.polynomial import chebyshev
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.response.decay_table import DEGREE, NODES, WIDTH, series
-from biogrip.response.mode_growth import growth_of_modes
+from biogrip.response.mode_growth import compute_growth
 from biogrip.response.modes import Modes
 
 # As in `decay_table`, wide pieces of high degree need the fewest rates, short ones of low degree
@@ -63,7 +63,7 @@ class ModeRows:
         self._table = np.empty((self._last, self._drives, len(_ORDERS), self._rows))
         for piece in range(wide):
             u = WIDTH * (piece + NODES)
-            growth, _ = growth_of_modes(-np.expm1(u)[None] / self._end_s, torque, time_s)
+            growth, _ = compute_growth(-np.expm1(u)[None] / self._end_s, torque, time_s)
             values = (growth[0] / np.expm1(u)[:, None]) @ to_rows
             short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
             here = slice(piece * _SHORTER, (piece + 1) * _SHORTER)

@@ -29,7 +29,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import LEFT, evaluate, poles, slope_at_poles, transfer_functions
 from biogrip.response.many_branches import modes_with_slopes
 
-_TILT = 1e-30
+_COMPLEX_STEP = 1e-30
 
 
 class Modes(NamedTuple):
@@ -79,15 +79,17 @@ class Polynomials:
         )
 
 
-def tilted(model: SampleModel, parameters: Array, *, slopes: bool) -> tuple[Network, int]:
+def complex_step_network(
+    model: SampleModel, parameters: Array, *, slopes: bool
+) -> tuple[Network, int]:
     """Return networks of samples and, for slopes, of copies with complex-step parameters."""
     if not slopes:
         return model.network(parameters), 0
     count = parameters.shape[1]
-    return model.network((parameters * _tilts(count)[:, None]).reshape(-1, count)), count
+    return model.network((parameters * _complex_steps(count)[:, None]).reshape(-1, count)), count
 
 
-def polynomials_of(
+def compute_polynomials(
     gripper: Gripper, network: Network, count: int, *, symmetric: bool, inertia: bool
 ) -> Polynomials:
     """Compute the transfer functions of samples, and their derivatives.
@@ -97,7 +99,7 @@ def polynomials_of(
     gripper
         Its arms may differ.
     network, count
-        From `tilted`; a count of zero gives no derivatives.
+        From `complex_step_network`; a count of zero gives no derivatives.
     symmetric
         True if both arms are driven alike; determines the drives.
     inertia
@@ -106,7 +108,9 @@ def polynomials_of(
     numerators, denominator = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia
     )
-    return Polynomials(*_untilted(denominator, count), *_untilted(numerators[LEFT], count))
+    return Polynomials(
+        *_split_complex_step(denominator, count), *_split_complex_step(numerators[LEFT], count)
+    )
 
 
 def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
@@ -133,7 +137,7 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
     )
 
 
-def modes_of(
+def compute_modes(
     gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
 ) -> Modes:
     """Compute the modes of samples without inertia, all of them real.
@@ -149,24 +153,24 @@ def modes_of(
     slopes
         True to compute derivatives; otherwise n_parameters is zero.
     """
-    network, count = tilted(model, parameters, slopes=slopes)
+    network, count = complex_step_network(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:
-        parts = modes_with_slopes(gripper, network, _TILT, count, symmetric=symmetric)
+        parts = modes_with_slopes(gripper, network, _COMPLEX_STEP, count, symmetric=symmetric)
         return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
-    polynomials = polynomials_of(gripper, network, count, symmetric=symmetric, inertia=False)
+    polynomials = compute_polynomials(gripper, network, count, symmetric=symmetric, inertia=False)
     return modes_at(polynomials, poles(polynomials.denominator, real=True))
 
 
-def _untilted(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
+def _split_complex_step(coefficients: NDArray[Any], count: int) -> tuple[Array, Array]:
     """Return coefficients, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
     *others, _, terms = coefficients.shape
     of_tilts = coefficients.reshape(*others, count + 1, -1, terms).swapaxes(0, -3)
-    return of_tilts[0].real, of_tilts[1:].imag / _TILT
+    return of_tilts[0].real, of_tilts[1:].imag / _COMPLEX_STEP
 
 
 @cache
-def _tilts(count: int) -> ComplexArray:
+def _complex_steps(count: int) -> ComplexArray:
     """Return factors: ones in the first row, and one complex-step parameter in each other row."""
     tilts = np.ones((count + 1, count), dtype=np.complex128)
-    tilts[1:].imag = _TILT * np.eye(count)
+    tilts[1:].imag = _COMPLEX_STEP * np.eye(count)
     return tilts

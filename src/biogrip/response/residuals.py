@@ -11,9 +11,9 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
-from biogrip.response.grip import Grip, grip_of
+from biogrip.response.grip import Grip, compute_grip
 from biogrip.response.linear import LEFT
-from biogrip.response.modes import modes_of
+from biogrip.response.modes import compute_modes
 from biogrip.response.nuisance import taken_out
 from biogrip.response.sensitivity import (
     corrections,
@@ -66,7 +66,7 @@ class Residuals:
         self.peak_rad = float(np.max(np.abs(self._rotation_rad)))
         self.duration_s = float(time_s[-1])
         if noise_rad is None:
-            noise_rad = noise_of(self._rotation_rad)
+            noise_rad = estimate_noise(self._rotation_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
         # Rows of the trace by inclusion of inertia, shared by all models.
@@ -80,7 +80,7 @@ class Residuals:
     def grip(self, log_parameters: Array) -> Grip:
         """Return the force with which the jaws press a sample or would have to pull it."""
         network = self.model.network(np.exp(log_parameters))
-        return grip_of(self._gripper, network, self._torque, nonlinear=self.nonlinear)
+        return compute_grip(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 
     def of_model(self, model: SampleModel) -> "Residuals":
         """Return the residuals of another model against the same trace."""
@@ -153,7 +153,7 @@ class Residuals:
         # So many readings are dense: their sums equal those of nodes up to rounding.
         rows = condensed.rows_of_nodes(self._simulated(log_parameters, condensed.dense.time_s))
         traces = [other._trace_at_nodes for other in others]
-        rows[:, 0] -= [seen for seen, _ in traces]
+        rows[:, 0] -= [projected for projected, _ in traces]
         return rows, np.array([rest for _, rest in traces])
 
     @cached_property
@@ -217,7 +217,7 @@ class Residuals:
                 gripper, model, torque, time_s, parameters, inertia=inertia, slopes=slopes
             )
             return condensed.rows(rotations)
-        modes = modes_of(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
+        modes = compute_modes(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
         return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:
@@ -287,7 +287,7 @@ class Residuals:
         )
 
 
-def noise_of(rotation_rad: Array) -> float:
+def estimate_noise(rotation_rad: Array) -> float:
     """Estimate the standard deviation of white noise on a smooth trace without a model.
 
     The median of second differences is used, on which slopes and jumps of a protocol have

@@ -26,8 +26,14 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import evaluate
-from biogrip.response.mode_growth import growth_of_modes
-from biogrip.response.modes import Modes, Polynomials, modes_at, polynomials_of, tilted
+from biogrip.response.mode_growth import compute_growth
+from biogrip.response.modes import (
+    Modes,
+    Polynomials,
+    complex_step_network,
+    compute_polynomials,
+    modes_at,
+)
 from biogrip.response.roots import roots
 
 # Weights of poles a relative gap g apart lose eps/g^2, their slopes eps/g^3.
@@ -77,12 +83,12 @@ def ringing_responses(
         gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes
     ):
         rows[where] = sum(
-            responses_of(part, torque, time_s) for part in modes if part.rates.shape[1]
+            compute_responses(part, torque, time_s) for part in modes if part.rates.shape[1]
         )
     return rows
 
 
-def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
+def compute_responses(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     """Compute responses of modes to a protocol, and their derivatives by the log-parameters.
 
     Returns
@@ -101,7 +107,7 @@ def responses_of(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     rows = np.empty((n, 1 + count, len(time_s)))
     at_once = max(1, _AT_ONCE // (m * len(time_s)))
     for some in parts(n, at_once):
-        both = np.concatenate(growth_of_modes(modes.rates[some], torque, time_s), axis=1)
+        both = np.concatenate(compute_growth(modes.rates[some], torque, time_s), axis=1)
         both = both.reshape(-1, 2 * drives * m, len(time_s))
         if np.iscomplexobj(both):
             both = np.concatenate((both.real, both.imag), axis=1)
@@ -123,7 +129,7 @@ def ringing_modes(
     Parameters
     ----------
     gripper, model, parameters, symmetric, slopes
-        As in `modes_of`.
+        As in `compute_modes`.
 
     Yields
     ------
@@ -132,8 +138,8 @@ def ringing_modes(
     modes
         Real modes, and complex modes of whose responses the real part is meant.
     """
-    network, count = tilted(model, parameters, slopes=slopes)
-    polynomials = polynomials_of(gripper, network, count, symmetric=symmetric, inertia=True)
+    network, count = complex_step_network(model, parameters, slopes=slopes)
+    polynomials = compute_polynomials(gripper, network, count, symmetric=symmetric, inertia=True)
     rates = roots(polynomials.denominator)
     size = np.abs(rates)
     close = _closest(rates, size) < _CLOSE

@@ -79,10 +79,10 @@ def roots(coefficients: Array) -> ComplexArray:
     # No symmetry, so that no two starting points can move in step.
     angles = np.pi + np.array([0.4, -0.9, 1.1, -0.25, 0.7, -1.3, 0.15])[np.arange(degree) % 7]
     z = radii * np.exp(1j * (angles + 0.05 * np.arange(degree)))
-    return separate(swept(z, lambda z: _newton_step(coefficients, z)))
+    return separate(find_zeros(z, lambda z: _newton_step(coefficients, z)))
 
 
-def swept(
+def find_zeros(
     z: ComplexArray,
     newton_step: Callable[[ComplexArray], ComplexArray],
     between: Array | None = None,
@@ -105,7 +105,7 @@ def swept(
     """
     off_diagonal = ~np.eye(z.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        settled = resting = np.zeros((len(z), 1), dtype=bool)
+        refine_optima = resting = np.zeros((len(z), 1), dtype=bool)
         for _ in range(_SWEEPS):
             newton = newton_step(z)
             distance = z[:, :, None] - z[:, None, :]
@@ -116,11 +116,11 @@ def swept(
             # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
             z = z - step
-            if np.all(settled):
+            if np.all(refine_optima):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
-            resting = settled
-            settled = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
+            resting = refine_optima
+            refine_optima = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
     return z
 
 

@@ -13,9 +13,9 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.inertia import ring, while_ringing
-from biogrip.response.modes import modes_of
+from biogrip.response.modes import compute_modes
 from biogrip.response.nonlinear import COARSE, Correction, correction
-from biogrip.response.ringing import responses_of, ringing_responses
+from biogrip.response.ringing import compute_responses, ringing_responses
 
 # The correction is of second order; differences give its derivative to 1e-6 of that.
 _STEP = 1e-3
@@ -42,15 +42,15 @@ def linear_responses(
     """
     if inertia and not model.power_law:
         return ringing_responses(gripper, model, torque, time_s, parameters, slopes=slopes)
-    modes = modes_of(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
+    modes = compute_modes(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
     rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
     for some in parts(len(time_s), _AT_ONCE):
-        rows[:, :, some] = responses_of(modes, torque, time_s[some])
-    if inertia and np.any(seen := while_ringing(gripper, torque, time_s)):
+        rows[:, :, some] = compute_responses(modes, torque, time_s[some])
+    if inertia and np.any(ringing := while_ringing(gripper, torque, time_s)):
         around = model.network(_around(parameters, _RINGING_STEP, slopes=slopes))
-        added = ring(gripper, around, torque, time_s[seen])
+        added = ring(gripper, around, torque, time_s[ringing])
         added = added.reshape(len(parameters), -1, added.shape[1])
-        rows[..., seen] += differences(added, _RINGING_STEP)
+        rows[..., ringing] += differences(added, _RINGING_STEP)
     return rows
 
 

@@ -83,11 +83,12 @@ class _System:
         k_p, c_p, k, c = network.k_p[0], network.c_p[0], network.k[0], network.c[0]
         n = len(k)
         tips = np.array([b, b])
-        hinges = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
+        spring_rows = np.hstack((np.diag(np.sqrt(self._k)), np.zeros((2, n))))
         branches = np.sqrt(k)[:, None] * np.hstack((np.tile(tips, (n, 1)), -np.eye(n)))
         side = np.sqrt(k_p) * np.concatenate((tips, np.zeros(n)))
         self._touching = Modes(
-            np.vstack((hinges, side, branches)), _block(_coupled(self._c, b * b * c_p), np.sqrt(c))
+            np.vstack((spring_rows, side, branches)),
+            _block(_coupled(self._c, b * b * c_p), np.sqrt(c)),
         )
         self._arms = Modes(np.diag(np.sqrt(self._k)), np.diag(np.sqrt(self._c)))
         self._has_damper = bool(c_p > 0)

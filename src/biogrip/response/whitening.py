@@ -28,7 +28,7 @@ MOST_SAMPLES = 50_000
 
 
 @dataclass(frozen=True)
-class Colour:
+class NoiseModel:
     """Autocorrelation model of noise, by the shares of its components in the variance.
 
     Parameters
@@ -58,7 +58,7 @@ class Whitening:
     ----------
     time_s : (n_samples,)
         Ascending sampling times.
-    colour
+    noise_model
         Autocorrelation model of the noise.
     nuisance : (n_functions, n_samples)
         Functions that the instrument may have added, with any amplitude.
@@ -67,14 +67,20 @@ class Whitening:
     """
 
     def __init__(
-        self, time_s: Array, colour: Colour, nuisance: Array, uncertain: Array | None = None
+        self,
+        time_s: Array,
+        noise_model: NoiseModel,
+        nuisance: Array,
+        uncertain: Array | None = None,
     ) -> None:
         # Imported here, for loading celerite takes a tenth of a second.
         from celerite2 import driver
 
         flicker = flicker_rates(time_s)
-        rates = np.append(1 / colour.time_s, flicker)
-        shares = np.append(colour.relaxing, np.full(len(flicker), colour.flicker / len(flicker)))
+        rates = np.append(1 / noise_model.time_s, flicker)
+        shares = np.append(
+            noise_model.relaxing, np.full(len(flicker), noise_model.flicker / len(flicker))
+        )
         self._solve = driver.solve_lower
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates
         self._left = np.tile(shares, (len(time_s), 1))

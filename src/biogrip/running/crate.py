@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from biogrip import __version__
 from biogrip.digits import counted
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 from biogrip.running.manifest import Manifest
 from biogrip.running.provenance import finished
 from biogrip.running.records import Record
@@ -72,9 +72,9 @@ def write_crate(results: Path, output: Path) -> str:
 
     study = read_study(results)
     manifest = Manifest(results)
-    wanted = [STUDY, *finished(results, manifest)]
-    records = {name: manifest.last(name) for name in wanted}
-    times = [_time(records[name]) for name in wanted]
+    names = [STUDY, *finished(results, manifest)]
+    records = {name: manifest.last(name) for name in names}
+    times = [_time(records[name]) for name in names]
     begun, ended = min(times), max(times)
 
     crate = ROCrate(version="1.1")
@@ -100,7 +100,7 @@ def write_crate(results: Path, output: Path) -> str:
     traces = [
         _added(crate, Path(study.case(name).file), f"traces/{name}.csv") for name in study.recorded
     ]
-    made = [_added(crate, results / n, f"results/{n}", records[n]) for n in wanted[1:]]
+    made = [_added(crate, results / n, f"results/{n}", records[n]) for n in names[1:]]
     action = crate.add_action(
         workflow,
         "#run",
@@ -115,7 +115,7 @@ def write_crate(results: Path, output: Path) -> str:
         },
     )
     crate.root_dataset.append_to("mentions", action)
-    with written_whole(output) as scratch:
+    with atomic_write(output) as scratch:
         crate.write_zip(scratch)
     return f"{counted(len(made), 'result')} of {results} packed in {output}."
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from biogrip.files import watched
+from biogrip.files import watch_writes
 from biogrip.running.records import Record
 
 JOURNALS = ".manifest"
@@ -56,7 +56,7 @@ class Journal:
         return Record(
             path.absolute().relative_to(self._results).as_posix(),
             stat.st_size,
-            sha256_of(content),
+            hash_file(content),
             stat.st_mtime_ns,
             time.time_ns(),
             *self._made,
@@ -83,7 +83,7 @@ def recorded_in(results: Path, settings: str = "", inputs: str = "") -> Iterator
     journal = Journal(results, settings, inputs)
     # While it is there, results are being written.
     journal.note_begun([])
-    with watched(journal.note, lambda scratch: journal.note_begun([scratch])):
+    with watch_writes(journal.note, lambda scratch: journal.note_begun([scratch])):
         yield
 
 
@@ -126,7 +126,7 @@ def _writer(journal: Path) -> tuple[str, int, int]:
     return name["host"], int(name["process"]), int(name["begun"])
 
 
-def sha256_of(path: Path) -> str:
+def hash_file(path: Path) -> str:
     """Return the SHA-256 hash of a file, in hexadecimal."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()

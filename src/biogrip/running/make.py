@@ -7,10 +7,10 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.products.catalogue import chosen, products
 from biogrip.products.plan import Plan
 from biogrip.products.product import Product
-from biogrip.running.journal import JOURNALS, digest_of_files, recorded_in, sha256_of
+from biogrip.running.journal import JOURNALS, digest_of_files, hash_file, recorded_in
 from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.running.resolved import NAME, read_study
-from biogrip.running.sheet import Sheet, inputs_of, sheets_of
+from biogrip.running.rules import Rule, inputs_of, make_rules
 
 
 def make(
@@ -35,54 +35,54 @@ def make(
         If there is no such product or job, or it cannot be made.
     """
     plan = Plan(read_study(results), results)
-    asked = chosen(names)
-    for product in asked:
-        _check(Sheet(product.name, (product,), plan), job)
+    requested = chosen(names)
+    for product in requested:
+        _check(Rule(product.name, (product,), plan), job)
     if made_for is not None:
-        sheet = Sheet("", tuple(asked), plan)
-        if sheet.digest_of_settings(job) != made_for.split("-")[0]:
+        rule = Rule("", tuple(requested), plan)
+        if rule.digest_of_settings(job) != made_for.split("-")[0]:
             raise BiogripError(
                 f"{results / NAME}: has changed since this run was planned: another run was begun "
                 "beside it. Run again."
             )
-        _make(sheet, asked, job, made_for)
+        _make(rule, requested, job, made_for)
         return
-    sheets = sheets_of(products().values(), plan)
-    for product in asked:
-        sheet = _planned(sheets, product, job)
-        _make(sheet, [product], job, sheet.digest(job))
+    rules = make_rules(products().values(), plan)
+    for product in requested:
+        rule = _planned(rules, product, job)
+        _make(rule, [product], job, rule.digest(job))
 
 
-def _make(sheet: Sheet, asked: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
-    results = sheet.plan.results
-    outputs = [Path(file) for product in asked for file in product.outputs(job).values()]
+def _make(rule: Rule, requested: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
+    results = rule.plan.results
+    outputs = [Path(file) for product in requested for file in product.outputs(job).values()]
     refuse_links(results, [*outputs, results / JOURNALS])
     refuse_files_as_folders(results, [*outputs, results / JOURNALS / "a journal"])
-    files = [Path(file) for file in inputs_of(sheet, job)]
+    files = [Path(file) for file in inputs_of(rule, job)]
     # If an input is missing, the product that reads it reports that.
     there = all(file.is_file() for file in files)
-    inputs = digest_of_files(map(sha256_of, files)) if there else ""
+    inputs = digest_of_files(map(hash_file, files)) if there else ""
     with recorded_in(results, made_for, inputs):
-        for product in asked:
-            product.run(sheet.plan, job)
+        for product in requested:
+            product.run(rule.plan, job)
 
 
-def _planned(sheets: Iterable[Sheet], product: Product, job: Mapping[str, str]) -> Sheet:
+def _planned(rules: Iterable[Rule], product: Product, job: Mapping[str, str]) -> Rule:
     """Return the rule that makes a product, or one of its own if none is planned."""
-    found = [sheet for sheet in sheets if product.name in {p.name for p in sheet.products}]
-    with_job = [sheet for sheet in found if job in sheet.jobs or not sheet.jobs]
-    return (with_job or [Sheet(product.name, (product,), found[0].plan)])[0]
+    found = [rule for rule in rules if product.name in {p.name for p in rule.products}]
+    with_job = [rule for rule in found if job in rule.jobs or not rule.jobs]
+    return (with_job or [Rule(product.name, (product,), found[0].plan)])[0]
 
 
-def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
+def _check(rule: Rule, job: Mapping[str, str]) -> None:
     """Refuse a job whose wildcards are incomplete, superfluous or not of this study."""
-    for name in sheet.wildcards:
+    for name in rule.wildcards:
         if name not in job:
-            raise BiogripError(f"{sheet.name}: is made with --{name}, which is missing.")
+            raise BiogripError(f"{rule.name}: is made with --{name}, which is missing.")
     for name in job:
-        if name not in sheet.wildcards:
-            raise BiogripError(f"--{name}: does not go with {sheet.name}.")
-    study = sheet.plan.study
+        if name not in rule.wildcards:
+            raise BiogripError(f"--{name}: does not go with {rule.name}.")
+    study = rule.plan.study
     for name, allowed in (
         ("case", [*study.cases, *study.points]),
         ("method", study.methods),
@@ -96,12 +96,12 @@ def _check(sheet: Sheet, job: Mapping[str, str]) -> None:
     if "seed" in job and not job["seed"].isdigit():
         raise BiogripError(f"--seed: found '{job['seed']}', allowed is a number.")
     if "batch" in job:
-        _check_batch(sheet, job)
+        _check_batch(rule, job)
 
 
-def _check_batch(sheet: Sheet, job: Mapping[str, str]) -> None:
+def _check_batch(rule: Rule, job: Mapping[str, str]) -> None:
     """Refuse a batch whose inputs do not exist; it need not be a batch of the present plan."""
-    for file in (Path(file) for files in sheet.inputs(dict(job)).values() for file in files):
+    for file in (Path(file) for files in rule.inputs(dict(job)).values() for file in files):
         if file.stem == job["batch"] and not file.exists():
             there = sorted(path.stem for path in file.parent.glob(f"*{file.suffix}"))
             hint, some = nearest(file.stem, there), ", ".join(there[:20])

@@ -11,22 +11,22 @@ from dataclasses import replace
 from pathlib import Path
 
 from biogrip.errors import BiogripError
-from biogrip.files import scratch_of
+from biogrip.files import scratch_path
 from biogrip.running.journal import (
     JOURNALS,
     Journal,
+    hash_file,
     is_closed,
     is_gone,
     is_running,
     journals_in,
-    sha256_of,
 )
 from biogrip.running.places import refuse_links, refuse_other_than_folder
 from biogrip.running.records import (
     Record,
+    hash_lines,
     read_journal,
     read_manifest,
-    sum_of_lines,
 )
 
 NAME = "manifest.jsonl"
@@ -159,7 +159,7 @@ class Manifest:
         # The record of a log whose job was killed has size 0 and no hash.
         if stat.st_size == 0 or (stat.st_mtime_ns == record.modified_ns and not thoroughly):
             return True
-        return sha256_of(file) == record.sha256
+        return hash_file(file) == record.sha256
 
     def forget(self, paths: Iterable[str]) -> None:
         """Remove files from the records."""
@@ -190,10 +190,10 @@ class Manifest:
             set_aside(copy)
         self._damaged = []
         text = "".join(record.line for path in self.paths for record in self._records[path])
-        text += sum_of_lines(text.encode())
+        text += hash_lines(text.encode())
         for copy in self._copies:
             copy.parent.mkdir(parents=True, exist_ok=True)
-            scratch = scratch_of(copy)
+            scratch = scratch_path(copy)
             scratch.write_text(text, encoding="utf-8", newline="\n")
             os.replace(scratch, copy)
         self._discard_journals()

@@ -15,10 +15,10 @@ def refuse_links(folder: Path, places: Iterable[Path]) -> None:
     BiogripError
         Names the first link.
     """
-    seen = {folder}
+    inside = {folder}
     for place in places:
-        seen.update((place, *place.parents))
-    for place in sorted(seen):
+        inside.update((place, *place.parents))
+    for place in sorted(inside):
         if (place == folder or folder in place.parents) and place.is_symlink():
             raise BiogripError(
                 f"{place}: is a link, and nothing is written, replaced or removed through links. "

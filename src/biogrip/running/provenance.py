@@ -8,11 +8,11 @@ from pathlib import Path, PurePosixPath
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
-from biogrip.running.journal import digest_of_files, sha256_of
+from biogrip.running.journal import digest_of_files, hash_file
 from biogrip.running.manifest import Manifest
 from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
-from biogrip.running.sheet import Sheet, inputs_of, sheets_of
+from biogrip.running.rules import Rule, inputs_of, make_rules
 
 _RESULTS = "results"
 
@@ -33,12 +33,12 @@ class Provenance:
         self._manifest = manifest
         self._hashes: dict[str, str | None] = {}
 
-    def made_otherwise(self, sheets: Iterable[Sheet]) -> list[str]:
+    def made_otherwise(self, rules: Iterable[Rule]) -> list[str]:
         """Return results that were made with other settings, other code, or from other files.
 
         Parameters
         ----------
-        sheets
+        rules
             All products and jobs of the study.
 
         Returns
@@ -48,18 +48,18 @@ class Provenance:
         """
         return [
             name
-            for sheet in sheets
-            for job in sheet.jobs
-            for name in self._of_job(sheet, job)
+            for rule in rules
+            for job in rule.jobs
+            for name in self._of_job(rule, job)
             if (self._results / name).exists()
         ]
 
-    def outdated(self, sheets: Iterable[Sheet]) -> set[str]:
+    def outdated(self, rules: Iterable[Rule]) -> set[str]:
         """Return recorded results that were made otherwise, or from any that were.
 
         Parameters
         ----------
-        sheets
+        rules
             All products and jobs of the study.
 
         Returns
@@ -68,12 +68,12 @@ class Provenance:
             Relative to the results folder. A result that is gone counts, too, if it was
             made otherwise: others may have been made from it.
         """
-        jobs = [(sheet, job) for sheet in sheets for job in sheet.jobs]
-        found = {name for sheet, job in jobs for name in self._of_job(sheet, job)}
+        jobs = [(rule, job) for rule in rules for job in rule.jobs]
+        found = {name for rule, job in jobs for name in self._of_job(rule, job)}
         followers: dict[str, set[str]] = defaultdict(set)
-        for sheet, job in jobs:
-            outputs = set(_outputs(sheet, job))
-            for file in filter(is_result, inputs_of(sheet, job)):
+        for rule, job in jobs:
+            outputs = set(_outputs(rule, job))
+            for file in filter(is_result, inputs_of(rule, job)):
                 followers[name_of(file)] |= outputs
         waiting = list(found)
         while waiting:
@@ -82,11 +82,11 @@ class Provenance:
             waiting += new
         return found
 
-    def _of_job(self, sheet: Sheet, job: Wildcards) -> list[str]:
-        recorded = [name for name in _outputs(sheet, job) if self._manifest.knows(name)]
+    def _of_job(self, rule: Rule, job: Wildcards) -> list[str]:
+        recorded = [name for name in _outputs(rule, job) if self._manifest.knows(name)]
         if not recorded:
             return []
-        settings, inputs = sheet.digest(job), self._digest_of_inputs(sheet, job)
+        settings, inputs = rule.digest(job), self._digest_of_inputs(rule, job)
         return [
             name
             for name in recorded
@@ -94,9 +94,9 @@ class Provenance:
             or (inputs is not None and last.inputs != inputs)
         ]
 
-    def _digest_of_inputs(self, sheet: Sheet, job: Wildcards) -> str | None:
+    def _digest_of_inputs(self, rule: Rule, job: Wildcards) -> str | None:
         """Return a digest of a job's recorded inputs, or None if an input is unknown."""
-        hashes = [self._hash_of(file) for file in inputs_of(sheet, job)]
+        hashes = [self._hash_of(file) for file in inputs_of(rule, job)]
         return None if None in hashes else digest_of_files(hash_ for hash_ in hashes if hash_)
 
     def _hash_of(self, file: str) -> str | None:
@@ -106,13 +106,13 @@ class Provenance:
                 self._hashes[file] = self._manifest.last(name).sha256
             else:
                 place = self._results.parent / file
-                self._hashes[file] = sha256_of(place) if place.is_file() else None
+                self._hashes[file] = hash_file(place) if place.is_file() else None
         return self._hashes[file]
 
 
-def _outputs(sheet: Sheet, job: Wildcards) -> list[str]:
+def _outputs(rule: Rule, job: Wildcards) -> list[str]:
     """Return the files of a job, relative to the results folder."""
-    return [name_of(file) for product in sheet.products for file in product.outputs(job).values()]
+    return [name_of(file) for product in rule.products for file in product.outputs(job).values()]
 
 
 def is_result(file: str) -> bool:
@@ -146,12 +146,12 @@ def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
     BiogripError
         Names the first file for which this does not hold.
     """
-    sheets = sheets_of(products().values(), Plan(read_study(results), results))
+    rules = make_rules(products().values(), Plan(read_study(results), results))
     found = [
         name
-        for sheet in sheets
-        for product in sheet.products
-        for job in sheet.jobs
+        for rule in rules
+        for product in rule.products
+        for job in rule.jobs
         if "batch" not in job
         for name in map(name_of, product.outputs(job).values())
         if fnmatch(PurePosixPath(name).stem, only)
@@ -169,7 +169,7 @@ def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
                 f"{results / name}: is not what was written (edited, or damaged). "
                 "The next run makes it again."
             )
-    outdated = Provenance(results, manifest).outdated(sheets)
+    outdated = Provenance(results, manifest).outdated(rules)
     for name in names:
         if name in outdated:
             raise BiogripError(

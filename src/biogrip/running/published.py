@@ -10,7 +10,7 @@ from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.products.product import FIGURE_KINDS, PUBLISHED_TABLE_KINDS
-from biogrip.running.journal import sha256_of
+from biogrip.running.journal import hash_file
 from biogrip.running.manifest import Manifest, set_aside
 from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.running.provenance import finished
@@ -113,7 +113,7 @@ def _copy(results: Path, published: Path, names: list[str]) -> None:
 def _clear(file: Path, digests: list[str], *, replaced: bool) -> None:
     """Set aside a file edited since it was published; remove one that is not to be replaced."""
     if os.path.lexists(file):
-        if file.is_symlink() or sha256_of(file) not in digests:
+        if file.is_symlink() or hash_file(file) not in digests:
             set_aside(file)
         elif not replaced:
             file.unlink()

@@ -131,7 +131,7 @@ def read_manifest(file: Path) -> list[Record] | None:
     if not os.path.lexists(file):
         return []
     text, last = _divided(_bytes(file))
-    if last != sum_of_lines(text).encode():
+    if last != hash_lines(text).encode():
         return None
     found = []
     for number, line in enumerate(text.splitlines(), start=1):
@@ -148,7 +148,7 @@ def _divided(text: bytes) -> tuple[bytes, bytes]:
     return text[:start], text[start:]
 
 
-def sum_of_lines(text: bytes) -> str:
+def hash_lines(text: bytes) -> str:
     """Return the last line of a manifest, which has the hash of all others."""
     return json.dumps({SUM_OF_LINES: hashlib.sha256(text).hexdigest()}) + "\n"
 

@@ -215,8 +215,8 @@ def _to_open(folder: Path, arguments: list[str]) -> str:
             for page in (results / "report.html", *pages)
             if page.is_file() and page.stat().st_mtime_ns >= begun_ns
         ]
-    asked = [folder / word for word in arguments if word.startswith("results/")]
-    there = _files(asked) or _files(pages)
+    requested = [folder / word for word in arguments if word.startswith("results/")]
+    there = _files(requested) or _files(pages)
     more = f" and {len(there) - _SHOWN} more" if len(there) > _SHOWN else ""
     return f"biogrip: done. Open {', '.join(there[:_SHOWN])}{more}." if there else "biogrip: done."
 

@@ -17,7 +17,7 @@ from biogrip.running.locks import is_locked
 _AGAIN_S = 0.05
 # Interrupt anyway after this, in case a version of Snakemake waits in another function.
 _PATIENCE_S = 10.0
-_asked_s: list[float] = []
+_stop_requests_s: list[float] = []
 
 
 def main() -> None:
@@ -40,8 +40,8 @@ def _stop(_: int, frame: FrameType | None) -> None:
         os._exit(128 + signal.SIGINT)
     # Try again later: planning may not have reached the wait, or a job may have just begun.
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
-    _asked_s.append(time.monotonic())
-    waits = _waits_for_jobs(frame) or _asked_s[-1] - _asked_s[0] > _PATIENCE_S
+    _stop_requests_s.append(time.monotonic())
+    waits = _waits_for_jobs(frame) or _stop_requests_s[-1] - _stop_requests_s[0] > _PATIENCE_S
     # Interrupt only once: a second time would interrupt the cancelling of jobs.
     interrupts = waits and signal.getsignal(signal.SIGTERM) is not _cancelling
     if interrupts:

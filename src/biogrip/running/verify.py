@@ -11,7 +11,7 @@ from biogrip.running.manifest import OF_NO_RULE, Manifest
 from biogrip.running.provenance import Provenance, name_of
 from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
-from biogrip.running.sheet import files_of, sheets_of
+from biogrip.running.rules import files_of, make_rules
 
 
 def verify(results: Path) -> str:
@@ -40,14 +40,14 @@ def verify(results: Path) -> str:
             problems.append(f"{results / path}: is not what was written (edited, or damaged).")
     others = 0
     if not problems and manifest.knows(STUDY):
-        sheets = sheets_of(products().values(), Plan(read_study(results), results))
+        rules = make_rules(products().values(), Plan(read_study(results), results))
         problems = [
             f"{results / name}: was made for other settings, by other code or of other files "
             f"than {results / STUDY} says."
-            for name in sorted(Provenance(results, manifest).outdated(sheets))
+            for name in sorted(Provenance(results, manifest).outdated(rules))
             if manifest.knows(name)
         ]
-        others = len(manifest.others([*map(name_of, files_of(sheets)), *OF_NO_RULE]))
+        others = len(manifest.others([*map(name_of, files_of(rules)), *OF_NO_RULE]))
     if problems:
         raise BiogripError("\n".join([*problems, "The next run makes them again."]))
     also = f" Of other studies than {results / STUDY}: {others}." if others else ""

@@ -23,7 +23,7 @@ _ROOM_BYTES = 256 * 1024
 def hold_against_record(
     workflow: Any,
     results: Path,
-    asked: Callable[[], Iterable[str]],
+    requested: Callable[[], Iterable[str]],
     made_otherwise: Callable[[Manifest], Iterable[str]],
     begin: Callable[[], None],
 ) -> None:
@@ -37,7 +37,7 @@ def hold_against_record(
         Snakemake's workflow object.
     results
         The results folder.
-    asked
+    requested
         Function that returns the files a run makes by default.
     made_otherwise
         Function that returns outdated results, relative to the results folder.
@@ -58,12 +58,12 @@ def hold_against_record(
                     release_dead_locks(Path(".snakemake"))
                 # Beside another run nothing is changed: Snakemake says so, and ends.
                 if kind.dryrun_exec or not is_locked(Path(".snakemake")):
-                    check_results(results, asked(), may_make, changing=not kind.dryrun_exec)
+                    check_results(results, requested(), may_make, changing=not kind.dryrun_exec)
                     if not kind.dryrun_exec:
                         begin()
         ended = execute(*args, **kwargs)
         if not kind.dryrun_exec:
-            _say_what_else_is_there(results, asked())
+            _say_what_else_is_there(results, requested())
         return ended
 
     def forced() -> Any:
@@ -88,9 +88,9 @@ def _said_and_ended() -> Iterator[None]:
         sys.exit(f"biogrip: {visible_lines(error)}")
 
 
-def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
+def _say_what_else_is_there(results: Path, requested: Iterable[str]) -> None:
     """Print how many results belong to other studies."""
-    own = [_name(results, Path(file)) for file in asked]
+    own = [_name(results, Path(file)) for file in requested]
     others = Manifest(results).others([*own, *OF_NO_RULE])
     if others:
         print(
@@ -101,7 +101,7 @@ def _say_what_else_is_there(results: Path, asked: Iterable[str]) -> None:
 
 
 def check_results(
-    results: Path, asked: Iterable[str], may_make: Callable[[str], bool], *, changing: bool
+    results: Path, requested: Iterable[str], may_make: Callable[[str], bool], *, changing: bool
 ) -> None:
     """Compare the results with their record, and remove files that must be made again.
 
@@ -112,7 +112,7 @@ def check_results(
     ----------
     results
         The results folder.
-    asked
+    requested
         Files that a run makes by default.
     may_make
         Function that returns True if a rule of the study makes a file.
@@ -125,13 +125,13 @@ def check_results(
         If a file is in the way that the study did not write, a path has a link, or the folder is
         not writable.
     """
-    wanted = [Path(file) for file in asked]
-    refuse_links(results, wanted)
-    refuse_files_as_folders(results, wanted)
+    files = [Path(file) for file in requested]
+    refuse_links(results, files)
+    refuse_files_as_folders(results, files)
     if changing:
-        _check_writable(results, wanted)
+        _check_writable(results, files)
     manifest = Manifest(results)
-    refuse_others(manifest, results, wanted)
+    refuse_others(manifest, results, files)
     gone = []
     for path in manifest.files:
         file = results / path

@@ -34,8 +34,8 @@ class MethodBlocks:
     def of(self, method: str) -> object:
         """Return the settings object of a method."""
         found = [self.block(name) for name in METHODS[method].blocks]
-        together = METHODS[method].settings
-        return METHODS[method].named(together)(*found) if together else found[0]
+        combined = METHODS[method].settings
+        return METHODS[method].named(combined)(*found) if combined else found[0]
 
     def problems_of(self, genes: int) -> Iterator[Problem]:
         """Find settings that conflict with the length of a chromosome."""

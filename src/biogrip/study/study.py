@@ -22,7 +22,7 @@ from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.readings import read_blocks
 from biogrip.study.source import overlaid
-from biogrip.study.sweeps import Sweep, point_blocks, sweeps_of
+from biogrip.study.sweeps import Sweep, make_sweeps, point_blocks
 from biogrip.study.typed import built, plain
 from biogrip.traces.recordings import Columns
 
@@ -255,7 +255,7 @@ class Study:
     @cached_property
     def sweeps(self) -> dict[str, Sweep]:
         """Sweeps by name."""
-        return sweeps_of(self.config.sweeps)
+        return make_sweeps(self.config.sweeps)
 
     @cached_property
     def readings(self) -> dict[str, dict[str, Case]]:

@@ -11,9 +11,9 @@ from biogrip.study.sweeps import (
     Sweep,
     SweepBlock,
     ValueBlock,
-    axis_of,
-    points_of,
-    sweeps_of,
+    list_points,
+    make_axis,
+    make_sweeps,
 )
 from biogrip.study.typed import keys
 
@@ -42,7 +42,7 @@ def sweep_problems(
         for name, block in blocks.items()
         for path, text in _block_problems(block, cases)
     ]
-    sweeps = sweeps_of(blocks)
+    sweeps = make_sweeps(blocks)
     points = sum(
         len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
         for sweep in sweeps.values()
@@ -87,11 +87,11 @@ def _block_problems(block: SweepBlock, cases: Mapping[str, CaseBlock]) -> Iterat
     for name, axis in axes.items():
         for path, text in _key_problems(axis):
             yield (name, *path), text
-        shown = [value.text for value in axis_of(axis).values]
+        shown = [value.text for value in make_axis(axis).values]
         for index, value in enumerate(shown):
             if value in shown[:index]:
                 yield (name, "values", index), f"is called '{value}' like one before it."
-    rows, columns = (axis_of(axis) for axis in axes.values())
+    rows, columns = (make_axis(axis) for axis in axes.values())
     ours = {key for value in rows.values for key in value.overrides}
     for index, changing in enumerate(columns.values):
         for key in changing.overrides:
@@ -109,8 +109,8 @@ def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
     allowed = [key for key, is_block in _dotted(Shared) if is_block == with_blocks]
     for key in axis.keys:
         if key not in allowed:
-            wanted = "a block" if with_blocks else "a single value"
-            text = f"found '{key}', allowed is the key of {wanted} that a case may change."
+            expected = "a block" if with_blocks else "a single value"
+            text = f"found '{key}', allowed is the key of {expected} that a case may change."
             yield ("key",), text + nearest(key, allowed)
 
 
@@ -128,15 +128,15 @@ def _dotted(block: type, path: str = "") -> Iterator[tuple[str, bool]]:
 def _name_problems(
     sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
 ) -> Iterator[Problem]:
-    seen: set[str] = set()
-    for sweep, point in points_of(sweeps):
+    found_before: set[str] = set()
+    for sweep, point in list_points(sweeps):
         if point.name in cases:
             text = f"is the name of a point of the sweep {sweep.name}; allowed is another name."
             yield ("cases", point.name), text
-        if point.name in seen:
+        if point.name in found_before:
             text = f"has the point {point.name} twice; allowed is every combination once."
             yield ("sweeps", sweep.name), text
-        seen.add(point.name)
+        found_before.add(point.name)
         if len(point.name) > _LONGEST_NAME:
             text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
             yield ("sweeps", sweep.name), f"{text}allowed are {_LONGEST_NAME} (it names files)."

@@ -163,23 +163,23 @@ class Sweep:
         ]
 
 
-def sweeps_of(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
+def make_sweeps(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
     """Return the sweeps that a study's config defines."""
     return {
         name: Sweep(
-            name, block.title or name, block.cases, axis_of(block.rows), axis_of(block.columns)
+            name, block.title or name, block.cases, make_axis(block.rows), make_axis(block.columns)
         )
         for name, block in blocks.items()
     }
 
 
-def axis_of(block: AxisBlock) -> Axis:
+def make_axis(block: AxisBlock) -> Axis:
     """Return the axis that a config block defines."""
     unit = f" ({block.unit})" if block.unit is not None else ""
     return Axis(block.label + unit, tuple(_values(block)))
 
 
-def points_of(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
+def list_points(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
     """Yield every point of all sweeps with its sweep."""
     for sweep in sweeps.values():
         for case in sweep.cases:
@@ -201,7 +201,7 @@ def point_blocks(
     """
     found = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
-    for _, point in points_of(sweeps):
+    for _, point in list_points(sweeps):
         block = blocks[point.case]
         for key, value in point.overrides.items():
             block = _changed(block, key, value)

@@ -13,7 +13,7 @@ from biogrip.study.messages import MOST_EXPLAINED, shape_at, value_problems
 from biogrip.study.readings import read_blocks
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
-from biogrip.study.sweeps import point_blocks, points_of, sweeps_of
+from biogrip.study.sweeps import list_points, make_sweeps, point_blocks
 from biogrip.study.typed import Shape, built, parts, plain
 
 STUDY = Shape(Key(), block=StudyConfig)
@@ -85,16 +85,16 @@ def block_problems(path: KeyPath, value: Any) -> Iterator[Problem]:
 
 def _refuse(problems: Iterator[Problem], files: ConfigFiles) -> None:
     """Raise an error that lists the first few problems, if there are any."""
-    seen: dict[str, None] = {}
+    found_before: dict[str, None] = {}
     for path, text in islice(problems, MOST_EXPLAINED):
         # A problem in a block that cases inherit is reported once, not once per case.
         origin = _origin(path, files)
-        seen[f"{files.place(origin)}: {dotted(origin)}: {text}"] = None
-    if seen:
-        shown = list(islice(seen, _SHOWN))
-        if len(seen) > _SHOWN:
-            more = "or more" if len(seen) >= MOST_EXPLAINED else "more"
-            shown.append(f"... and {len(seen) - _SHOWN} {more}.")
+        found_before[f"{files.place(origin)}: {dotted(origin)}: {text}"] = None
+    if found_before:
+        shown = list(islice(found_before, _SHOWN))
+        if len(found_before) > _SHOWN:
+            more = "or more" if len(found_before) >= MOST_EXPLAINED else "more"
+            shown.append(f"... and {len(found_before) - _SHOWN} {more}.")
         raise BiogripError("The study's configuration cannot be used.\n" + "\n".join(shown))
 
 
@@ -140,8 +140,8 @@ def _assumed_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
 
 def _point_problems(study: StudyConfig) -> Iterator[Problem]:
     """Check every point of every sweep as if it were a case of the config."""
-    sweeps = sweeps_of(study.sweeps)
-    by_name = {point.name: (sweep, point) for sweep, point in points_of(sweeps)}
+    sweeps = make_sweeps(study.sweeps)
+    by_name = {point.name: (sweep, point) for sweep, point in list_points(sweeps)}
     for name, block in point_blocks(sweeps, study.cases).items():
         path = ("cases", name)
         found = [((*path, *place), text) for place, text in value_problems(_CASE, block)]

@@ -24,7 +24,7 @@ _NO_NUMBER = pa.Array.from_buffers(pa.float64(), 1, [None, pa.py_buffer(np.array
 
 
 def plain_rows(
-    path: Path, header_lines: int, width: int, wanted: Sequence[int], separator: str
+    path: Path, header_lines: int, width: int, needed: Sequence[int], separator: str
 ) -> Array | None:
     """Read the rows below a header; None if any of them is not plain.
 
@@ -36,7 +36,7 @@ def plain_rows(
         Number of lines before the rows.
     width
         Number of columns.
-    wanted
+    needed
         Indices of the columns to read, from 0.
     separator
         Cell separator; unless it is a comma, numbers may have a decimal comma.
@@ -60,17 +60,17 @@ def plain_rows(
     if np.frombuffer(body, np.uint8).max() > 0x7F:
         return None
     for decimal in "." if separator == "," else ".,":
-        rows = _parsed(body, width, wanted, separator, decimal)
+        rows = _parsed(body, width, needed, separator, decimal)
         if rows is not None:
             return rows if len(rows) == len(lengths) else None
     return None
 
 
 def _parsed(
-    body: pa.Buffer, width: int, wanted: Sequence[int], separator: str, decimal: str
+    body: pa.Buffer, width: int, needed: Sequence[int], separator: str, decimal: str
 ) -> Array | None:
     names = [str(column) for column in range(width)]
-    chosen = [names[column] for column in wanted]
+    chosen = [names[column] for column in needed]
     try:
         table = csv.read_csv(
             pa.BufferReader(body),

@@ -249,10 +249,10 @@ def _cleared(basis: Array, functions: Array) -> Array:
 
 def _fit(functions: _Functions) -> _Fit:
     nuisance = functions.nuisance
-    seen, trace = _cleared(nuisance, functions.lagged), without(nuisance, functions.trace)
-    found, _, rank, _ = np.linalg.lstsq(seen.T, trace, _ROUNDING)
+    basis, trace = _cleared(nuisance, functions.lagged), without(nuisance, functions.trace)
+    found, _, rank, _ = np.linalg.lstsq(basis.T, trace, _ROUNDING)
     weights: Array = np.asarray(found, np.float64)
-    return _Fit(weights @ seen, weights, int(rank))
+    return _Fit(weights @ basis, weights, int(rank))
 
 
 def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool:
@@ -319,10 +319,10 @@ def _left_over(trace: Array, responses: Array) -> float:
     from scipy.optimize import nnls
 
     scale = np.linalg.norm(responses, axis=1)
-    told = scale > 0
-    if not np.any(told):
+    scaled = scale > 0
+    if not np.any(scaled):
         return float(trace @ trace)
-    return float(nnls((responses[told] / scale[told, None]).T, trace)[1] ** 2)
+    return float(nnls((responses[scaled] / scale[scaled, None]).T, trace)[1] ** 2)
 
 
 def _check_turn(

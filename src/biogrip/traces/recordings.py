@@ -297,10 +297,10 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
 def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
     if header is None:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    wanted = (columns.time, columns.rotation)
-    separator, names = _header(path, at[0], header, wanted)
+    needed = (columns.time, columns.rotation)
+    separator, names = _header(path, at[0], header, needed)
     which = _said_by(columns.by_options, "time", "rotation")
-    time, rotation = (_index(path, at[0], names, column, which) for column in wanted)
+    time, rotation = (_index(path, at[0], names, column, which) for column in needed)
     if time == rotation:
         raise BiogripError(
             f"{place(path, at[0], columns.time)}: found time and rotation in one column, "
@@ -309,7 +309,7 @@ def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> 
     return _Layout(separator, len(names), {columns.time: time, columns.rotation: rotation})
 
 
-def _header(path: Path, at: int, line: str, wanted: tuple[str, str]) -> tuple[str, list[str]]:
+def _header(path: Path, at: int, line: str, needed: tuple[str, str]) -> tuple[str, list[str]]:
     """Return the separator that yields most wanted columns, then most columns, and the names."""
     readings = {}
     for separator in _SEPARATORS:
@@ -318,7 +318,7 @@ def _header(path: Path, at: int, line: str, wanted: tuple[str, str]) -> tuple[st
         except csv.Error as error:
             raise BiogripError(f"{place(path, at)}: cannot be read as a row: {error}.") from error
         readings[separator] = [cell.strip() for cell in cells]
-    plain = {_plain(name) for name in wanted}
+    plain = {_plain(name) for name in needed}
 
     def merit(separator: str) -> tuple[int, int]:
         names = readings[separator]

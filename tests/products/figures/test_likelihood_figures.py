@@ -20,7 +20,7 @@ BEST = 2.0
 def item(**changes: Any) -> dict[str, Any]:
     """A quantity whose profile is a parabola of its logarithm, with few points."""
     values = BEST * np.exp(np.linspace(-1, 1, 9))
-    profile = {"values": list(values), "rises": list((4 * np.log(values / BEST)) ** 2)}
+    profile = {"values": list(values), "increases": list((4 * np.log(values / BEST)) ** 2)}
     limits = {"low": BEST * np.exp(-0.49), "high": BEST * np.exp(0.49), "excluded": []}
     words = {"quantity": "k", "symbol": "$k$", "unit": "N/m", "verdict": "determined"}
     return {**words, **limits, "profile": profile, **changes}
@@ -41,12 +41,12 @@ def drawn(path: Path) -> Any:
 def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: Path) -> None:
     axes = drawn(written(tmp_path / "v.json", item())).axes[0]
     (curve,) = (line for line in axes.lines if line.get_label() == "this trace")
-    values, rises = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+    values, increases = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
     assert len(values) > 40
     # Its root is bent at the optimum only, where cubics round it off.
     away = np.abs(np.log(values / BEST)) > 0.3
     np.testing.assert_allclose(
-        rises[away], (4 * np.log(values[away] / BEST)) ** 2, rtol=0.05, atol=0.05
+        increases[away], (4 * np.log(values[away] / BEST)) ** 2, rtol=0.05, atol=0.05
     )
     low, high = axes.get_xlim()
     assert low < BEST * np.exp(-0.49)
@@ -85,12 +85,12 @@ def test_ticks_do_not_collide(low: float, high: float, labels: list[str]) -> Non
 
 
 def drawn_valley(
-    folder: Path, rises: list[list[float]], fits: dict[str, list[float]], **known: Any
+    folder: Path, increases: list[list[float]], fits: dict[str, list[float]], **known: Any
 ) -> Any:
     """Axes of a valley along the sum of 10, with sums of 9, 10 and 11."""
     shares = np.linspace(0.1, 0.9, 5)
     sums = 10 * np.array([[0.9], [1.0], [1.1]])
-    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "rises": rises}
+    grid = {"x_values": sums * shares, "y_values": sums * (1 - shares), "increases": increases}
     axis = {"name": "c", "symbol": "$c$", "unit": "N s/m"}
     found = {
         "x": axis,

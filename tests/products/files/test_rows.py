@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from biogrip.own_traces.many_traces import Told, write_table
-from biogrip.products.files.rows import as_it_was, inert, read_frame, read_rows, write_rows
+from biogrip.own_traces.many_traces import Outcome, write_table
+from biogrip.products.files.rows import as_it_was, escape_formula, read_frame, read_rows, write_rows
 
 FORMULAS = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-x", "=", "'=1", "''=1", "+")
 PLAIN = ("-1", "+2.5", "-1e-05", "-inf", "-", "a=b", "'a", "", "1.5", "it's", "NaN-1")
@@ -26,13 +26,13 @@ def test_no_cell_is_a_formula_and_all_are_read_back(tmp_path: Path, text: str) -
 
 @pytest.mark.parametrize("text", PLAIN)
 def test_numbers_and_other_text_are_written_as_they_are(text: str) -> None:
-    assert inert(text) == as_it_was(text) == text
+    assert escape_formula(text) == as_it_was(text) == text
 
 
 def test_a_table_of_traces_names_those_that_look_like_formulas(tmp_path: Path) -> None:
     table = tmp_path / "table.csv"
     reason = "=1+1.csv: found no header, allowed is a line with column names."
-    write_table(Told([], {"=1+1.csv": reason}), table)
+    write_table(Outcome([], {"=1+1.csv": reason}), table)
     with table.open(newline="") as stream:
         assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", f"'{reason}"]
     assert read_rows(table)[1][:2] == ["=1+1.csv", reason]

@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, held
+from biogrip.experiment.protocol import Phase, hold
 from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.products.files.traces import read_jaw_force, read_measurements, read_target
@@ -19,7 +19,7 @@ def settings(torque_Nm: float, *more: Phase, unilateral: bool = False) -> target
     return target.Settings(
         "Drop",
         STUDY.gripper,
-        (held(100.0, torque_Nm), *more),
+        (hold(100.0, torque_Nm), *more),
         Sampling(rate_Hz=1.0),
         Sample("maxwell"),
         {"k": 1.0, "c": 1.0},
@@ -45,7 +45,7 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     file = tmp_path / "t.csv"
     target.simulate(settings(1e-9), file)
     assert capsys.readouterr().out == ""
-    target.simulate(settings(1e-9, held(100.0, 1e-10)), file)
+    target.simulate(settings(1e-9, hold(100.0, 1e-10)), file)
     said = capsys.readouterr()
     assert "biogrip: warning: Drop: under this protocol the jaws would have to pull" in said.out
     assert "from 100 s on" in said.err
@@ -53,7 +53,7 @@ def test_a_protocol_that_makes_the_jaws_pull_is_warned_of(
     assert np.all(force[time_s < 100] >= 0)
     assert force[time_s > 100].max() < 0
     bilateral = read_target(file)[2]
-    target.simulate(settings(1e-9, held(100.0, 1e-10), unilateral=True), file)
+    target.simulate(settings(1e-9, hold(100.0, 1e-10), unilateral=True), file)
     assert "contact is lost there, which its identification ignores" in capsys.readouterr().out
     time_s, _, force = read_jaw_force(file)
     assert np.all(force[time_s > 100] == 0)

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from biogrip.design import within_reach
-from biogrip.design.experiment import Wanted
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.products.files.sequences import SEQUENCES
@@ -94,12 +94,12 @@ class OneTorque:
     """A train of steps that is as good as any for a test; a search takes seconds."""
 
     def __init__(self) -> None:
-        self.wanted: list[Wanted] = []
+        self.inputs: list[DesignInputs] = []
 
-    def __call__(self, wanted: Wanted, *_: object) -> list[Torque]:
-        self.wanted.append(wanted)
+    def __call__(self, inputs: DesignInputs, *_: object) -> list[Torque]:
+        self.inputs.append(inputs)
         shares = np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
-        return [TorqueSearch(wanted, SHAPES["steps"]).torque(shares)]
+        return [TorqueSearch(inputs, SHAPES["steps"]).torque(shares)]
 
 
 def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -122,7 +122,7 @@ def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
             # Some standard deviations of the interval's own.
             assert abs(c_p["estimate"] / c_p["truth"] - 1) < 2 * (c_p["high"] / c_p["low"] - 1)
     # What the first trace told goes into the second's design: k_p as well as its interval says.
-    after, beforehand, _ = search.wanted
+    after, beforehand, _ = search.inputs
     assert not beforehand.before.any()
     index = after.model.names.index("k_p")
     spread = np.sqrt(np.linalg.inv(after.before[0] + np.eye(4))[index, index])

@@ -11,7 +11,7 @@ from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
 from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
-from biogrip.products.files.rows import inert
+from biogrip.products.files.rows import escape_formula
 from biogrip.products.tables.all_errors import all_errors
 from biogrip.products.tables.errors import ERRORS, Settings, errors
 from biogrip.products.tables.layout import Column, Table, write
@@ -138,7 +138,7 @@ def test_the_published_tables_hold_nothing_that_is_escaped() -> None:
     for file in files:
         with file.open(newline="") as stream:
             cells = [cell for row in csv.reader(stream) for cell in row]
-        assert [cell for cell in cells if inert(cell) != cell or "|" in cell] == []
+        assert [cell for cell in cells if escape_formula(cell) != cell or "|" in cell] == []
 
 
 def test_the_tolerance_that_a_heading_names_is_the_one_that_was_used(

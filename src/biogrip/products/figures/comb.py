@@ -123,5 +123,5 @@ COMB = drawing(
     "its side; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
     settings=settings,
-    sheet="study_figures",
+    rule="study_figures",
 )

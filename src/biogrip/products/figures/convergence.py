@@ -124,5 +124,5 @@ CONVERGENCE = drawing(
     settings=settings,
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
     cases=lambda study: study.cases,
-    sheet="case_figures",
+    rule="case_figures",
 )

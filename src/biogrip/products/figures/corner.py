@@ -22,7 +22,7 @@ from biogrip.experiment.sample import Parameter, Sample, with_fixed
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, PAGE_IN, SHADE, figure
-from biogrip.products.files.posterior import SAMPLES, TOLD, read_posterior, read_samples
+from biogrip.products.files.posterior import POSTERIOR, SAMPLES, read_posterior, read_samples
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.study.study import Case, Study
 
@@ -61,27 +61,27 @@ def settings(study: Study, case: Case) -> Settings:
     return Settings(case.title, case.sample, case.fixed, case.parameters)
 
 
-def draw(settings: Settings, told: Path, samples: Path) -> Figure:
+def draw(settings: Settings, posterior: Path, samples: Path) -> Figure:
     """Draw the posterior of a case.
 
     Parameters
     ----------
     settings
         Settings of the job.
-    told, samples
+    posterior, samples
         Summary of the posterior, JSON, and its samples, Parquet.
     """
     model = with_fixed(settings.sample.model, settings.fixed)
     values = read_samples(samples, model)
     return draw_corner(
-        model.parameters, values, read_posterior(told), settings.parameters, settings.title
+        model.parameters, values, read_posterior(posterior), settings.parameters, settings.title
     )
 
 
 def draw_corner(
     parameters: Sequence[Parameter],
     values: Array,
-    told: Mapping[str, Any],
+    posterior: Mapping[str, Any],
     truth: Mapping[str, float],
     title: str,
 ) -> Figure:
@@ -93,7 +93,7 @@ def draw_corner(
         Parameters that were sampled.
     values : (n, n_parameters)
         Samples, SI units.
-    told
+    posterior
         Summary of the posterior, see `posterior_data`.
     truth
         True values by name, as far as known.
@@ -106,7 +106,7 @@ def draw_corner(
     grid = drawn.subplots(count, count, squeeze=False, sharex="col")
     logs = np.log(values)
     edges = [_edges(logs[:, i], truth.get(p.name)) for i, p in enumerate(parameters)]
-    intervals = {item["quantity"]: item for item in told["quantities"]}
+    intervals = {item["quantity"]: item for item in posterior["quantities"]}
     for row, own in enumerate(parameters):
         for column, other in enumerate(parameters):
             axes = grid[row, column]
@@ -123,7 +123,7 @@ def draw_corner(
         grid[row, 0].set_ylabel(f"{own.symbol} ({own.unit})" if row else "", fontsize=7)
         grid[-1, row].set_xlabel(f"{own.symbol} ({own.unit})", fontsize=7)
     drawn.align_labels()
-    percent, most = f"{100 * told['confidence']:g} %", f"{100 * _MOST:g} % of them"
+    percent, most = f"{100 * posterior['confidence']:g} %", f"{100 * _MOST:g} % of them"
     handles: list[Any] = [
         Line2D([], [], color=BLUE, linewidth=1.0, label="half of the samples"),
         Line2D([], [], color=BLUE, linewidth=0.6, linestyle="--", label=most),
@@ -219,7 +219,7 @@ CORNER = drawing(
     "logarithms. Outlined: the least regions with half and 95 % of the samples; shaded: the "
     "interval; dotted: the median; orange: the truth.",
     settings=settings,
-    reads={"told": the(TOLD), "samples": the(SAMPLES)},
+    reads={"posterior": the(POSTERIOR), "samples": the(SAMPLES)},
     cases=lambda study: study.sampled,
     weight=JUDGEMENT,
 )

@@ -30,7 +30,7 @@ def drawing(
     reads: Mapping[str, Reads] | None = None,
     cases: Callable[[Study], Iterable[str]] | None = None,
     sweeps: bool = False,
-    sheet: str = "",
+    rule: str = "",
     when: Callable[[Study], bool] = lambda _: True,
     weight: Weight | None = None,
 ) -> Product:
@@ -54,7 +54,7 @@ def drawing(
         Names of the cases that have the figure; if not given, there is one for the study.
     sweeps
         If true, there is one figure for each sweep.
-    sheet
+    rule
         Name of a group of figures that one job draws.
     when
         Condition for a study to have the figure.
@@ -79,7 +79,7 @@ def drawing(
         message=f"Drawing {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight or (EVALUATION if cases else LIGHT),
-        sheet=sheet,
+        rule=rule,
         category="Figures",
         item=file or name,
         caption=caption,

@@ -111,5 +111,5 @@ EVOLUTION = drawing(
     settings=settings,
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
     cases=lambda study: study.cases,
-    sheet="case_figures",
+    rule="case_figures",
 )

@@ -100,5 +100,5 @@ FIT = drawing(
         "calibrated": calibration_of(),
     },
     cases=lambda study: study.cases,
-    sheet="case_figures",
+    rule="case_figures",
 )

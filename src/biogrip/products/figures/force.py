@@ -69,16 +69,16 @@ def draw(settings: Settings, target: Path) -> Figure:
     torque = torque_history(settings.phases)
     network = settings.sample.model.sample(settings.parameters)
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
-    held = jaw_force(
+    sticking = jaw_force(
         settings.gripper, network, torque, time_s, nonlinear=settings.nonlinear, inertia=False
     )[0]
     drawn = figure(COLUMN_IN, 3.2)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
-    factor, unit = scale_of(held, "N")
+    factor, unit = scale_of(sticking, "N")
     forces.axhline(0, color=BLACK, linewidth=0.6)
-    forces.plot(time_s, factor * held, color=BLUE, label="jaws that hold the sample")
-    negative = np.minimum(factor * held, 0)
-    pulling = bool(negative.min() < -1e-9 * factor * np.abs(held).max())
+    forces.plot(time_s, factor * sticking, color=BLUE, label="jaws that hold the sample")
+    negative = np.minimum(factor * sticking, 0)
+    pulling = bool(negative.min() < -1e-9 * factor * np.abs(sticking).max())
     if pulling:
         forces.fill_between(
             time_s, negative, 0, color=ORANGE, alpha=0.35, linewidth=0, hatch="////",
@@ -90,7 +90,7 @@ def draw(settings: Settings, target: Path) -> Figure:
         shown = _from_loss(apart, apart.jaw_force_N)
         forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     forces.set_ylabel(f"jaw force ({unit})")
-    low, high = float(negative.min()), factor * float(held.max())
+    low, high = float(negative.min()), factor * float(sticking.max())
     forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
     forces.legend(loc="upper right")
     forces.set_title(settings.title)
@@ -127,5 +127,5 @@ FORCE = drawing(
     settings=settings,
     reads={"target": the(TARGETS)},
     cases=lambda study: study.simulated,
-    sheet="case_figures",
+    rule="case_figures",
 )

@@ -65,6 +65,6 @@ JUDGED_FIT = drawing(
         "calibrated": calibration_of(),
     },
     cases=lambda study: study.cases,
-    sheet="case_figures",
+    rule="case_figures",
     weight=JUDGEMENT,
 )

@@ -116,5 +116,5 @@ LINEARISATION_MAP = drawing(
     settings=settings,
     reads={"differences": the(DIFFERENCES.path)},
     when=lambda study: bool(study.simulated),
-    sheet="study_figures",
+    rule="study_figures",
 )

@@ -24,7 +24,7 @@ _ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 
 
 
 # Rotation that is visible in the drawing while arms still look like arms.
-_SEEN_RAD = 0.012
+_VISIBLE_RAD = 0.012
 
 
 @dataclass(frozen=True)
@@ -107,12 +107,12 @@ def _largest_rotation_rad(settings: Settings) -> float:
         time_s = np.linspace(0.0, torque.end_s, 401)
         rotation = simulated_rotation(case.gripper, case.network, torque, time_s, nonlinear=False)
         peaks.append(float(rotation.max()))
-    return max(peaks) or _SEEN_RAD
+    return max(peaks) or _VISIBLE_RAD
 
 
 def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
     """Draw the tips at the reference and at the largest rotation, which is enlarged."""
-    times = max(1, round(_SEEN_RAD / rotation_rad))
+    times = max(1, round(_VISIBLE_RAD / rotation_rad))
     enlarged = f" (drawn {times} times)" if times > 1 else ""
     reference, moved = (
         {name: (1e3 * x, 1e3 * y) for name, (x, y) in _joints(gripper, turned).items()}
@@ -211,5 +211,5 @@ LINKAGE = drawing(
     "(d) the constitutive models. Arm length and angle are those of the config; in the default "
     "study they are reconstructed.",
     settings=settings,
-    sheet="study_figures",
+    rule="study_figures",
 )

@@ -37,7 +37,7 @@ from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import Weight, of_cases
 from biogrip.study.study import Study
 
-SEEN = 0.1
+NEAR = 0.1
 """Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
 
 _POINTS = 121
@@ -132,11 +132,11 @@ def _moduli(
                 axes.plot(omega, part, **style | {"linestyle": dashed}, label=label)
                 label = None
     fitting = np.concatenate(near)
-    seen = np.flatnonzero(_agreed(fitting)) if len(fitting) else np.array([], dtype=np.int64)
-    for run in np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1) if len(seen) else []:
+    shown = np.flatnonzero(_agreed(fitting)) if len(fitting) else np.array([], dtype=np.int64)
+    for run in np.split(shown, np.flatnonzero(np.diff(shown) > 1) + 1) if len(shown) else []:
         axes.axvspan(
             omega[run[0]], omega[run[-1]], color=SHADE, linewidth=0, zorder=0,
-            label="seen by the experiment" if run[0] == seen[0] else None,
+            label="seen by the experiment" if run[0] == shown[0] else None,
         )  # fmt: skip
     truth = _modulus(model.sample(case.truth.parameters), omega)[0]
     axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
@@ -175,7 +175,7 @@ def _modulus(network: Network, omega: Array) -> Array:
 def _agreed(moduli: Array) -> BoolArray:
     """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on the modulus."""
     low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
-    agreed: BoolArray = high < (1 + SEEN) * low
+    agreed: BoolArray = high < (1 + NEAR) * low
     return agreed
 
 
@@ -184,7 +184,7 @@ MODULI = drawing(
     name="moduli",
     caption="Upper row: storage modulus G' (solid) and loss modulus G'' (dashed) of the true "
     "sample, and of all fits to its traces; shaded is the band in which nine tenths of the fits "
-    f"near the noise agree on the modulus to {SEEN:.0%}, whatever their parameters. Lower row: how "
+    f"near the noise agree on the modulus to {NEAR:.0%}, whatever their parameters. Lower row: how "
     "much the rotation changes with the logarithm of each parameter, in standard deviations of one "
     "measured value's noise; within the shaded band a single value does not show it.",
     settings=settings,
@@ -193,6 +193,6 @@ MODULI = drawing(
         "targets": of_cases(TARGETS, shown_cases),
     },
     when=lambda study: bool(study.simulated),
-    sheet="study_figures",
+    rule="study_figures",
     weight=Weight(10, 2000),
 )

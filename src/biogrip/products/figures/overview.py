@@ -35,7 +35,7 @@ from biogrip.products.figures.style import (
 )
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import MEASUREMENTS
-from biogrip.products.files.verdicts import EXPECTED, read_verdicts, told_from_zero
+from biogrip.products.files.verdicts import EXPECTED, bounded_on_a_side, read_verdicts
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.stages.calibrated import calibration_of
 from biogrip.study.study import Study
@@ -110,8 +110,8 @@ def draw(
         found = read_identifications(path, settings.method)
         seeds = len(found)
         tolerance = settings.near_noise_tolerance
-        told = told_from_zero(read_verdicts(expected[index]))
-        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index, told)
+        bounded = bounded_on_a_side(read_verdicts(expected[index]))
+        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index, bounded)
     legend: dict[str, Any] = {}
     for panel_axes in axes[1:]:
         legend |= {
@@ -163,12 +163,12 @@ def _scatter(
     found: pd.DataFrame,
     tolerance: float,
     index: int,
-    told: set[str],
+    bounded: set[str],
 ) -> None:
     reached = near_noise(found, tolerance)
     words = near_noise_words(tolerance)
     ticks = []
-    quantities = [item for item in _quantities(case) if item[0] in told]
+    quantities = [item for item in _quantities(case) if item[0] in bounded]
     for x, (_, label, columns, target, paper) in enumerate(quantities):
         ratio = found[columns].sum(axis=1).to_numpy(float) / target
         place = x + 0.5 * ((np.arange(len(ratio)) * 0.618034) % 1 - 0.5)
@@ -241,6 +241,6 @@ OVERVIEW = drawing(
         ),
     },
     when=lambda study: bool(study.simulated),
-    sheet="study_figures",
+    rule="study_figures",
     weight=Weight(10, 2000),
 )

@@ -68,11 +68,11 @@ def draw_profiles(
             curve = _curve(foreseen[item["quantity"]]["profile"])
             axes.plot(*curve, color=GREY, label="expected without noise")
         axes.plot(*_curve(item["profile"]), color=FITTED, label="this trace")
-        for rise, style, label in (
+        for increase, style, label in (
             (found["threshold"], "--", f"{100 * found['confidence']:g} %"),
             (found["certainty"], ":", f"{100 * CERTAIN:g} %, to close a side"),
         ):
-            line = axes.axhline(rise, color=TARGET, linestyle=style, linewidth=0.7)
+            line = axes.axhline(increase, color=TARGET, linestyle=style, linewidth=0.7)
             if index == 0:
                 line.set_label(label)
         _limits(axes, item)
@@ -107,7 +107,7 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
 
     # Rounding may have made neighbours equal.
     values, places = np.unique(np.array(profile["values"]), return_index=True)
-    roots = np.sqrt(np.clip(np.array(profile["rises"])[places], 0.0, 4 * _HIGHEST))
+    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * _HIGHEST))
     dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
     return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
 
@@ -127,8 +127,8 @@ def _limits(axes: Axes, item: dict[str, Any]) -> None:
 
 def _window(item: dict[str, Any]) -> tuple[float, float]:
     """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
-    values, rises = (np.array(item["profile"][key]) for key in ("values", "rises"))
-    inside = np.flatnonzero(rises < _HIGHEST)
+    values, increases = (np.array(item["profile"][key]) for key in ("values", "increases"))
+    inside = np.flatnonzero(increases < _HIGHEST)
     ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
     low, high = (float(end([x for x in ends if x is not None])) for end in (min, max))
     margin = max((high / low) ** 0.05, 1.0002)
@@ -144,6 +144,6 @@ PROFILES = drawing(
     settings=settings,
     reads={"measured": the(PATH), "expected": verdicts_expected()},
     cases=lambda study: study.cases,
-    sheet="case_figures",
+    rule="case_figures",
     weight=JUDGEMENT,
 )

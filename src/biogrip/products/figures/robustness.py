@@ -166,5 +166,5 @@ ROBUSTNESS_MAP = drawing(
     settings=heat_maps,
     reads={"points": points_of_cases()},
     sweeps=True,
-    sheet="",
+    rule="",
 )

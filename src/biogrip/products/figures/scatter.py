@@ -82,15 +82,15 @@ def draw(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    truth, posed = settings.truth, settings.problem.calibrated(calibrated)
+    truth, case_problem = settings.truth, settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    log_truth = posed.logs(truth.parameters)
-    _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
+    log_truth = case_problem.logs(truth.parameters)
+    _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
     noise_rad = standard_deviation(rotation, settings.noise)
-    quantities = parameters_and_sum(posed.searched)
+    quantities = parameters_and_sum(case_problem.searched)
     drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
-        names = [posed.searched.parameters[i] for i in quantity.members]
+        names = [case_problem.searched.parameters[i] for i in quantity.members]
         value = sum(truth.parameters[p.name] for p in names)
         if value == 0:
             axes.axis("off")
@@ -207,6 +207,6 @@ SCATTER = drawing(
         "calibrated": calibration_of(),
     },
     cases=lambda study: study.simulated,
-    sheet="case_figures",
+    rule="case_figures",
     weight=JUDGEMENT,
 )

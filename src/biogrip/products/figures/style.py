@@ -10,7 +10,7 @@ from fontTools import subset
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 from biogrip.identify.methods import Method
 from biogrip.products.figures.decades import label_plainly
 
@@ -97,9 +97,9 @@ def row_of_panels(
 
 def save(drawn: Figure, output: Path) -> None:
     """Write a figure as PNG and PDF, without dates, so that files are reproducible."""
-    with written_whole(output) as scratch:
+    with atomic_write(output) as scratch:
         save_png(drawn, scratch)
-    with written_whole(output.with_suffix(".pdf")) as scratch, _glyphs_alone():
+    with atomic_write(output.with_suffix(".pdf")) as scratch, _glyphs_alone():
         drawn.savefig(scratch, format="pdf", metadata={"CreationDate": None, "Creator": None})
 
 

@@ -113,5 +113,5 @@ TORQUE = drawing(
     "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
     "the smallest and at the largest sample that the gripper takes.",
     settings=settings,
-    sheet="study_figures",
+    rule="study_figures",
 )

@@ -91,7 +91,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     shown = []
     for grid in valley["grids"]:
         # The root of the increase is nearly linear, so interpolate that.
-        roots = np.sqrt(np.maximum(np.array(grid["rises"], dtype=float), 0.0))
+        roots = np.sqrt(np.maximum(np.array(grid["increases"], dtype=float), 0.0))
         filled = axes.contourf(
             grid["x_values"],
             grid["y_values"],
@@ -164,6 +164,6 @@ VALLEY = drawing(
     settings=settings,
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],
-    sheet="case_figures",
+    rule="case_figures",
     weight=JUDGEMENT,
 )

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.identify.methods import Method
-from biogrip.identify.success import chi_square_rise, near_noise_words
+from biogrip.identify.success import chi_square_increase, near_noise_words
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import COLUMN_IN, TARGET, figure, line_of
 from biogrip.products.files.identifications import PATH, read_identifications
@@ -59,7 +59,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
         Files of the case, CSV.
     """
     found = read_identifications(identifications)
-    rise = np.maximum(chi_square_rise(found, settings.samples), _LOWEST)
+    increase = np.maximum(chi_square_increase(found, settings.samples), _LOWEST)
     tolerance = settings.optimum_tolerance
     drawn = figure(COLUMN_IN, 3.15)
     axes = drawn.subplots()
@@ -68,7 +68,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
         method = settings.methods[name]
-        mine = np.sort(rise[found["method"] == name])
+        mine = np.sort(increase[found["method"] == name])
         share = 100 * np.mean(mine <= tolerance)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share:.0f} %"
@@ -82,7 +82,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
         axes.axhline(near, linestyle=":", label=words, **line),
     ]
     axes.set_yscale("log")
-    axes.set_ylim(_LOWEST / 2, 5 * max(near, float(rise.max())))
+    axes.set_ylim(_LOWEST / 2, 5 * max(near, float(increase.max())))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()
@@ -105,5 +105,5 @@ WATERFALL = drawing(
     settings=settings,
     reads={"identifications": the(PATH)},
     cases=lambda study: study.simulated,
-    sheet="case_figures",
+    rule="case_figures",
 )

@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from biogrip.errors import BiogripError
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 
 Table: TypeAlias = pa.Table
 
@@ -41,7 +41,7 @@ def write_tables(path: Path, tables: Sequence[Table], *, dictionary: bool = True
     dictionary
         If true, use dictionary encoding, which pays for repeated values, not for noise.
     """
-    with written_whole(path) as scratch:
+    with atomic_write(path) as scratch:
         pq.write_table(pa.concat_tables(tables), scratch, use_dictionary=dictionary)
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from biogrip.identifiability.posterior_settings import PosteriorSettings
     from biogrip.identifiability.sampling import Samples
 
-TOLD = "results/posterior/{case}.json"
+POSTERIOR = "results/posterior/{case}.json"
 SAMPLES = "results/posterior/{case}.parquet"
 
 _MOST_ROWS = 10_000

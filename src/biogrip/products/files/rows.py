@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from biogrip.errors import BiogripError
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,13 +64,15 @@ class RowFile:
 def write_rows(path: Path, columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a header and rows, escaping text that a spreadsheet would take for a formula."""
     with (
-        written_whole(path) as scratch,
+        atomic_write(path) as scratch,
         # File names may hold bytes that are not valid text.
         scratch.open("w", encoding="utf-8", errors="backslashreplace", newline="") as stream,
     ):
         writer = csv.writer(_Lines(stream), lineterminator=_END)
         for row in chain((columns,), rows):
-            writer.writerow([inert(cell) if isinstance(cell, str) else cell for cell in row])
+            writer.writerow(
+                [escape_formula(cell) if isinstance(cell, str) else cell for cell in row]
+            )
 
 
 class _Lines:
@@ -84,13 +86,13 @@ class _Lines:
         self._stream.write(row.removesuffix(_END) + "\n")
 
 
-def inert(text: str) -> str:
+def escape_formula(text: str) -> str:
     """Return text that a spreadsheet takes for no formula; signed numbers stay as they are."""
     return f"'{text}" if _FORMULA.match(text) and not _SIGNED.fullmatch(text) else text
 
 
 def as_it_was(cell: Any) -> Any:
-    """Undo `inert`; anything else is returned unchanged."""
+    """Undo `escape_formula`; anything else is returned unchanged."""
     ours = isinstance(cell, str) and cell[:1] == "'" and _FORMULA.match(cell)
     return cell[1:] if ours else cell
 
@@ -130,13 +132,13 @@ def read_frame(
     return frame
 
 
-def read_rows(path: Path, wanted: Sequence[str] | None = None) -> list[list[str]]:
+def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
     """Read the header and all rows as text.
 
     Raises
     ------
     BiogripError
-        If the file cannot be read, or its header is not `wanted`.
+        If the file cannot be read, or its header is not `columns`.
     """
     try:
         with path.open(encoding="utf-8", newline="") as stream:
@@ -145,6 +147,8 @@ def read_rows(path: Path, wanted: Sequence[str] | None = None) -> list[list[str]
         raise BiogripError(f"{path}: cannot be read: {error}.") from error
     if not rows:
         raise BiogripError(f"{path}: is empty.")
-    if wanted is not None and rows[0] != list(wanted):
-        raise BiogripError(f"{path}, line 1: found {','.join(rows[0])}; wanted {','.join(wanted)}.")
+    if columns is not None and rows[0] != list(columns):
+        raise BiogripError(
+            f"{path}, line 1: found {','.join(rows[0])}; wanted {','.join(columns)}."
+        )
     return rows

@@ -143,8 +143,8 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
     """
     present = column_names(path)
     kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
-    wanted = present if seeds is None else [*kept, *(f"{_SEED}{seed}" for seed in seeds)]
-    columns = read_columns(path, wanted)
+    names = present if seeds is None else [*kept, *(f"{_SEED}{seed}" for seed in seeds)]
+    columns = read_columns(path, names)
     time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
     traces = {int(name.removeprefix(_SEED)): trace for name, trace in columns.items()}
     return Measurements(time_s, target, traces)

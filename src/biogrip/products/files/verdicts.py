@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from biogrip.digits import rounded_numbers, rounded_rise
+from biogrip.digits import round_increase, rounded_numbers
 from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 
-def told_from_zero(verdicts: dict[str, Any]) -> set[str]:
+def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
     """Return the quantities whose verdict is not just an upper bound."""
     return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
 
@@ -77,6 +77,6 @@ def _finding(finding: "Finding") -> dict[str, Any]:
         "in_words": finding.words(),
         "profile": {
             "values": [float(value) for value in np.exp(profile.log_values)],
-            "rises": [rounded_rise(float(rise)) for rise in profile.rises],
+            "increases": [round_increase(float(increase)) for increase in profile.increases],
         },
     }

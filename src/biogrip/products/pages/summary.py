@@ -106,7 +106,7 @@ SUMMARY = Product(
     lambda plan: wildcards_of(plan.study.cases),
     message="Writing the summary page of {case}",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},
-    sheet="case_figures",
+    rule="case_figures",
     category="Summaries",
     item="summary",
     caption="Verdicts, notes and figures for one trace of this case.",

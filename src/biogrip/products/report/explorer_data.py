@@ -103,11 +103,11 @@ def _case(
     time_s, target = sampled.time_s, sampled.target_rad
     stride = 1 + _NUMBER_BYTES * len(time_s) // most_bytes
     room = most_bytes // (_NUMBER_BYTES * len(time_s[::stride]))
-    held = {seed: path for path in files.measurements for seed in seeds_in(path)}
-    seeds = sorted(held)[: max(1, min(MOST_SEEDS, room))]
+    files_by_seed = {seed: path for path in files.measurements for seed in seeds_in(path)}
+    seeds = sorted(files_by_seed)[: max(1, min(MOST_SEEDS, room))]
     traces: dict[int, Array] = {}
     for path in files.measurements:
-        own = [seed for seed in seeds if held[seed] == path]
+        own = [seed for seed in seeds if files_by_seed[seed] == path]
         traces |= read_measurements(path, own).rotation_rad if own else {}
     sigma = 0.0
     if case.noise is not None and target is not None:

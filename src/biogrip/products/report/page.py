@@ -14,7 +14,7 @@ import yaml
 from markupsafe import Markup
 
 from biogrip.errors import BiogripError
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 from biogrip.identify.methods import Method
 from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
@@ -26,8 +26,8 @@ from biogrip.products.pages.summary import embedded
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.report.explorer_data import CaseFiles, ExploredCase, explorer_data
+from biogrip.products.rule_products import group_by_rule
 from biogrip.products.stages.calibrated import calibration_of
-from biogrip.products.together import together
 from biogrip.study.study import Study
 from biogrip.study.typed import plain
 
@@ -200,7 +200,7 @@ def write(
         versions={"Python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
     )
-    with written_whole(page) as scratch, scratch.open("wb") as file:
+    with atomic_write(page) as scratch, scratch.open("wb") as file:
         parts.dump(file, encoding="utf-8")
 
 
@@ -219,7 +219,7 @@ def _rules(plan: Plan) -> dict[tuple[Any, ...], str]:
     """Return the rule of every job of every product."""
     return {
         (product.name, *job.items()): each.rule
-        for each in together(products().values(), plan)
+        for each in group_by_rule(products().values(), plan)
         for product in each.products
         for job in each.jobs
     }

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.identifiability.likelihood import MISSED, Likelihood, likelihood_of
-from biogrip.identifiability.profiles import profiles_of
+from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
+from biogrip.identifiability.profiles import compute_profiles
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.multi_start import fit_from
@@ -31,7 +31,7 @@ def judged_in_full(seed: int) -> bool:
     return seed % EVERY == 0
 
 
-def refitted(likelihood: Likelihood, deeper: np.ndarray, confidence: float) -> Likelihood | None:
+def refitted(likelihood: Likelihood, missed: np.ndarray, confidence: float) -> Likelihood | None:
     """Fit again, started at parameters whose chi^2 is below that of the optimum.
 
     Returns
@@ -39,11 +39,11 @@ def refitted(likelihood: Likelihood, deeper: np.ndarray, confidence: float) -> L
     Likelihood or None
         Likelihood at the new optimum; None if chi^2 did not fall.
     """
-    fit = fit_from([likelihood.problem], deeper)
+    fit = fit_from([likelihood.problem], missed)
     misfit_rad = float(fit.misfit_rad[0])
-    if likelihood.rise(misfit_rad) > -MISSED:
+    if likelihood.increase(misfit_rad) > -MISSED:
         return None
-    return likelihood_of(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
+    return make_likelihood(likelihood.problem, fit.x[0], misfit_rad, confidence=confidence)
 
 
 def shown_of(
@@ -51,18 +51,18 @@ def shown_of(
 ) -> Iterator[list[Shown]]:
     """Yield verdicts on each trace, as `diagnose` gives them, for all quantities."""
     current = list(likelihoods)
-    profiles = profiles_of(current, quantities, smooth=False)
+    profiles = compute_profiles(current, quantities, smooth=False)
     for _ in range(_MOST_RESTARTS):
-        lowest = [min(own, key=lambda each: float(each.rises.min())) for own in profiles]
+        lowest = [min(own, key=lambda each: float(each.increases.min())) for own in profiles]
         again = {
             index: new
             for index, each in enumerate(lowest)
-            if each.rises.min() < -MISSED
+            if each.increases.min() < -MISSED
             and (new := refitted(current[index], each.lowest, confidence)) is not None
         }
         if not again:
             break
-        renewed = profiles_of(list(again.values()), quantities, smooth=False)
+        renewed = compute_profiles(list(again.values()), quantities, smooth=False)
         for (index, likelihood), own in zip(again.items(), renewed, strict=True):
             current[index], profiles[index] = likelihood, own
     for own in profiles:

@@ -83,17 +83,17 @@ def identify(
         Processor times, CSV; for traces identified together, the mean.
     """
     case, method = settings.case, settings.method
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     identified = identifier(method, settings.of_method)
     recorded = read_measurements(measurements, list(seeds))
     progress = Progress(f"{case}, {method}", len(seeds))
-    whose = case, method, posed.model, posed.searched, posed.fixed
+    whose = case, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
         rngs = [stream(settings.study_seed, case, seed, method) for seed in group]
         start = time.process_time()
-        problems = [posed.of(recorded.time_s, trace) for trace in traces]
+        problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
         answers = identified(problems, rngs, progress.within)
         cpu_s = (time.process_time() - start) / len(group)
         for seed, trace, answer in zip(group, traces, answers, strict=True):

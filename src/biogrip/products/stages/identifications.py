@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import Sample
-from biogrip.files import written_whole
+from biogrip.files import atomic_write
 from biogrip.products.files.identifications import (
     BATCHES,
     HISTORIES,
@@ -80,7 +80,7 @@ def join(
             f"{', '.join(settings.methods)}. Delete them and run again."
         )
     write_rows(parameters, header, rows)
-    with written_whole(history) as scratch:
+    with atomic_write(history) as scratch:
         schema = pq.read_schema(history_batches[0])
         with pq.ParquetWriter(scratch, schema) as joined:
             for batch in history_batches:

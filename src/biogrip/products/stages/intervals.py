@@ -12,8 +12,8 @@ from biogrip.experiment.noise import Noise, add_noise, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.fisher import covariance
-from biogrip.identifiability.likelihood import Likelihood, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.identify.answer import Identification, silent
@@ -110,10 +110,10 @@ def estimate(
     intervals
         One row per quantity and seed, CSV.
     """
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     INTERVALS.write(
-        intervals, _rows(settings, posed, seeds, time_s, rotation, _determined(expected))
+        intervals, _rows(settings, case_problem, seeds, time_s, rotation, _determined(expected))
     )
 
 
@@ -122,20 +122,20 @@ class _Quantities:
     """All quantities, and indices of those that traces should determine."""
 
     every: list[Quantity]
-    wanted: list[int]
+    selected: list[int]
 
 
 def _rows(
     settings: Settings,
-    posed: CaseProblem,
+    case_problem: CaseProblem,
     seeds: Sequence[int],
     time_s: Array,
     rotation: Array,
-    wanted: set[str],
+    selected: set[str],
 ) -> Iterator[tuple[str | int, ...]]:
-    every = parameters_and_sum(posed.searched)
-    chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in wanted])
-    rest_known, told, truth = _rest_known(settings, posed, time_s, rotation)
+    every = parameters_and_sum(case_problem.searched)
+    chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in selected])
+    rest_known, informed, truth = _rest_known(settings, case_problem, time_s, rotation)
     progress = Progress(f"{settings.case}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, EVERY):
@@ -143,11 +143,11 @@ def _rows(
         in_full: dict[int, Likelihood] = {}
         for group in groups(some, _TIMES):
             traces = _traces(settings, group, time_s, rotation)
-            likelihoods, limits = _fitted(settings, posed, group, time_s, traces, chosen)
+            likelihoods, limits = _fitted(settings, case_problem, group, time_s, traces, chosen)
             known = np.tile(truth, (len(group), 1))
-            if len(told):
-                simpler = [posed.of(time_s, trace, rest_known) for trace in traces]
-                known[:, told] = fit_from(simpler, truth[told]).x
+            if len(informed):
+                simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
+                known[:, informed] = fit_from(simpler, truth[informed]).x
             for index, seed in enumerate(group):
                 best = likelihoods[index].best
                 lines[seed] = _lines(chosen, best, limits[index], known[index])
@@ -160,16 +160,16 @@ def _rows(
 
 
 def _rest_known(
-    settings: Settings, posed: CaseProblem, time_s: Array, rotation: Array
+    settings: Settings, case_problem: CaseProblem, time_s: Array, rotation: Array
 ) -> tuple[SampleModel, IntArray, Array]:
     """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
-    truth = posed.logs(settings.parameters)
-    _, sensitivity = posed.of(time_s, rotation).residuals(truth)
+    truth = case_problem.logs(settings.parameters)
+    _, sensitivity = case_problem.of(time_s, rotation).residuals(truth)
     spread = np.diag(covariance(sensitivity, standard_deviation(rotation, settings.noise)))
-    told = np.flatnonzero(np.isfinite(spread))
-    names = posed.searched.names
-    given = {name: settings.parameters[name] for i, name in enumerate(names) if i not in told}
-    return with_fixed(posed.searched, given), told, truth
+    informed = np.flatnonzero(np.isfinite(spread))
+    names = case_problem.searched.names
+    given = {name: settings.parameters[name] for i, name in enumerate(names) if i not in informed}
+    return with_fixed(case_problem.searched, given), informed, truth
 
 
 def _traces(
@@ -181,7 +181,7 @@ def _traces(
 
 def _fitted(
     settings: Settings,
-    posed: CaseProblem,
+    case_problem: CaseProblem,
     group: Sequence[int],
     time_s: Array,
     traces: list[Array],
@@ -191,27 +191,27 @@ def _fitted(
     rngs = [stream(settings.study_seed, settings.case, seed, "coverage") for seed in group]
     confidence = settings.confidence
     found = [
-        likelihood_of(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
-        for problem, each in _optima(settings, posed, time_s, traces, rngs)
+        make_likelihood(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
+        for problem, each in _optima(settings, case_problem, time_s, traces, rngs)
     ]
-    quantities = [chosen.every[index] for index in chosen.wanted]
-    limits, deeper = limits_and_deeper(found, quantities)
-    for trace, x in deeper.items():
+    quantities = [chosen.every[index] for index in chosen.selected]
+    limits, missed = find_limits(found, quantities)
+    for trace, x in missed.items():
         if (again := refitted(found[trace], x, confidence)) is not None:
-            found[trace], limits[trace] = again, limits_and_deeper([again], quantities)[0][0]
+            found[trace], limits[trace] = again, find_limits([again], quantities)[0][0]
     return found, limits
 
 
 def _optima(
     settings: Settings,
-    posed: CaseProblem,
+    case_problem: CaseProblem,
     time_s: Array,
     traces: list[Array],
     rngs: Sequence[np.random.Generator],
 ) -> Iterator[tuple[Problem, Identification]]:
     """Yield problems and fits of traces, fitted together if their noise is white."""
-    if posed.plain:
-        problems = [posed.of(time_s, trace) for trace in traces]
+    if case_problem.plain:
+        problems = [case_problem.of(time_s, trace) for trace in traces]
         identify = identifier("least_squares", settings.least_squares)
         yield from zip(problems, identify(problems, rngs, silent), strict=True)
         return
@@ -220,14 +220,14 @@ def _optima(
         def find(problem: Problem, rng: np.random.Generator = rng) -> Identification:
             return best_fit(problem, settings.least_squares, rng, silent)
 
-        fit = trace_fit(posed, time_s, trace, find)
+        fit = trace_fit(case_problem, time_s, trace, find)
         yield fit.problem, fit.found
 
 
 def _lines(chosen: _Quantities, best: Array, limits: Array, known: Array) -> list[list[str]]:
     """Return estimate, limits and estimate with the rest fixed for every quantity, as text."""
     lines = [[_text(quantity.log(best), _DIGITS), "", "", ""] for quantity in chosen.every]
-    for which, index in enumerate(chosen.wanted):
+    for which, index in enumerate(chosen.selected):
         quantity, (low, high) = chosen.every[index], limits[which]
         digits = _MORE_DIGITS if high - low < _NARROW else _DIGITS
         found = quantity.log(best), low, high, quantity.log(known)
@@ -244,7 +244,7 @@ def _of_seeds(
     for seed, of_seed in lines.items():
         for index, (quantity, line) in enumerate(zip(chosen.every, of_seed, strict=True)):
             shown = verdicts[seed][index] if seed in verdicts else None
-            if shown or index in chosen.wanted:
+            if shown or index in chosen.selected:
                 limits = (shown.low, shown.high) if shown else (None, None)
                 texts = ["" if limit is None else f"{limit:.5g}" for limit in limits]
                 yield case, quantity.label, seed, *line, shown.verdict if shown else "", *texts

@@ -12,7 +12,7 @@ from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.likelihood import MISSED
-from biogrip.identifiability.valley import valley_and_deeper
+from biogrip.identifiability.valley import compute_valley
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.identifier import best_fit
@@ -53,7 +53,7 @@ class Settings:
 
     def fit(
         self,
-        posed: CaseProblem,
+        case_problem: CaseProblem,
         time_s: Array,
         rotation_rad: Array,
         seed: int,
@@ -65,7 +65,7 @@ class Settings:
             rng = stream(self.study_seed, self.case, seed, "identifiability")
             return best_fit(problem, self.least_squares, rng, progress)
 
-        return trace_fit(posed, time_s, rotation_rad, find)
+        return trace_fit(case_problem, time_s, rotation_rad, find)
 
 
 @dataclass(frozen=True)
@@ -124,14 +124,14 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     verdicts
         Verdicts, profiles and valley, JSON.
     """
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
-    fit = settings.fit(posed, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
-    told, valley = _diagnosed(fit.problem, posed, fit.found, settings.confidence)
-    said = diagnosis_data(told)
+    fit = settings.fit(case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, settings.confidence)
+    said = diagnosis_data(diagnosis)
     data = {
         "case": settings.case,
-        "model": posed.model.name,
+        "model": case_problem.model.name,
         "confidence": settings.confidence,
         **said,
         "notes": [*fit.notes(), *said["notes"]],
@@ -142,19 +142,19 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
 
 
 def _diagnosed(
-    problem: Problem, posed: CaseProblem, found: Identification, confidence: float
+    problem: Problem, case_problem: CaseProblem, found: Identification, confidence: float
 ) -> tuple[Diagnosis, dict[str, Any] | None]:
     """Diagnose a trace, and again from a fit along its valley, if that has a lower chi^2."""
-    model, noise_rad = posed.searched, posed.noise_rad
-    told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
-    valley, deeper = valley_and_deeper(told.likelihood, model)
-    if deeper is not None:
-        again = found.at(fit_from([problem], deeper))
-        if told.likelihood.rise(again.misfit_rad) < -MISSED:
+    model, noise_rad = case_problem.searched, case_problem.noise_rad
+    diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+    valley, missed = compute_valley(diagnosis.likelihood, model)
+    if missed is not None:
+        again = found.at(fit_from([problem], missed))
+        if diagnosis.likelihood.increase(again.misfit_rad) < -MISSED:
             found = again
-            told = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
-            valley, _ = valley_and_deeper(told.likelihood, model)
-    return told, valley
+            diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+            valley, _ = compute_valley(diagnosis.likelihood, model)
+    return diagnosis, valley
 
 
 def expect(
@@ -176,19 +176,19 @@ def expect(
     verdicts
         Verdicts and profiles, JSON.
     """
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     noise_rad = rms(standard_deviation(rotation, settings.noise)) or None
-    problem = posed.of(time_s, rotation, noise_rad=noise_rad)
-    found = identify_from(problem, posed.logs(settings.parameters))
-    told = diagnose(
-        problem, posed.searched, found, confidence=settings.confidence, noise_rad=noise_rad
+    problem = case_problem.of(time_s, rotation, noise_rad=noise_rad)
+    found = identify_from(problem, case_problem.logs(settings.parameters))
+    diagnosis = diagnose(
+        problem, case_problem.searched, found, confidence=settings.confidence, noise_rad=noise_rad
     )
     data = {
         "case": settings.case,
-        "model": posed.model.name,
+        "model": case_problem.model.name,
         "confidence": settings.confidence,
-        **diagnosis_data(told),
+        **diagnosis_data(diagnosis),
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
 

@@ -82,23 +82,23 @@ def fit(
     fits
         One row per model and seed, CSV.
     """
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, list(seeds))
-    MODEL_FITS.write(fits, _rows(settings, posed, seeds, recorded))
+    MODEL_FITS.write(fits, _rows(settings, case_problem, seeds, recorded))
 
 
 def _rows(
-    settings: Settings, posed: CaseProblem, seeds: Sequence[int], recorded: Measurements
+    settings: Settings, case_problem: CaseProblem, seeds: Sequence[int], recorded: Measurements
 ) -> Iterator[tuple[str | int, ...]]:
     case, samples = settings.case, len(recorded.time_s)
     progress = Progress(f"{case}, models", len(settings.models) * len(seeds))
     rows: dict[str, list[tuple[str | int, ...]]] = {name: [] for name in settings.models}
     for group in groups(seeds):
-        traces = [posed.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
+        traces = [case_problem.of(recorded.time_s, recorded.rotation_rad[seed]) for seed in group]
         models = {name: sample.model for name, sample in settings.models.items()}
         found = fit_models(
             {
-                name: [posed.for_model(trace, model) for trace in traces]
+                name: [case_problem.for_model(trace, model) for trace in traces]
                 for name, model in models.items()
             },
             settings.least_squares,

@@ -22,8 +22,8 @@ from biogrip.identify.methods import METHODS
 from biogrip.identify.model_choice import ranked
 from biogrip.identify.problem import Problem
 from biogrip.products.files.posterior import (
+    POSTERIOR,
     SAMPLES,
-    TOLD,
     Limits,
     limits_in,
     posterior_data,
@@ -81,7 +81,7 @@ def sample(
     measurements: Path,
     verdicts: Path,
     calibrated: list[Path],
-    told: Path,
+    posterior: Path,
     samples: Path,
 ) -> None:
     """Sample the posterior of the trace of seed 0.
@@ -96,28 +96,28 @@ def sample(
         Verdicts on the same trace, JSON.
     calibrated
         A calibration, YAML, whose arms replace the gripper's, if there is one.
-    told
+    posterior
         Summary of the posterior, JSON.
     samples
         Posterior samples, Parquet.
     """
-    posed = settings.problem.calibrated(calibrated)
+    case_problem = settings.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     time_s, trace = recorded.time_s, recorded.rotation_rad[TRACE]
     limits = limits_in(read_verdicts(verdicts))
-    pose = partial(posed.of, time_s, trace)
-    if not posed.plain:
+    pose = partial(case_problem.of, time_s, trace)
+    if not case_problem.plain:
         # Use the noise model that the verdicts are based on.
-        fit = settings.fit(posed, time_s, trace, TRACE)
-        pose = partial(posed.for_model, fit.problem)
-    data, drawn = posterior_of_trace(settings, posed, pose, limits, silent)
-    write_samples(samples, posed.searched, drawn)
-    write_text(told, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
+        fit = settings.fit(case_problem, time_s, trace, TRACE)
+        pose = partial(case_problem.for_model, fit.problem)
+    data, drawn = posterior_of_trace(settings, case_problem, pose, limits, silent)
+    write_samples(samples, case_problem.searched, drawn)
+    write_text(posterior, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
 
 
 def posterior_of_trace(
     settings: Settings,
-    posed: CaseProblem,
+    case_problem: CaseProblem,
     pose: Callable[[SampleModel], Problem],
     limits: Limits,
     progress: Progress,
@@ -128,7 +128,7 @@ def posterior_of_trace(
     ----------
     settings
         Settings of the job.
-    posed
+    case_problem
         Assumptions of the identification, with a calibrated gripper if the case uses one.
     pose
         Function that returns the trace's fit problem for a sample model.
@@ -144,32 +144,34 @@ def posterior_of_trace(
     log_parameters : (n, n_parameters)
         Some thousand samples.
     """
-    from biogrip.identifiability.marginals import marginals_of
+    from biogrip.identifiability.marginals import compute_marginals
     from biogrip.identifiability.quantities import parameters_and_sum
     from biogrip.identifiability.sampling import sampled
 
     rng = stream(settings.study_seed, settings.case, TRACE, "posterior")
-    problem = pose(posed.searched)
-    posterior = _posterior(problem, settings.posterior, posed.noise_rad)
+    problem = pose(case_problem.searched)
+    posterior = _posterior(problem, settings.posterior, case_problem.noise_rad)
     found = sampled(posterior, settings.posterior, rng, progress)
     drawn = thinned(found.log_parameters)
     every = found.log_parameters.reshape(-1, drawn.shape[1])
-    quantities = parameters_and_sum(posed.searched)
-    marginals = marginals_of(every, quantities, problem.residuals.duration_s, settings.confidence)
+    quantities = parameters_and_sum(case_problem.searched)
+    marginals = compute_marginals(
+        every, quantities, problem.residuals.duration_s, settings.confidence
+    )
     data = {
-        "model": posed.model.name,
+        "model": case_problem.model.name,
         "confidence": settings.confidence,
         **posterior_data(found, settings.posterior, marginals, limits),
-        "evidence": _evidence(settings, pose, posed.noise_rad, progress),
+        "evidence": _evidence(settings, pose, case_problem.noise_rad, progress),
     }
     return data, drawn
 
 
 def _posterior(problem: Problem, settings: PosteriorSettings, noise_rad: float | None) -> Any:
     from biogrip.identifiability.posterior import Posterior
-    from biogrip.identifiability.prior import prior_of
+    from biogrip.identifiability.prior import make_prior
 
-    prior = prior_of(problem.residuals.model, problem.low, problem.high, settings.prior)
+    prior = make_prior(problem.residuals.model, problem.low, problem.high, settings.prior)
     return Posterior(problem, prior, noise_rad)
 
 
@@ -182,7 +184,7 @@ def _evidence(
     """Return one row per model: evidence, AIC and BIC, as differences from the best."""
     if not settings.models:
         return []
-    from biogrip.identifiability.evidence import evidence_of
+    from biogrip.identifiability.evidence import compute_evidence
     from biogrip.identifiability.sampling import sampled
 
     rows, misfits, samples = [], [], 0
@@ -194,7 +196,7 @@ def _evidence(
         rng = stream(settings.study_seed, settings.case, TRACE, f"evidence {name}")
         posterior = _posterior(problem, settings.posterior, noise_rad)
         found = sampled(posterior, settings.posterior, rng, progress)
-        own = evidence_of(posterior, found, rng)
+        own = compute_evidence(posterior, found, rng)
         rows.append((own, found.convergence.reached))
     highest = max(own.log for own, _ in rows)
     tried = ranked(list(settings.models), misfits, samples)
@@ -216,7 +218,7 @@ def _evidence(
 
 SAMPLED = Product(
     "posterior_samples",
-    {"told": TOLD, "samples": SAMPLES},
+    {"posterior": POSTERIOR, "samples": SAMPLES},
     sample,
     settings,
     lambda plan: wildcards_of(plan.study.sampled),

@@ -90,18 +90,18 @@ def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
     case = settings.case
     progress = Progress(f"{case}, readings", len(settings.readings) * settings.seeds)
     for name, reading in settings.readings.items():
-        posed = reading.problem
+        case_problem = reading.problem
         for seeds in groups(range(settings.seeds)):
             streams = {
                 purpose: [stream(settings.study_seed, case, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             }
             traces = [add_noise(rotation, reading.noise, rng, time_s) for rng in streams["noise"]]
-            problems = [posed.of(time_s, trace) for trace in traces]
+            problems = [case_problem.of(time_s, trace) for trace in traces]
             found = identify_many(problems, reading.genetic, streams["genetic"])
             for seed, trace, answer in zip(seeds, traces, found, strict=True):
-                names = posed.searched.names
-                values = {**posed.fixed, **dict(zip(names, answer.parameters, strict=True))}
+                names = case_problem.searched.names
+                values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
                 yield (
                     case,
                     name,

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.experiment import Experiment, Wanted
+from biogrip.design.earlier_traces import Earlier, estimate_from_traces
+from biogrip.design.experiment import DesignInputs, Experiment
 from biogrip.design.schedule import presses
-from biogrip.design.told import Earlier, told_by
-from biogrip.design.within_reach import planned_within_reach
+from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
 from biogrip.groups.replicates import joint_problem
-from biogrip.identifiability.likelihood import MISSED, likelihood_of
-from biogrip.identifiability.limits import limits_and_deeper
+from biogrip.identifiability.likelihood import MISSED, make_likelihood
+from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
@@ -30,7 +30,7 @@ from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
 from biogrip.progress import Progress
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.asked_design import plausible_ends, wanted_of
+from biogrip.study.design_inputs import make_design_inputs, plausible_ends
 from biogrip.study.study import Case, Study
 
 REPEATED, AFTER, BEFOREHAND, TRUTH = WAYS = ("repeated", "after", "beforehand", "truth")
@@ -50,7 +50,7 @@ class Settings:
         Assumptions of the identification, with known noise; its protocol is the first one.
     sampling
         Sampling of the first experiment.
-    wanted
+    inputs
         Inputs of designs for the ranges.
     low, high
         Log bounds between which cells are drawn.
@@ -70,7 +70,7 @@ class Settings:
     case: str
     problem: CaseProblem
     sampling: Sampling
-    wanted: Wanted
+    inputs: DesignInputs
     low: Array
     high: Array
     within: tuple[Array, Array]
@@ -83,7 +83,7 @@ class Settings:
     @property
     def noise_rad(self) -> float:
         """Standard deviation of the sensor's noise."""
-        return self.wanted.noise_rad
+        return self.inputs.noise_rad
 
 
 def sequenced(study: Study) -> list[str]:
@@ -93,34 +93,34 @@ def sequenced(study: Study) -> list[str]:
 
 def cells_of(case: Case) -> int:
     """Return the number of cells whose sequences are simulated."""
-    asked = case.block.design
-    return asked.sequence.cells if asked and asked.sequence else 0
+    block = case.block.design
+    return block.sequence.cells if block and block.sequence else 0
 
 
 def settings(study: Study, job: Wildcards) -> Settings:
     """Return the settings that the sequences of a case depend on."""
     case = study.case(job["case"])
-    asked = case.block.design
-    assert asked is not None
-    assert asked.sequence is not None
+    block = case.block.design
+    assert block is not None
+    assert block.sequence is not None
     low, high = plausible_ends(case)
     names = case.problem.searched.names
-    spread = np.array([name in (asked.ranges or {}) for name in names])
+    spread = np.array([name in (block.ranges or {}) for name in names])
     as_in_config = np.log([case.parameters[name] for name in names])
     return Settings(
         study.study_seed,
         case.name,
-        replace(case.problem, noise_rad=asked.noise_rad),
+        replace(case.problem, noise_rad=block.noise_rad),
         case.sampling,
-        wanted_of(case),
+        make_design_inputs(case),
         np.where(spread, low, as_in_config),
         np.where(spread, high, as_in_config),
         (low, high),
-        asked.tried,
-        asked.drawn,
+        block.tried,
+        block.drawn,
         case.method("least_squares"),
         case.confidence,
-        asked.sequence.experiments,
+        block.sequence.experiments,
     )
 
 
@@ -166,10 +166,10 @@ class _Cell:
         yield from self._rows_of(AFTER, planned, self._one_after_another(planned))
         progress.done()
         for way, samples in (
-            (BEFOREHAND, settings.wanted.parameters),
+            (BEFOREHAND, settings.inputs.parameters),
             (TRUTH, np.exp(self._truth)[None]),
         ):
-            best = self._designed(way, replace(settings.wanted, parameters=samples))
+            best = self._designed(way, replace(settings.inputs, parameters=samples))
             yield from self._rows_of(way, [best], self._repeated(way, best))
             progress.done()
 
@@ -188,43 +188,49 @@ class _Cell:
         """Yield results of experiments each designed from all earlier ones, extending `done`."""
         settings = self._settings
         problems: list[Problem] = []
-        told: Earlier | None = None
+        earlier: Earlier | None = None
         for count in range(1, settings.experiments + 1):
-            if told is not None:
-                wanted = replace(
-                    settings.wanted, parameters=told.parameters, before=told.information
+            if earlier is not None:
+                inputs = replace(
+                    settings.inputs, parameters=earlier.parameters, before=earlier.information
                 )
-                done.append(self._designed(f"{AFTER} {count}", wanted))
-            posed, time_s, trace = self._trace(AFTER, count, done[-1])
-            problems.append(posed.of(time_s, trace))
+                done.append(self._designed(f"{AFTER} {count}", inputs))
+            case_problem, time_s, trace = self._trace(AFTER, count, done[-1])
+            problems.append(case_problem.of(time_s, trace))
             joint = joint_problem(problems, count * [settings.noise_rad])
-            told = told_by(
+            earlier = estimate_from_traces(
                 joint,
                 settings.noise_rad,
                 partial(self._identify, AFTER, count),
                 settings.within,
                 settings.drawn,
                 self._stream(f"{AFTER} {count}, drawn"),
-                told,
+                earlier,
             )
-            yield _Known(joint, settings.noise_rad, told.best, told.misfit_rad)
+            yield _Known(joint, settings.noise_rad, earlier.best, earlier.misfit_rad)
 
     def _trace(
         self, way: str, count: int, experiment: Experiment
     ) -> tuple[CaseProblem, Array, Array]:
         """Simulate a trace; return the fit problem's assumptions, times and rotation."""
         phases, sampling = experiment
-        posed = replace(self._settings.problem, phases=phases)
-        time_s = sampling.over(posed.torque.end_s)
-        network = posed.searched.network(np.exp(self._truth)[None])
-        clean = simulated_rotation(posed.gripper, network, posed.torque, time_s, nonlinear=False)
+        case_problem = replace(self._settings.problem, phases=phases)
+        time_s = sampling.over(case_problem.torque.end_s)
+        network = case_problem.searched.network(np.exp(self._truth)[None])
+        clean = simulated_rotation(
+            case_problem.gripper, network, case_problem.torque, time_s, nonlinear=False
+        )
         # The first trace is the same in all ways that start with the same experiment.
         rng = self._stream(f"{way if count > 1 else 'first'} {count}, noise")
-        return posed, time_s, clean[0] + self._settings.noise_rad * rng.standard_normal(len(time_s))
+        return (
+            case_problem,
+            time_s,
+            clean[0] + self._settings.noise_rad * rng.standard_normal(len(time_s)),
+        )
 
-    def _designed(self, purpose: str, wanted: Wanted) -> Experiment:
+    def _designed(self, purpose: str, inputs: DesignInputs) -> Experiment:
         rng = self._stream(f"{purpose}, design")
-        _, plan = planned_within_reach(wanted, self._settings.tried, rng, silent)
+        _, plan = plan_within_reach(inputs, self._settings.tried, rng, silent)
         return plan.phases, Sampling(bursts=plan.bursts)
 
     def _identify(self, way: str, count: int, problem: Problem) -> Identification:
@@ -237,16 +243,16 @@ class _Cell:
         settings = self._settings
         quantities = parameters_and_sum(settings.problem.searched)[: len(self._truth)]
         for count, each in enumerate(known, 1):
-            likelihood = likelihood_of(
+            likelihood = make_likelihood(
                 each.problem,
                 each.best,
                 each.misfit_rad,
                 confidence=settings.confidence,
                 noise_rad=each.noise_rad,
             )
-            limits = limits_and_deeper([likelihood], quantities)[0][0]
-            deeper = fit_from([each.problem], self._truth)
-            missed = int(likelihood.rise(float(deeper.misfit_rad[0])) < -MISSED)
+            limits = find_limits([likelihood], quantities)[0][0]
+            better = fit_from([each.problem], self._truth)
+            missed = int(likelihood.increase(float(better.misfit_rad[0])) < -MISSED)
             pressed = int(all(self._pressed(experiment) for experiment in done))
             head = settings.case, self._number, way, count
             for quantity, ends in zip(quantities, limits, strict=True):
@@ -256,8 +262,8 @@ class _Cell:
 
     def _pressed(self, experiment: Experiment) -> bool:
         """Return whether the jaws press the cell throughout an experiment."""
-        wanted = replace(self._settings.wanted, parameters=np.exp(self._truth)[None])
-        return presses(wanted, experiment[0])
+        inputs = replace(self._settings.inputs, parameters=np.exp(self._truth)[None])
+        return presses(inputs, experiment[0])
 
     def _stream(self, purpose: str) -> np.random.Generator:
         settings = self._settings

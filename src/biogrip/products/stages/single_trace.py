@@ -30,5 +30,5 @@ SINGLE_TRACE = Product(
             one=True,
         )
     },
-    asked=False,
+    by_default=False,
 )

@@ -16,7 +16,7 @@ from biogrip.products.files.traces import TARGETS, write_target
 from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, wildcards_of
 from biogrip.progress import warn
-from biogrip.response.grip import grip_of
+from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_rotation
 from biogrip.response.unilateral import unilateral_response
@@ -98,7 +98,7 @@ def _response(
 
 
 def _say_if_contact_is_lost(settings: Settings, network: Network, torque: TorqueHistory) -> None:
-    grip = grip_of(settings.gripper, network, torque, nonlinear=settings.nonlinear)
+    grip = compute_grip(settings.gripper, network, torque, nonlinear=settings.nonlinear)
     words = grip.words()
     if words is None:
         return

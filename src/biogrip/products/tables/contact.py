@@ -66,5 +66,5 @@ CONTACT = table(
     item="input: contact",
     caption="Rotation, torque and voltage that close the jaws onto samples of several sizes.",
     settings=lambda study: Settings(study.gripper, study.jaw_gap_m, study.actuator, study.phases),
-    sheet="tables",
+    rule="tables",
 )

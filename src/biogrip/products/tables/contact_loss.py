@@ -19,7 +19,7 @@ from biogrip.products.files.traces import as_written
 from biogrip.products.product import Weight
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.response.grip import grip_of
+from biogrip.response.grip import compute_grip
 from biogrip.response.simulation import simulated_rotation
 from biogrip.response.unilateral import unilateral_response
 from biogrip.study.study import Study
@@ -120,7 +120,7 @@ def contact_loss(settings: Settings) -> Table:
 def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
     torque, model = torque_history(case.phases), case.sample.model
     network = model.sample(case.parameters)
-    if grip_of(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
+    if compute_grip(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
         return []
     time_s = case.sampling.over(torque.end_s)
     held = as_written(simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0])

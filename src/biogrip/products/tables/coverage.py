@@ -102,16 +102,16 @@ def coverage(
     calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
     for (name, case), target, file in zip(settings.items(), targets, intervals, strict=True):
-        posed = case.problem.calibrated([next(calibrations)] if case.calibrated else [])
-        log_truth = posed.logs(case.parameters)
+        case_problem = case.problem.calibrated([next(calibrations)] if case.calibrated else [])
+        log_truth = case_problem.logs(case.parameters)
         found = INTERVALS.read(file)
         time_s, _, rotation = read_target(target)
-        _, sensitivity = posed.of(time_s, rotation).residuals(log_truth)
+        _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
         noise_rad = standard_deviation(rotation, case.noise)
-        for quantity in parameters_and_sum(posed.searched):
+        for quantity in parameters_and_sum(case_problem.searched):
             mine = found[found["quantity"] == quantity.label]
             # The config's value: `log_truth` is clipped to the search range.
-            names = [posed.searched.names[index] for index in quantity.members]
+            names = [case_problem.searched.names[index] for index in quantity.members]
             truth = sum(case.parameters[member] for member in names)
             head = (name, quantity.label, quantity.unit, truth)
             limit = 100 * bound(sensitivity, noise_rad, log_truth, quantity)
@@ -181,7 +181,7 @@ COVERAGE = table(
     item="coverage",
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
     "their intervals, and the verdicts that users are shown, hold the truth.",
-    sheet="tables",
+    rule="tables",
     settings=settings,
     reads={
         "targets": of_cases(TARGETS, lambda study: study.covered),

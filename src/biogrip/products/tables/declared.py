@@ -20,7 +20,7 @@ def table(
     reads: Mapping[str, Reads] | None = None,
     cases: Callable[[Study], Iterable[str]] | None = None,
     sweeps: bool = False,
-    sheet: str = "",
+    rule: str = "",
     when: Callable[[Study], bool] = lambda _: True,
     weight: Weight = LIGHT,
     stem: str = "results/tables/{name}",
@@ -43,7 +43,7 @@ def table(
         Names of the cases that have the table; if not given, there is one for the study.
     sweeps
         If true, there is one table for each sweep.
-    sheet
+    rule
         Name of a group of tables that one job makes.
     when
         Condition for a study to have the table.
@@ -71,7 +71,7 @@ def table(
         message=f"Writing the table {name}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight,
-        sheet=sheet,
+        rule=rule,
         category="Tables",
         item=item,
         caption=caption,

@@ -80,8 +80,8 @@ def designed(settings: Settings, expected: list[Path], intervals: list[Path]) ->
             head = (name, parameter.name, parameter.unit, truth, 1e6 * case.noise_rad)
             both = (_percent(before[index]), _percent(after[index]))
             verdict = verdicts[parameter.name]["verdict"]
-            seen = _of_seeds(found, parameter.name, truth, float(after[index]))
-            rows.append((*head, *both, verdict, *seen, 1e9 * least_N))
+            observed = _of_seeds(found, parameter.name, truth, float(after[index]))
+            rows.append((*head, *both, verdict, *observed, 1e9 * least_N))
     caption = (
         "Cramér-Rao bounds, one standard deviation, with all parameters free and the arms' "
         "inertia in the model, at the same noise: with the protocol and the sampling of the study, "

@@ -211,7 +211,7 @@ EVIDENCE = table(
     item="evidence",
     caption="Statements of the paper beside what the study computes, and what speaks for the "
     "reconstructed values.",
-    sheet="tables",
+    rule="tables",
     settings=settings,
     reads={
         "identifications": of_cases(PATH, lambda study: study.published),

@@ -188,7 +188,7 @@ INPUTS = (
         item="input: gripper",
         caption=f"Table 1 of the paper. {_CAPTION}",
         settings=lambda study: GripperSettings(study.gripper, study.reconstructed("gripper")),
-        sheet="tables",
+        rule="tables",
     ),
     table(
         actuator,
@@ -196,7 +196,7 @@ INPUTS = (
         item="input: actuator",
         caption=f"Table 2 of the paper. {_CAPTION}",
         settings=lambda study: ActuatorSettings(study.actuator, study.reconstructed("actuator")),
-        sheet="tables",
+        rule="tables",
     ),
     table(
         gene_ranges,
@@ -204,7 +204,7 @@ INPUTS = (
         item="input: gene ranges",
         caption=f"Table 3 of the paper. {_CAPTION}",
         settings=lambda study: RangeSettings(study.ranges, study.reconstructed("search_range")),
-        sheet="tables",
+        rule="tables",
     ),
     table(
         parameter_ranges,
@@ -212,6 +212,6 @@ INPUTS = (
         item="input: parameter ranges",
         caption=f"Table 4 of the paper. {_CAPTION}",
         settings=lambda study: RangeSettings(study.ranges),
-        sheet="tables",
+        rule="tables",
     ),
 )

@@ -112,5 +112,5 @@ LEFT_OUT = table(
     caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
     "inertia.",
     settings=settings,
-    sheet="tables",
+    rule="tables",
 )

@@ -12,7 +12,7 @@ from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.response.grip import grip_of
+from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_shortening
 from biogrip.study.study import Case, Study
@@ -97,7 +97,7 @@ def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
     given = case.gripper, network, torque
     shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear)[0, 0])
     force = float(jaw_force(*given, end, nonlinear=case.nonlinear)[0, 0])
-    grip = grip_of(*given, nonlinear=case.nonlinear)
+    grip = compute_grip(*given, nonlinear=case.nonlinear)
     # A springpot has neither instantaneous nor long-term stiffness.
     power_law = case.sample.model.power_law
     in_the_end = None if power_law else float(network.k_p[0])
@@ -132,6 +132,6 @@ MECHANICS = table(
     caption="Strain, force, stiffness and apparent modulus of every simulated sample, beside the "
     "gripper's own stiffness.",
     settings=settings,
-    sheet="tables",
+    rule="tables",
     when=lambda study: bool(study.simulated),
 )

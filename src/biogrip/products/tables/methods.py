@@ -10,7 +10,7 @@ import pandas as pd
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.identify.methods import Method
-from biogrip.identify.success import chi_square_rise, near_noise, near_noise_words
+from biogrip.identify.success import chi_square_increase, near_noise, near_noise_words
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
@@ -78,7 +78,7 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for (name, (truth, samples)), path in zip(settings.cases.items(), identifications, strict=True):
         found = read_identifications(path)
-        rise = chi_square_rise(found, samples)
+        increase = chi_square_increase(found, samples)
         for method in found["method"].unique():
             mine = found["method"] == method
             reached = near_noise(found[mine], settings.near_noise_tolerance)
@@ -87,9 +87,9 @@ def methods(settings: Settings, identifications: list[Path]) -> Table:
                     name,
                     settings.methods[method].title,
                     int(mine.sum()),
-                    float(np.mean(rise[mine] <= settings.optimum_tolerance)),
+                    float(np.mean(increase[mine] <= settings.optimum_tolerance)),
                     float(np.mean(reached)),
-                    float(np.median(rise[mine])),
+                    float(np.median(increase[mine])),
                     float(found.loc[mine, "evaluations"].median()),
                     *_errors(found[mine], truth, list(labels)),
                 )
@@ -127,7 +127,7 @@ METHODS_COMPARED = table(
     item="methods",
     caption="The identifiers on the same traces: share of seeds at the global optimum and within "
     "the study's tolerance of the noise, responses simulated, errors.",
-    sheet="tables",
+    rule="tables",
     settings=settings,
     reads={"identifications": of_cases(PATH, lambda study: study.simulated)},
     when=lambda study: bool(study.simulated),

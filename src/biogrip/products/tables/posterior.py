@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR
-from biogrip.products.files.posterior import TOLD, read_posterior
+from biogrip.products.files.posterior import POSTERIOR, read_posterior
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
@@ -47,9 +47,9 @@ def settings(study: Study) -> Settings:
     return Settings({name: study.case(name).parameters for name in study.sampled})
 
 
-def posteriors(settings: Settings, told: list[Path]) -> Table:
+def posteriors(settings: Settings, files: list[Path]) -> Table:
     """List posteriors from the summary of each case, JSON."""
-    found = [read_posterior(path) for path in told]
+    found = [read_posterior(path) for path in files]
     rows = [
         row
         for each, (case, parameters) in zip(found, settings.parameters.items(), strict=True)
@@ -97,6 +97,6 @@ POSTERIOR_TABLE = table(
     caption="Posteriors of one trace of each case, beside its profile likelihoods, and how far "
     "the samples have converged.",
     settings=settings,
-    reads={"told": of_cases(TOLD, lambda study: study.sampled)},
+    reads={"files": of_cases(POSTERIOR, lambda study: study.sampled)},
     when=lambda study: bool(study.sampled),
 )

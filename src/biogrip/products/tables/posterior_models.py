@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from biogrip.products.files.posterior import TOLD, read_posterior
+from biogrip.products.files.posterior import POSTERIOR, read_posterior
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
@@ -31,7 +31,7 @@ def compared(study: Study) -> list[str]:
     ]
 
 
-def posterior_models(cases: list[str], told: list[Path]) -> Table:
+def posterior_models(cases: list[str], files: list[Path]) -> Table:
     """List models and their evidence from the posterior summary of each case, JSON."""
     rows: list[tuple[Cell, ...]] = [
         (
@@ -45,7 +45,7 @@ def posterior_models(cases: list[str], told: list[Path]) -> Table:
             float(f"{row['error']:.1g}"),
             "yes" if row["reliable"] else "no",
         )
-        for case, path in zip(cases, told, strict=True)
+        for case, path in zip(cases, files, strict=True)
         for row in read_posterior(path)["evidence"]
     ]
     caption = (
@@ -62,6 +62,6 @@ POSTERIOR_MODELS = table(
     item="evidence of models",
     caption="Evidence of sample models for one trace of each case, beside AIC and BIC.",
     settings=compared,
-    reads={"told": of_cases(TOLD, compared)},
+    reads={"files": of_cases(POSTERIOR, compared)},
     when=lambda study: bool(compared(study)),
 )

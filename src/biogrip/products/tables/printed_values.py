@@ -74,7 +74,7 @@ PRINTED_VALUES = table(
     item="printed values",
     caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
     "encoding, ranges and error formula.",
-    sheet="tables",
+    rule="tables",
     settings=settings,
     when=lambda study: bool(study.published),
 )

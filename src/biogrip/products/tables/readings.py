@@ -19,7 +19,7 @@ from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.study.study import Study
 
 # Parameters compared jointly with the paper's values; c_p is left out as undetermined.
-_TOGETHER = ("k", "k_p", "c")
+_ALL = ("k", "k_p", "c")
 # Relative rounding error of the paper's values.
 _ROUNDING = 0.005
 
@@ -65,7 +65,7 @@ def readings(settings: Settings, found: list[Path]) -> Table:
         Column("reading", "Reading"),
         Column("seeds", "Seeds"),
         Column("near_noise_share", f"Share {words}", 2),
-        Column("as_close_share", f"Share as close as the paper in {', '.join(_TOGETHER)}", 2),
+        Column("as_close_share", f"Share as close as the paper in {', '.join(_ALL)}", 2),
         *(Column(f"error_percent {p.name}", f"Error {p.name} %", 2) for p in SINGLE_BRANCH),
         Column("last_improvement", "Last improvement", 3),
     )
@@ -108,7 +108,7 @@ def _as_close(truth: Truth, found: pd.DataFrame) -> BoolArray | None:
     """Return whether each seed is as close to the truth as the paper in compared parameters."""
     published = truth.published.identified
     columns = {p.name: p.column for p in SINGLE_BRANCH}
-    names = [name for name in _TOGETHER if name in published and truth.parameters.get(name)]
+    names = [name for name in _ALL if name in published and truth.parameters.get(name)]
     if not names:
         return None
     within = [

@@ -91,5 +91,5 @@ ROBUSTNESS = table(
     settings=heat_maps,
     reads={"points": points_of_cases()},
     sweeps=True,
-    sheet="",
+    rule="",
 )

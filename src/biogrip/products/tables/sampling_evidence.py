@@ -72,7 +72,7 @@ def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
     at_truth = [bounds_percent(problem, noise, truth, time_s) for time_s in times]
     shown = [q for q, _ in at_truth[0]]
     if set(names) <= set(identified):
-        shown = _told_apart(bounds_percent(problem, noise, identified, times[-1]))
+        shown = _drop_redundant(bounds_percent(problem, noise, identified, times[-1]))
     rows: list[tuple[Cell, ...]] = []
     for index, (q, _) in enumerate(at_truth[0]):
         bounds = [found[index][1] for found in at_truth]
@@ -85,7 +85,7 @@ def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
     return rows
 
 
-def _told_apart(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
+def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
     """Leave out sums whose members are determined, and members that only the sum determines."""
     sums = [(q, percent) for q, percent in bounds if q.form == "sum"]
     left_out = []
@@ -106,7 +106,7 @@ SAMPLING_EVIDENCE = table(
     "noise leaves at least at several sampling rates. Only near the rate at which the two are "
     "alike, on average over the rows, can the paper's traces have been sampled; that rate is "
     "reconstructed.",
-    sheet="tables",
+    rule="tables",
     settings=settings,
     when=lambda study: bool(study.published),
 )

@@ -43,7 +43,7 @@ TIMES = table(
     stem="results/timings",
     item="processor times",
     caption="Processor time of the identifications on the machine that made this report.",
-    sheet="tables",
+    rule="tables",
     settings=lambda study: study.identifiers,
     reads={"times": of_cases(TIMINGS.path, lambda study: study.cases)},
 )

@@ -17,7 +17,8 @@ from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
-from biogrip.groups.dishes import (
+from biogrip.groups.cell_table import Cell, read_cells
+from biogrip.groups.group_findings import (
     USUAL_POWER,
     GroupDifference,
     GroupFinding,
@@ -26,12 +27,11 @@ from biogrip.groups.dishes import (
     findings_of_groups,
 )
 from biogrip.groups.joint_fit import fitted_jointly
-from biogrip.groups.membership import Cell, read_cells
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identify.answer import Identification
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
-from biogrip.own_traces.one_trace import Wanted, study_of
+from biogrip.own_traces.one_trace import IdentifyOptions, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.verdicts import exact_data
@@ -42,7 +42,7 @@ from biogrip.terminal import visible, visible_lines
 
 
 @dataclass(frozen=True)
-class _Posed:
+class _TraceProblem:
     """A recorded trace that can be used, its fit problem and the settings of the fit."""
 
     trace: Path
@@ -66,7 +66,7 @@ def groups(
     table
         CSV file, see `read_cells`.
     model, read_as, config
-        Fields of `Wanted`.
+        Fields of `IdentifyOptions`.
     output
         JSON file. By default it is beside the table.
     force
@@ -89,20 +89,20 @@ def groups(
     traces = [trace for cell in cells for trace in cell.traces]
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
-    found = compare_groups(Wanted(table, model, read_as, config), cells, written)
+    found = compare_groups(IdentifyOptions(table, model, read_as, config), cells, written)
     print(visible_lines(in_words(found)))
     print(f"Written to {visible(written)}.")
     return 1 if found["skipped"] else 0
 
 
-def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
+def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
     """Identify every cell from all its traces, and compare the groups of cells.
 
     Traces that cannot be used are left out and listed under ``skipped``.
 
     Parameters
     ----------
-    wanted
+    options
         Options for all traces; its own trace is the table of cells.
     cells
         Rows of the table.
@@ -115,23 +115,23 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         If an option or the config cannot be used, or no trace can.
     """
     # Errors of options and config concern all traces: raise them once, here.
-    study = study_of(wanted)
+    study = study_of(options)
     (case,) = study.cases.values()
-    posed, confidence = case.problem, case.confidence
-    progress = Progress(str(wanted.trace), len(cells))
+    case_problem, confidence = case.problem, case.confidence
+    progress = Progress(str(options.trace), len(cells))
     judged: list[JudgedCell] = []
     data: list[dict[str, Any]] = []
-    traces = _Traces(wanted)
+    traces = _Traces(options)
     for cell in cells:
         progress.doing(f"cell {cell.name}")
         usable = traces.of(cell)
         if usable:
             fit = fitted_jointly(
                 [each.problem for each in usable],
-                posed.searched,
+                case_problem.searched,
                 _identify(usable[0], progress.within),
                 confidence=confidence,
-                noise_rad=posed.noise_rad,
+                noise_rad=case_problem.noise_rad,
             )
             judged.append(JudgedCell(cell.name, cell.group, fit))
             data.append(
@@ -149,7 +149,7 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
         progress.done()
     if not judged:
         raise BiogripError(
-            f"{visible(wanted.trace)}: none of its traces can be used; the first: "
+            f"{visible(options.trace)}: none of its traces can be used; the first: "
             f"{traces.skipped[0]['reason']}"
         )
     # The reference group is the first in the table, even if none of its traces can be used.
@@ -157,9 +157,9 @@ def compare_groups(wanted: Wanted, cells: Sequence[Cell], output: Path) -> dict[
     findings = findings_of_groups(judged, names, confidence)
     found = {
         WRITTEN_BY: __version__,
-        "table": str(wanted.trace),
-        "model": posed.model.name,
-        "model_title": posed.model.title,
+        "table": str(options.trace),
+        "model": case_problem.model.name,
+        "model_title": case_problem.model.title,
         "confidence": confidence,
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
@@ -191,28 +191,28 @@ def in_words(found: dict[str, Any]) -> str:
 class _Traces:
     """Reader of traces that collects those that cannot be used in ``skipped``."""
 
-    def __init__(self, wanted: Wanted) -> None:
+    def __init__(self, options: IdentifyOptions) -> None:
         self.skipped: list[dict[str, str]] = []
-        self._wanted = wanted
+        self._options = options
         self._read: dict[bytes, Path] = {}
 
-    def of(self, cell: Cell) -> list[_Posed]:
+    def of(self, cell: Cell) -> list[_TraceProblem]:
         """Return the fit problems of the usable traces of a cell."""
-        posed = []
+        case_problem = []
         for trace in cell.traces:
             try:
-                posed.append(self._posed(trace))
+                case_problem.append(self._trace_problem(trace))
             except BiogripError as error:
                 reason = (
                     str(error) if visible(trace) in str(error) else f"{visible(trace)}: {error}"
                 )
                 self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
-        return posed
+        return case_problem
 
-    def _posed(self, trace: Path) -> _Posed:
-        study = study_of(replace(self._wanted, trace=trace))
+    def _trace_problem(self, trace: Path) -> _TraceProblem:
+        study = study_of(replace(self._options, trace=trace))
         (case,) = study.cases.values()
-        recorded = self._wanted.read_as.read(trace, case.gripper, case.problem)
+        recorded = self._options.read_as.read(trace, case.gripper, case.problem)
         rotation_rad = recorded.rotation_rad[0]
         # Noise never repeats: equal rotations are a copied file, and would feign agreement.
         same = sha256(rotation_rad.tobytes()).digest()
@@ -227,14 +227,14 @@ class _Traces:
             # All cells share one gripper: its calibration error is common to them, not noise.
             assumed = replace(case.problem, uncertainty={})
             problem = settings.fit(assumed, recorded.time_s, rotation_rad, 0).problem
-        return _Posed(trace, problem, settings)
+        return _TraceProblem(trace, problem, settings)
 
 
 def _identify(
-    posed: _Posed, progress: Callable[[int, float], None]
+    case_problem: _TraceProblem, progress: Callable[[int, float], None]
 ) -> Callable[[Problem], Identification]:
     """Return a function that finds global optima with the seeds and budget of `identify_trace`."""
-    settings = posed.settings
+    settings = case_problem.settings
 
     def found(problem: Problem) -> Identification:
         rng = stream(settings.study_seed, settings.case, 0, "identifiability")
@@ -303,7 +303,7 @@ def _difference_data(each: GroupDifference) -> dict[str, Any]:
             "low": None if ranks.low is None else exp(ranks.low),
             "high": None if ranks.high is None else exp(ranks.high),
         },
-        "ratio_seen": each.ratio_seen,
+        "detectable_ratio": each.detectable_ratio,
     }
 
 
@@ -367,7 +367,7 @@ def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
                 f"{row['p']:.2g}",
                 f"{row['adjusted_p']:.2g}",
                 by_ranks,
-                f"{row['ratio_seen']:.3g}",
+                f"{row['detectable_ratio']:.3g}",
             ]
         )
     header = [

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimized
+from biogrip.identify.levenberg_marquardt import Minima, Normal, bounded_step, minimize
 from biogrip.identify.local_fits import LocalFits
 
 # Tolerance and initial damping of the steps that approach a minimum along a curved valley.
@@ -40,7 +40,7 @@ _FLAT, _SMALLEST = 1e-12, 1e-150
 _ROUNDING = 1e-15
 
 
-def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
+def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     """Refine optima by Newton steps until they are stationary to the last digits.
 
     Parameters
@@ -64,7 +64,7 @@ def settled(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
     def convex(x: Array, fit: IntArray) -> Normal:
         return _convex(fits, x, trace[fit])
 
-    closer = minimized(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
+    closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
     rounding = _rounding(fits, here.misfit_rad, trace)

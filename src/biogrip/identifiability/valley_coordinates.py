@@ -14,7 +14,7 @@ from biogrip.experiment.sample import SampleModel
 
 
 @dataclass(frozen=True)
-class Straightened:
+class ValleyCoordinates:
     """A change of coordinates whose Jacobian determinant is one.
 
     Parameters
@@ -60,7 +60,7 @@ class Straightened:
         return found
 
 
-def straightened(model: SampleModel) -> Straightened:
+def valley_coordinates(model: SampleModel) -> ValleyCoordinates:
     """Return the coordinates in which a model's exchangeable parameters have a straight valley."""
     named = enumerate(model.names)
-    return Straightened(tuple(index for index, name in named if name in model.exchangeable))
+    return ValleyCoordinates(tuple(index for index, name in named if name in model.exchangeable))

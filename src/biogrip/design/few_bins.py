@@ -19,14 +19,14 @@ from biogrip.design.criteria import whitened
 _AS_GOOD = 1e-3
 
 
-def in_few_cells(
-    told: Array, samples: Array, capacity: Array, cost: Array, before: Array | float = 0.0
+def in_few_bins(
+    sensitivity: Array, samples: Array, capacity: Array, cost: Array, before: Array | float = 0.0
 ) -> Array:
     """Distribute readings over few cells, with the same information.
 
     Parameters
     ----------
-    told : (n, n_parameters, n_cells)
+    sensitivity : (n, n_parameters, n_cells)
         Sensitivities in units of the noise.
     samples : (n_cells,)
         Given numbers of readings in cells.
@@ -44,18 +44,18 @@ def in_few_cells(
     """
     from scipy.optimize import linprog
 
-    information = (told * samples) @ told.swapaxes(1, 2) + before
-    white = whitened(information, told)
-    first, second = np.triu_indices(told.shape[1])
-    rows = (white[:, first] * white[:, second]).reshape(-1, told.shape[2])
-    wanted = rows @ samples
+    information = (sensitivity * samples) @ sensitivity.swapaxes(1, 2) + before
+    white = whitened(information, sensitivity)
+    first, second = np.triu_indices(sensitivity.shape[1])
+    rows = (white[:, first] * white[:, second]).reshape(-1, sensitivity.shape[2])
+    inputs = rows @ samples
     # In units of all readings, so that numbers are near one.
     total = samples.sum()
     upper = np.minimum(capacity / total, 1.0)
     found = linprog(
         cost,
         A_ub=np.concatenate((rows, -rows)) * total,
-        b_ub=np.concatenate((wanted + _AS_GOOD, -wanted + _AS_GOOD)),
+        b_ub=np.concatenate((inputs + _AS_GOOD, -inputs + _AS_GOOD)),
         A_eq=np.ones((1, len(samples))),
         b_eq=np.ones(1),
         bounds=np.stack((np.zeros_like(upper), upper), axis=1),

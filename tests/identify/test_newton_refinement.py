@@ -8,12 +8,12 @@ import pytest
 from biogrip import library
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import MODELS, SampleModel, model_named
-from biogrip.identify import settling
-from biogrip.identify.levenberg_marquardt import Minima, minimized
+from biogrip.identify import newton_refinement
+from biogrip.identify.levenberg_marquardt import Minima, minimize
 from biogrip.identify.local_fits import FINE, PRIOR_WIDTH, LocalFits
 from biogrip.identify.multi_start import fit_from
+from biogrip.identify.newton_refinement import refine_optima
 from biogrip.identify.problem import Problem
-from biogrip.identify.settling import settled
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import (
     GRIPPER,
@@ -87,7 +87,7 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
     """
     arm = library.Arm(1e-14, 3.3e-12, 4.4e-7)
     gripper = library.Gripper(1.5e-3, 75.0, arm, arm)
-    protocol = tuple(library.held(STEP_S, torque) for torque in STEPS)
+    protocol = tuple(library.hold(STEP_S, torque) for torque in STEPS)
     made_by, fitted = (
         library.set_up(gripper, protocol, library.Sample(name))
         for name in ("kelvin_voigt", "zener_kelvin")
@@ -111,13 +111,15 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
 @pytest.mark.parametrize("name", MODELS_SETTLED)
 def test_settling_never_makes_a_fit_worse(name: str) -> None:
     """And the misfit told is that of the parameters told."""
-    for posed, _ in noisy(MODELS_SETTLED[name], 12):
-        fits, found, trace = found_in(posed)
-        best = settled(fits, found, trace)
+    for case_problem, _ in noisy(MODELS_SETTLED[name], 12):
+        fits, found, trace = found_in(case_problem)
+        best = refine_optima(fits, found, trace)
         for x, ahead, told in zip(found.x, best.x, best.misfit_rad, strict=True):
-            (before, _), (after, misfit_rad) = cost(posed, x), cost(posed, ahead)
-            assert after <= before + rounding(posed, before)
-            assert told == pytest.approx(misfit_rad, rel=1e-9, abs=4e-15 * posed.residuals.peak_rad)
+            (before, _), (after, misfit_rad) = cost(case_problem, x), cost(case_problem, ahead)
+            assert after <= before + rounding(case_problem, before)
+            assert told == pytest.approx(
+                misfit_rad, rel=1e-9, abs=4e-15 * case_problem.residuals.peak_rad
+            )
 
 
 @pytest.mark.parametrize("name", MODELS_SETTLED)
@@ -126,7 +128,7 @@ def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.Monk
     closer: list[Array] = []
 
     def approached(*given: Any, **how: Any) -> Minima:
-        found: Minima = minimized(*given, **how)
+        found: Minima = minimize(*given, **how)
         closer.append(found.x)
         return found
 
@@ -134,14 +136,16 @@ def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.Monk
         return np.full(x.shape, 0.5)
 
     model = MODELS_SETTLED[name]
-    for posed, _ in noisy(model, 6):
-        fits, found, trace = found_in(posed)
-        monkeypatch.setattr(settling, "minimized", approached)
-        monkeypatch.setattr(settling, "_newton_step", leap)
-        kept = settled(fits, found, trace)
+    for case_problem, _ in noisy(model, 6):
+        fits, found, trace = found_in(case_problem)
+        monkeypatch.setattr(newton_refinement, "minimize", approached)
+        monkeypatch.setattr(newton_refinement, "_newton_step", leap)
+        kept = refine_optima(fits, found, trace)
         for x, before, after in zip(kept.x, found.x, closer.pop(), strict=True):
             ordered = [each[model.in_order(np.exp(each)[None])[0]] for each in (before, after)]
-            assert any(np.array_equal(x, each) for each in ordered) or lower(posed, x, ordered)
+            assert any(np.array_equal(x, each) for each in ordered) or lower(
+                case_problem, x, ordered
+            )
 
 
 def lower(problem: Problem, x: Array, others: list[Array]) -> bool:
@@ -152,22 +156,24 @@ def lower(problem: Problem, x: Array, others: list[Array]) -> bool:
 @pytest.mark.parametrize("name", MODELS_SETTLED)
 def test_curvatures_are_those_of_what_is_minimized(name: str) -> None:
     """All second derivatives, against differences of gradients on all samples; away from optima."""
-    for posed, sample in noisy(MODELS_SETTLED[name], 6):
-        fits, trace, x = LocalFits([posed]), np.zeros(1, dtype=np.int64), sample + 0.3
+    for case_problem, sample in noisy(MODELS_SETTLED[name], 6):
+        fits, trace, x = LocalFits([case_problem]), np.zeros(1, dtype=np.int64), sample + 0.3
         found = fits.curved(x[None], trace)
         unit = np.eye(len(x))
 
-        def gradient(at: Array, posed: Problem = posed) -> Array:
-            residual, slopes = posed.residuals(at)
-            away = (at - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
-            return slopes @ residual / posed.residuals.noise_scale_rad**2 + away
+        def gradient(at: Array, case_problem: Problem = case_problem) -> Array:
+            residual, slopes = case_problem.residuals(at)
+            away = (at - 0.5 * (case_problem.low + case_problem.high)) / PRIOR_WIDTH**2
+            return slopes @ residual / case_problem.residuals.noise_scale_rad**2 + away
 
         np.testing.assert_allclose(
             found.gradient[0], gradient(x), rtol=1e-6, atol=1e-8 * np.abs(found.gradient).max()
         )
         second = [(gradient(x + 1e-4 * u) - gradient(x - 1e-4 * u)) / 2e-4 for u in unit]
         # Of what the trace says nothing of, nearly all is rounding.
-        allowed = 1e-6 * np.abs(second).max() + rounding(posed, cost(posed, x)[0]) / 2e-4
+        allowed = (
+            1e-6 * np.abs(second).max() + rounding(case_problem, cost(case_problem, x)[0]) / 2e-4
+        )
         np.testing.assert_allclose(found.information[0], second, rtol=0, atol=allowed)
 
 
@@ -177,19 +183,19 @@ def test_an_optimum_is_settled_from_wherever_it_was_found() -> None:
     fits, traces = LocalFits(problems), np.arange(6)
     best = np.log([answer.parameters for answer in identified(problems, [0] * 6)])
     beside = fits.fitted(best + 0.02 * np.random.default_rng(3).normal(size=best.shape), traces)
-    again = settled(fits, beside, traces)
+    again = refine_optima(fits, beside, traces)
     np.testing.assert_allclose(again.x, best, rtol=0, atol=1e-8)
     assert np.all(again.converged)
 
 
 def test_the_optimum_is_settled_to_the_last_digits() -> None:
     """Where the gradient on all samples vanishes, from wherever one comes."""
-    posed = problem("endothelial_cell", 3)
-    best = np.log(run("least_squares", posed).parameters)
+    case_problem = problem("endothelial_cell", 3)
+    best = np.log(run("least_squares", case_problem).parameters)
     rng = np.random.default_rng(0)
-    ends = [fit_from([posed], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
+    ends = [fit_from([case_problem], best + 0.01 * rng.standard_normal(4)).x[0] for _ in range(4)]
     assert np.max(np.ptp(ends, axis=0)) < 1e-9
-    residual, sensitivity = posed.residuals(ends[0])
-    prior = (ends[0] - 0.5 * (posed.low + posed.high)) / PRIOR_WIDTH**2
-    gradient = sensitivity @ residual / posed.residuals.noise_scale_rad**2 + prior
+    residual, sensitivity = case_problem.residuals(ends[0])
+    prior = (ends[0] - 0.5 * (case_problem.low + case_problem.high)) / PRIOR_WIDTH**2
+    gradient = sensitivity @ residual / case_problem.residuals.noise_scale_rad**2 + prior
     assert np.max(np.abs(gradient)) < 1e-6

@@ -7,10 +7,10 @@ from math import sqrt
 import numpy as np
 
 from biogrip.groups.comparison import Difference, adjusted, difference
+from biogrip.groups.hodges_lehmann import Shift, shift
 from biogrip.groups.joint_fit import JointFit
-from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, population_of
-from biogrip.groups.power import ratio_seen
-from biogrip.groups.shift import Shift, shift
+from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, estimate_population
+from biogrip.groups.power import detectable_ratio
 from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import DETERMINED, Finding
@@ -66,7 +66,7 @@ class GroupDifference:
         p value adjusted for the number of groups that the quantity is compared in.
     ranks
         Distribution-free estimate of the difference of logarithms.
-    ratio_seen
+    detectable_ratio
         Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`.
     """
 
@@ -76,7 +76,7 @@ class GroupDifference:
     difference: Difference
     adjusted_p: float
     ranks: Shift
-    ratio_seen: float
+    detectable_ratio: float
 
 
 def findings_of_groups(
@@ -125,7 +125,7 @@ def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDiffere
                     each,
                     p_value,
                     shift(one.estimates.log_values, other.estimates.log_values, each.confidence),
-                    _ratio_seen(one, other),
+                    _detectable_ratio(one, other),
                 )
             )
     return compared
@@ -142,14 +142,14 @@ def log_deviation(finding: Finding, likelihood: Likelihood) -> float:
 def _finding(
     group: str, quantity: Quantity, index: int, cells: Sequence[JudgedCell], confidence: float
 ) -> GroupFinding:
-    told = [(cell.name, cell.fit.diagnosis) for cell in cells]
+    diagnoses = [(cell.name, cell.fit.diagnosis) for cell in cells]
     known = [
         (
             name,
             each.findings[index].profile.best,
             log_deviation(each.findings[index], each.likelihood),
         )
-        for name, each in told
+        for name, each in diagnoses
         if each.findings[index].verdict == DETERMINED
     ]
     names = tuple(name for name, _, _ in known)
@@ -163,13 +163,13 @@ def _finding(
         quantity.label,
         quantity.unit,
         estimates,
-        tuple(name for name, _ in told if name not in names),
-        population_of(estimates, confidence) if len(names) >= FEWEST_CELLS else None,
+        tuple(name for name, _ in diagnoses if name not in names),
+        estimate_population(estimates, confidence) if len(names) >= FEWEST_CELLS else None,
     )
 
 
-def _ratio_seen(one: Population, other: Population) -> float:
+def _detectable_ratio(one: Population, other: Population) -> float:
     fewer = 1 + min(one.freedom, other.freedom)
     # `deviation` includes spread and errors; badly known cells have less weight in it.
     variances = [(1 + each.freedom) * each.deviation**2 for each in (one, other)]
-    return ratio_seen(fewer, USUAL_POWER, sqrt(sum(variances) / 2), 0.0, one.confidence)
+    return detectable_ratio(fewer, USUAL_POWER, sqrt(sum(variances) / 2), 0.0, one.confidence)

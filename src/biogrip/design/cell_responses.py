@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.design.cells import Cells, swinging_cells
+from biogrip.design.time_bins import TimeBins, periodic_time_bins
 from biogrip.design.views import Moving, Views
 from biogrip.design.waveform import Waveform
 
@@ -18,7 +18,7 @@ _MARGIN = 2e-3
 
 
 @dataclass(frozen=True)
-class Looked:
+class CellResponses:
     """Responses of plausible samples to a torque whose largest is 1 N m, in cells.
 
     Parameters
@@ -51,14 +51,16 @@ class _Part:
     lowest_N: Array
 
 
-def looked(views: Views, cells: Cells, waveform: Waveform, fastest_Hz: float) -> Looked:
+def compute_cell_responses(
+    views: Views, time_bins: TimeBins, waveform: Waveform, fastest_Hz: float
+) -> CellResponses:
     """Compute the responses of plausible samples to a torque, in cells.
 
     Parameters
     ----------
     views
         Modes of the samples, with responses in the middle of the cells.
-    cells
+    time_bins
         Cells after a step, longer than any step.
     waveform
         Torque, in N m if its largest is 1.
@@ -70,19 +72,19 @@ def looked(views: Views, cells: Cells, waveform: Waveform, fastest_Hz: float) ->
     parts = []
     if not waveform.swings.all():
         steady = np.flatnonzero(~waveform.swings)
-        parts.append(_looked(moving, steady, cells, slots[steady, None]))
+        parts.append(_compute_responses(moving, steady, time_bins, slots[steady, None]))
     for k in np.flatnonzero(waveform.swings):
         period = round(waveform.periods_s[k] * fastest_Hz)
-        own = swinging_cells(int(slots[k]), period, _PARTS, _PERIODS)
+        own = periodic_time_bins(int(slots[k]), period, _PARTS, _PERIODS)
         times = own.middle / fastest_Hz
-        parts.append(_looked(moving, np.array([k]), own, slots[[k], None], times))
+        parts.append(_compute_responses(moving, np.array([k]), own, slots[[k], None], times))
     largest = np.max([part.largest_N for part in parts], axis=0)
     steps = np.concatenate([part.steps for part in parts])
     lowest = np.concatenate([part.lowest_N for part in parts], axis=1)
     lowest = np.minimum(lowest, moving.last_force[:, steps])
     margin = np.where(steps > 0, _MARGIN, 0.0) * largest[:, None]
     turned = max(part.turned_rad for part in parts)
-    return Looked(
+    return CellResponses(
         np.concatenate([part.sensitivity for part in parts], axis=2),
         np.concatenate([part.capacity for part in parts]),
         max(turned, float(np.max(np.abs(moving.last_rotation)))),
@@ -90,19 +92,23 @@ def looked(views: Views, cells: Cells, waveform: Waveform, fastest_Hz: float) ->
     )
 
 
-def _looked(
-    moving: Moving, steps: IntArray, cells: Cells, slots: IntArray, times_s: Array | None = None
+def _compute_responses(
+    moving: Moving,
+    steps: IntArray,
+    time_bins: TimeBins,
+    slots: IntArray,
+    times_s: Array | None = None,
 ) -> _Part:
     """Compute responses in steps with given numbers of slots; in sinusoids if times are given."""
-    view = moving.seen(steps, times_s)
-    seen = cells.middle < slots
-    turned = float(np.max(np.abs(view.rotation), where=seen, initial=0.0))
-    largest = np.max(view.force, axis=(1, 2), where=seen, initial=0.0)
-    lowest = np.min(view.force, axis=2, where=seen, initial=np.inf)
+    view = moving.respond(steps, times_s)
+    covered = time_bins.middle < slots
+    turned = float(np.max(np.abs(view.rotation), where=covered, initial=0.0))
+    largest = np.max(view.force, axis=(1, 2), where=covered, initial=0.0)
+    lowest = np.min(view.force, axis=2, where=covered, initial=np.inf)
     if times_s is not None:
         turned += _BETWEEN * float(np.ptp(view.rotation, axis=2).max()) / 2
         lowest -= _BETWEEN * np.ptp(view.force, axis=2) / 2
-    room = (np.clip(slots - cells.first, 0, cells.capacity) * seen).astype(float).ravel()
-    told = view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
+    room = (np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered).astype(float).ravel()
+    sensitivity = view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
     there = room > 0
-    return _Part(steps, told[..., there], room[there], turned, largest, lowest)
+    return _Part(steps, sensitivity[..., there], room[there], turned, largest, lowest)

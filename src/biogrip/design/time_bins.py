@@ -16,7 +16,7 @@ _SINGLE = 24
 
 
 @dataclass(frozen=True)
-class Cells:
+class TimeBins:
     """Cells after a step.
 
     Parameters
@@ -48,7 +48,7 @@ class Cells:
         return np.sqrt(first * (first + self.slots - 1.0))
 
 
-def cells(slots: int, growth: float, longest: int | None = None) -> Cells:
+def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins:
     """Divide the slots after a step into cells of growing length.
 
     Parameters
@@ -68,10 +68,10 @@ def cells(slots: int, growth: float, longest: int | None = None) -> Cells:
         place = max(further, place + 1.0)
     first = np.array(firsts, dtype=np.intp)
     lasting = np.diff(np.append(first, slots))
-    return Cells(first, lasting, np.ones_like(first))
+    return TimeBins(first, lasting, np.ones_like(first))
 
 
-def swinging_cells(slots: int, period: int, parts: int, growth: float) -> Cells:
+def periodic_time_bins(slots: int, period: int, parts: int, growth: float) -> TimeBins:
     """Divide the slots of a sinusoidal torque into cells that repeat in successive periods.
 
     Parameters
@@ -86,21 +86,21 @@ def swinging_cells(slots: int, period: int, parts: int, growth: float) -> Cells:
         Factor by which the number of periods grows over which cells repeat.
     """
     part = max(1, period // parts)
-    begun = cells(min(slots, period), growth, part)
+    begun = time_bins(min(slots, period), growth, part)
     edges = np.unique(np.round(np.linspace(0, period, min(parts, period) + 1)).astype(np.intp))
     whole = slots // period
     place, groups = 1, [begun]
     while place < whole:
         count = min(max(1, int(place * (growth - 1))), whole - place)
         repeats = np.full(len(edges) - 1, count)
-        groups.append(Cells(place * period + edges[:-1], np.diff(edges), repeats))
+        groups.append(TimeBins(place * period + edges[:-1], np.diff(edges), repeats))
         place += count
     left = slots - whole * period if whole else 0
     rest = edges[edges < left]
     ends = np.minimum(edges[1:], left)[: len(rest)]
-    groups.append(Cells(whole * period + rest, ends - rest, np.ones_like(rest)))
+    groups.append(TimeBins(whole * period + rest, ends - rest, np.ones_like(rest)))
     first, lasting, repeats = (
         np.concatenate([getattr(group, name) for group in groups])
         for name in ("first", "slots", "repeats")
     )
-    return Cells(first, lasting, repeats, period)
+    return TimeBins(first, lasting, repeats, period)

@@ -17,21 +17,21 @@ References
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.response.whitening import Colour, Whitening
+from biogrip.response.whitening import NoiseModel, Whitening
 
 # Bounds of the logarithm of a component's share over that of white noise: from none to all.
 _LEAST, _MOST = -9.0, 7.0
 # The likelihood has several maxima. Grid of log odds, and of places between the shortest and the
 # longest time; starts are the best points with more relaxing, and with more 1/f noise.
 _ODDS, _PLACES = (_LEAST, -4.0, -1.0, 2.0, 6.0), (0.15, 0.35, 0.6, 0.85)
-_STEP, _SETTLED = 1e-4, 1e-9
+_STEP, _CONVERGED = 1e-4, 1e-9
 # Step of finite differences.
 _APART = 0.1
 # Prior standard deviation of the logarithms of odds and time, in e-folds.
 _KNOWN = 3.0
 
 
-class ColourLikelihood:
+class NoiseModelLikelihood:
     """Restricted likelihood of noise models, given the residuals of a fit.
 
     Parameters
@@ -51,7 +51,7 @@ class ColourLikelihood:
         times = float(np.log(shortest / 2)), float(np.log(longest))
         self._bounds = [(_LEAST, _MOST), times, (_LEAST, _MOST)]
 
-    def best(self, near: Colour | None = None) -> Colour:
+    def best(self, near: NoiseModel | None = None) -> NoiseModel:
         """Return the noise model of highest likelihood, starting from `near` if it is given."""
         from scipy.optimize import minimize
 
@@ -62,13 +62,13 @@ class ColourLikelihood:
                 np.clip(start, *np.transpose(self._bounds)),
                 method="L-BFGS-B",
                 bounds=self._bounds,
-                options={"eps": _STEP, "ftol": _SETTLED},
+                options={"eps": _STEP, "ftol": _CONVERGED},
             )
             for start in starts
         ]
-        return _colour(min(found, key=lambda each: float(each.fun)).x)
+        return _noise_model(min(found, key=lambda each: float(each.fun)).x)
 
-    def freedom(self, colour: Colour, sensitivity: Array, nuisance: Array) -> float:
+    def freedom(self, noise_model: NoiseModel, sensitivity: Array, nuisance: Array) -> float:
         """Compute the degrees of freedom of the least known variance of a parameter.
 
         They are those of a chi-squared variable whose relative spread is that of the
@@ -76,7 +76,7 @@ class ColourLikelihood:
 
         Parameters
         ----------
-        colour
+        noise_model
             Noise model of highest likelihood.
         sensitivity : (n_parameters, n_samples)
             Derivatives by the log-parameters, over the noise's standard deviation.
@@ -90,12 +90,12 @@ class ColourLikelihood:
         """
 
         def variances(x: Array) -> Array:
-            white = Whitening(self._time_s, _colour(x), nuisance)(sensitivity)
+            white = Whitening(self._time_s, _noise_model(x), nuisance)(sensitivity)
             # Every parameter has a prior standard deviation of 1, as in `Likelihood.deviation`.
             inverse = np.linalg.inv(white @ white.T + np.eye(len(white)))
             return np.log(np.diagonal(inverse)) + 2 * self._log_scale(x)
 
-        x = _logarithms(colour)
+        x = _logarithms(noise_model)
         steps = _APART * np.eye(len(x))
         slopes = np.array([variances(x + step) - variances(x - step) for step in steps])
         slopes /= 2 * _APART
@@ -131,7 +131,7 @@ class ColourLikelihood:
 
     def _parts(self, x: Array) -> tuple[float, float, float]:
         """Return a sum of squares, and log determinants of absorbed directions and of all noise."""
-        whitening = Whitening(self._time_s, _colour(x), np.zeros((0, len(self._time_s))))
+        whitening = Whitening(self._time_s, _noise_model(x), np.zeros((0, len(self._time_s))))
         white = whitening(np.vstack((self._reached, self._residual)))
         basis, triangle = np.linalg.qr(white[:-1].T)
         left = white[-1] - basis @ (basis.T @ white[-1])
@@ -151,16 +151,16 @@ class ColourLikelihood:
         return [min(side, key=self._deviance) for side in sides]
 
 
-def _logarithms(colour: Colour) -> Array:
-    odds = np.array([colour.relaxing, colour.flicker]) / colour.white
-    return np.array([np.log(odds[0]), np.log(colour.time_s), np.log(odds[1])])
+def _logarithms(noise_model: NoiseModel) -> Array:
+    odds = np.array([noise_model.relaxing, noise_model.flicker]) / noise_model.white
+    return np.array([np.log(odds[0]), np.log(noise_model.time_s), np.log(odds[1])])
 
 
-def _colour(x: Array) -> Colour:
+def _noise_model(x: Array) -> NoiseModel:
     """Return the noise model of two log odds and the logarithm of a time."""
     relaxing, flicker = np.exp(x[0]), np.exp(x[2])
     whole = 1 + relaxing + flicker
-    return Colour(float(relaxing / whole), float(np.exp(x[1])), float(flicker / whole))
+    return NoiseModel(float(relaxing / whole), float(np.exp(x[1])), float(flicker / whole))
 
 
 def _independent(directions: Array) -> Array:

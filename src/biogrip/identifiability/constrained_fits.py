@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
-from biogrip.identifiability.held import HeldQuantities
 from biogrip.identifiability.likelihood import MISSED, Likelihood
 from biogrip.identifiability.quantities import Quantity
+from biogrip.identifiability.quantity_constraint import QuantityConstraint
 from biogrip.identify.levenberg_marquardt import Minima
 from biogrip.identify.local_fits import LocalFits
 
@@ -18,7 +18,7 @@ Along a valley, a fit to the last digit takes three times as many steps.
 """
 
 
-class HeldFits:
+class ConstrainedFits:
     """Fits of several traces with one of several quantities held at given values.
 
     Each profile belongs to a trace and a quantity; those of the first trace come first.
@@ -40,7 +40,7 @@ class HeldFits:
         Logarithm of the quantity there.
     threshold, certainty : (n_profiles,)
         As in `Likelihood`; certainty is no less than the threshold.
-    deeper
+    missed
         By trace, the lowest increase of chi^2 and its log-parameters, if it is so far
         below zero that the trace's global optimum was missed.
     """
@@ -52,13 +52,13 @@ class HeldFits:
         self._optima = np.stack([likelihood.best for likelihood in likelihoods])
         self.best = self._optima[self.trace]
         self.at_best = np.array([q.log(x) for x in self._optima for q in quantities])
-        told = [
+        settings = [
             (one.threshold, one.certainty, one.misfit_rad, one.noise_rad) for one in likelihoods
         ]
-        threshold, certainty, self._misfit_rad, self._noise_rad = np.array(told).T
+        threshold, certainty, self._misfit_rad, self._noise_rad = np.array(settings).T
         self.threshold = threshold[self.trace]
         self.certainty = np.maximum(certainty, threshold)[self.trace]
-        self.deeper: dict[int, tuple[float, Array]] = {}
+        self.missed: dict[int, tuple[float, Array]] = {}
         self._fits = LocalFits(problems)
         self._residuals = problems[0].residuals
         scale_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
@@ -83,16 +83,18 @@ class HeldFits:
 
         Returns
         -------
-        rises : (n,)
+        increases : (n,)
             Increase of chi^2 over each trace's optimum.
         log_parameters : (n, n_parameters)
             Fitted log-parameters, on the constraint up to rounding.
         """
         trace, which = np.divmod(profile, len(self.quantities))
         low, high, last_s = self._fits.low, self._fits.high, self._residuals.duration_s
-        held = HeldQuantities(self.quantities, which, targets, low, high, last_s)
-        found = self._fits.fitted(near, trace, tolerance, held=held)
-        return self._rises(found, trace) + held.price(found.x) * self._ratio[trace], found.x
+        constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
+        found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
+        return self._increases(found, trace) + constraint.price(found.x) * self._ratio[
+            trace
+        ], found.x
 
     def from_each(
         self, profile: IntArray, targets: Array, starts: Array, tolerance: float
@@ -101,15 +103,15 @@ class HeldFits:
 
         Returns
         -------
-        rises : (n_starts, n)
+        increases : (n_starts, n)
             Increase of chi^2 from each start.
         log_parameters : (n, n_parameters)
             Those of the lowest increase.
         """
         count, near = len(starts), np.concatenate(starts)
-        rises, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
-        rises = rises.reshape(count, -1)
-        return rises, x.reshape(starts.shape)[np.argmin(rises, axis=0), range(len(profile))]
+        increases, x = self.at(np.tile(profile, count), np.tile(targets, count), near, tolerance)
+        increases = increases.reshape(count, -1)
+        return increases, x.reshape(starts.shape)[np.argmin(increases, axis=0), range(len(profile))]
 
     def with_fixed(self, x: Array, fixed: BoolArray, tolerance: float) -> tuple[Array, Array]:
         """Fit the first trace with some parameters fixed; tolerance and results as in `at`.
@@ -124,16 +126,16 @@ class HeldFits:
         trace = np.zeros(len(x), dtype=np.int64)
         low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
         found = self._fits.fitted(x, trace, tolerance, low=low, high=high)
-        return self._rises(found, trace), found.x
+        return self._increases(found, trace), found.x
 
-    def _rises(self, found: Minima, trace: IntArray) -> Array:
+    def _increases(self, found: Minima, trace: IntArray) -> Array:
         excess = found.misfit_rad**2 - self._misfit_rad[trace] ** 2
-        rises = self._residuals.samples * excess / self._noise_rad[trace] ** 2
-        for index in np.flatnonzero(rises < -MISSED):
+        increases = self._residuals.samples * excess / self._noise_rad[trace] ** 2
+        for index in np.flatnonzero(increases < -MISSED):
             of_trace = int(trace[index])
-            if of_trace not in self.deeper or rises[index] < self.deeper[of_trace][0]:
-                self.deeper[of_trace] = float(rises[index]), found.x[index].copy()
-        return rises
+            if of_trace not in self.missed or increases[index] < self.missed[of_trace][0]:
+                self.missed[of_trace] = float(increases[index]), found.x[index].copy()
+        return increases
 
     def ranges(self) -> Array:
         """Return the lowest and highest logarithm of each profile's quantity, (2, n_profiles)."""

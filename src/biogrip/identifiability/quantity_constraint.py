@@ -29,7 +29,7 @@ _UNWILLING = 1e-9
 _SMALLEST = 1e-200
 
 
-class HeldQuantities:
+class QuantityConstraint:
     """A constraint on each of n fits, which holds one quantity at a given value.
 
     Parameters
@@ -58,15 +58,15 @@ class HeldQuantities:
         self._which, self._targets = which, targets
         self._low, self._high = low, high
         self._powers = np.zeros((len(quantities), len(low)))
-        most = max(len(quantity.hinges) for quantity in quantities)
+        most = max(len(quantity.penalties) for quantity in quantities)
         self._forms = np.zeros((len(quantities), most, len(low)))
         self._allowed, self._stiffness = np.zeros((2, len(quantities), most))
         for index, quantity in enumerate(quantities):
             self._powers[index, list(quantity.members)] = quantity.sign
-            for row, hinge in enumerate(quantity.hinges):
-                self._forms[index, row] = hinge.form(len(low))
-                self._allowed[index, row] = hinge.allowed(longest_s)
-                self._stiffness[index, row] = hinge.stiffness
+            for row, penalty in enumerate(quantity.penalties):
+                self._forms[index, row] = penalty.form(len(low))
+                self._allowed[index, row] = penalty.allowed(longest_s)
+                self._stiffness[index, row] = penalty.stiffness
         self._senses = np.array([float(quantity.sense) for quantity in quantities])
         self._most_members = max(len(quantity.members) for quantity in quantities)
 

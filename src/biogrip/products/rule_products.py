@@ -9,7 +9,7 @@ from biogrip.products.product import Product
 
 
 @dataclass(frozen=True)
-class Together:
+class RuleProducts:
     """Products that one rule makes, with its jobs.
 
     Parameters
@@ -27,22 +27,22 @@ class Together:
     jobs: tuple[Wildcards, ...]
 
 
-def together(products: Iterable[Product], plan: Plan) -> list[Together]:
+def group_by_rule(products: Iterable[Product], plan: Plan) -> list[RuleProducts]:
     """Group products by sheet into rules.
 
     A rule always makes all its outputs, but not every case has every figure. So a sheet has
     one rule for each set of products that cases have in common.
     """
-    sheets: dict[str, list[Product]] = defaultdict(list)
+    rules: dict[str, list[Product]] = defaultdict(list)
     for product in products:
-        sheets[product.sheet or product.name].append(product)
+        rules[product.rule or product.name].append(product)
     found = []
-    for name, members in sheets.items():
-        if not members[0].asked:
-            found.append(Together(name, tuple(members), ()))
+    for name, members in rules.items():
+        if not members[0].by_default:
+            found.append(RuleProducts(name, tuple(members), ()))
         for number, (makes, jobs) in enumerate(_in_common(members, plan).items(), 1):
             rule = name if number == 1 else f"{name}_{number}"
-            found.append(Together(rule, tuple(members[i] for i in makes), tuple(jobs)))
+            found.append(RuleProducts(rule, tuple(members[i] for i in makes), tuple(jobs)))
     return found
 
 

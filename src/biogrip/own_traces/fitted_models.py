@@ -13,7 +13,7 @@ from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identify.answer import Identification
 from biogrip.identify.least_squares import LeastSquaresSettings
-from biogrip.identify.model_choice import Tried, advice, ranked
+from biogrip.identify.model_choice import FittedModel, advice, ranked
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
@@ -22,7 +22,7 @@ _MOST_SAMPLES = 50_000
 
 
 @dataclass(frozen=True)
-class ModelsTried:
+class FittedModels:
     """Best fits of sample models to a trace.
 
     Parameters
@@ -34,7 +34,7 @@ class ModelsTried:
     """
 
     chosen: str
-    tried: list[Tried] = field(default_factory=list)
+    tried: list[FittedModel] = field(default_factory=list)
     answers: list[Identification] = field(default_factory=list)
 
     @property
@@ -78,11 +78,11 @@ def models_tried(
     study: Study,
     case: Case,
     fit: TraceFit,
-    told: Diagnosis,
+    diagnosis: Diagnosis,
     done: Callable[[], None],
     *,
     named: bool,
-) -> ModelsTried:
+) -> FittedModels:
     """Fit several sample models to a trace with the same noise model.
 
     None are fitted with fixed parameters, with the nonlinear model, which takes minutes, or if
@@ -94,44 +94,51 @@ def models_tried(
         The models to fit, and the budget of each fit.
     fit
         Fit of the trace with the chosen model.
-    told
+    diagnosis
         Diagnosis of that fit; its best fit is one of the starts.
     done
         Function to call after every model.
     named
         True if the config names the models; if not, power laws are tried as well.
     """
-    posed, chosen = case.problem, case.sample.candidate
-    if posed.nonlinear or posed.fixed:
-        return ModelsTried(chosen)
+    case_problem, chosen = case.problem, case.sample.candidate
+    if case_problem.nonlinear or case_problem.fixed:
+        return FittedModels(chosen)
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
-    power_laws = _power_laws(posed.torque.end_s) if few and not named else []
+    power_laws = _power_laws(case_problem.torque.end_s) if few and not named else []
     candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
     if len(candidates) < 2:
-        return ModelsTried(chosen)
+        return FittedModels(chosen)
     settings = case.method("least_squares")
     assert isinstance(settings, LeastSquaresSettings)
     found = fit_models(
-        {name: [posed.for_model(fit.problem, CANDIDATES[name].model)] for name in candidates},
+        {
+            name: [case_problem.for_model(fit.problem, CANDIDATES[name].model)]
+            for name in candidates
+        },
         settings,
         {name: [stream(study.study_seed, case.name, 0, f"model {name}")] for name in candidates},
         done,
-        near={chosen: told.likelihood.best[None]},
+        near={chosen: diagnosis.likelihood.best[None]},
     )
     answers = [found[name][0] for name in candidates]
     misfits = [answer.misfit_rad for answer in answers]
-    return ModelsTried(chosen, ranked(candidates, misfits, fit.problem.residuals.samples), answers)
+    return FittedModels(chosen, ranked(candidates, misfits, fit.problem.residuals.samples), answers)
 
 
-def judged_again(
-    fit: TraceFit, told: Diagnosis, models: ModelsTried, confidence: float, noise_rad: float | None
+def judge_again(
+    fit: TraceFit,
+    diagnosis: Diagnosis,
+    models: FittedModels,
+    confidence: float,
+    noise_rad: float | None,
 ) -> tuple[Diagnosis, list[str]]:
     """Diagnose a trace again if fits of other models found a lower chi^2 within the search range.
 
     Parameters
     ----------
-    fit, told
+    fit, diagnosis
         Fit and diagnosis so far.
     models
         Fits of all models.
@@ -140,22 +147,22 @@ def judged_again(
 
     Returns
     -------
-    told
+    diagnosis
         The new diagnosis, or the one so far.
     notes
         Sentences; one if the lower chi^2 is outside the search range.
     """
     own = models.own
-    if own is None or (rise := told.likelihood.rise(own.misfit_rad)) > -MISSED:
-        return told, []
+    if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
+        return diagnosis, []
     if is_within(own.parameters, fit.problem):
         model = fit.problem.residuals.model
         return diagnose(fit.problem, model, own, confidence=confidence, noise_rad=noise_rad), []
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
-    return told, [
-        f"Outside the search range{where}, the model fits better: χ² is lower by {-rise:.3g}. The "
-        "limits hold for samples within the range."
+    return diagnosis, [
+        f"Outside the search range{where}, the model fits better: χ² is lower by {-increase:.3g}. "
+        "The limits hold for samples within the range."
     ]
 
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.design.experiment import information_of
+from biogrip.design.experiment import compute_information
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.local_fits import FAIR, LocalFits
 from biogrip.identify.multi_start import best_of_starts
@@ -54,7 +54,7 @@ class Earlier:
         return logs
 
 
-def told_by(
+def estimate_from_traces(
     problem: Problem,
     noise_rad: float,
     identify: Callable[[Problem], Identification],
@@ -110,7 +110,7 @@ def information_at(problem: Problem, noise_rad: float, log_parameters: Array) ->
     (n, n_parameters, n_parameters)
     """
     slopes = problem.residuals.condensed_responses(log_parameters)[:, 1:] / noise_rad
-    return information_of(slopes)
+    return compute_information(slopes)
 
 
 def _drawn(
@@ -123,41 +123,41 @@ def _drawn(
 ) -> Array:
     """Draw plausible log-parameters, (at most count, n_parameters)."""
     best = np.log(found.parameters)
-    held = _told_badly(information_at(problem, noise_rad, best[None])[0], problem)
-    tried = _TRIED if held.any() else count
+    fixed = _undetermined(information_at(problem, noise_rad, best[None])[0], problem)
+    tried = _TRIED if fixed.any() else count
     x = np.tile(best, (tried, 1))
-    if held.any():
+    if fixed.any():
         low, high = within
-        x[:, held] = rng.uniform(low[held], high[held], (tried, int(held.sum())))
+        x[:, fixed] = rng.uniform(low[fixed], high[fixed], (tried, int(fixed.sum())))
         fits = LocalFits([problem])
-        bounds = np.where(held, x, problem.low), np.where(held, x, problem.high)
+        bounds = np.where(fixed, x, problem.low), np.where(fixed, x, problem.high)
         trace = np.zeros(tried, dtype=np.intp)
         fitted = fits.fitted(x, trace, FAIR, low=bounds[0], high=bounds[1])
         x, misfit = fitted.x, fitted.misfit_rad
-        rise = problem.residuals.samples * (misfit**2 - misfit.min() ** 2) / noise_rad**2
-        x = x[rng.random(tried) < np.exp(-0.5 * rise)][:count]
-    free = ~held
+        increase = problem.residuals.samples * (misfit**2 - misfit.min() ** 2) / noise_rad**2
+        x = x[rng.random(tried) < np.exp(-0.5 * increase)][:count]
+    free = ~fixed
     if not free.any():
         return x
     # With R^T R the precision, R^-1 z has its inverse as covariance.
-    told = information_at(problem, noise_rad, x)[:, free][:, :, free]
-    roots = np.linalg.cholesky(told + np.eye(int(free.sum()))).swapaxes(1, 2)
+    sensitivity = information_at(problem, noise_rad, x)[:, free][:, :, free]
+    roots = np.linalg.cholesky(sensitivity + np.eye(int(free.sum()))).swapaxes(1, 2)
     z = rng.standard_normal((len(x), int(free.sum()), 1))
     x[:, free] += np.linalg.solve(roots, z)[..., 0]
     drawn: Array = np.clip(x, problem.low, problem.high)
     return drawn
 
 
-def _told_badly(information: Array, problem: Problem) -> BoolArray:
+def _undetermined(information: Array, problem: Problem) -> BoolArray:
     """Mark the worst determined parameters in turn, until the others are determined well."""
-    held = np.zeros(len(information), dtype=bool)
+    fixed = np.zeros(len(information), dtype=bool)
     # The search range acts as a prior.
     precision = information + np.diag((problem.high - problem.low) ** -2)
-    while not held.all():
-        free = np.flatnonzero(~held)
+    while not fixed.all():
+        free = np.flatnonzero(~fixed)
         variance = np.diag(np.linalg.inv(precision[np.ix_(free, free)]))
         worst = int(np.argmax(variance))
         if variance[worst] <= _BADLY**2:
             break
-        held[free[worst]] = True
-    return held
+        fixed[free[worst]] = True
+    return fixed

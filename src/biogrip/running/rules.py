@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from biogrip.products.digest import digest
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
-from biogrip.products.together import together
+from biogrip.products.rule_products import group_by_rule
 from biogrip.running.source_files import fingerprint
 
 _CONSTRAINTS = {
@@ -21,7 +21,7 @@ _CONSTRAINTS = {
 
 
 @dataclass(frozen=True)
-class Sheet:
+class Rule:
     """A Snakemake rule: products that one job makes.
 
     Parameters
@@ -135,22 +135,24 @@ class Sheet:
         return "\n\n".join(f"{p.item}: {p.caption}" for p in self.products if p.caption)
 
 
-def inputs_of(sheet: Sheet, job: Wildcards) -> list[str]:
+def inputs_of(rule: Rule, job: Wildcards) -> list[str]:
     """Return all input files of a job, sorted."""
-    return sorted({file for files in sheet.inputs(job).values() for file in files})
+    return sorted({file for files in rule.inputs(job).values() for file in files})
 
 
-def sheets_of(products: Iterable[Product], plan: Plan) -> list[Sheet]:
+def make_rules(products: Iterable[Product], plan: Plan) -> list[Rule]:
     """Return the rules of a plan, grouping products that one job makes."""
-    return [Sheet(each.rule, each.products, plan, each.jobs) for each in together(products, plan)]
+    return [
+        Rule(each.rule, each.products, plan, each.jobs) for each in group_by_rule(products, plan)
+    ]
 
 
-def files_of(sheets: Iterable[Sheet]) -> list[str]:
+def files_of(rules: Iterable[Rule]) -> list[str]:
     """Return every output file of a study; all are targets, so that lost ones are made again."""
     return [
         file
-        for sheet in sheets
-        for product in sheet.products
-        for job in sheet.jobs
+        for rule in rules
+        for product in rule.products
+        for job in rule.jobs
         for file in product.outputs(job).values()
     ]
