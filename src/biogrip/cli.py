@@ -150,6 +150,9 @@ def _identify_parser(stages: Any) -> None:
         "--posterior", action="store_true", help="also sample the posterior: some seconds per trace"
     )
     identify.add_argument(
+        "--strict", action="store_true", help="end with status 1 if a fit is rejected"
+    )
+    identify.add_argument(
         "--report", type=Path, metavar="PAGE", help="HTML page with all results and figures"
     )
     identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, one row per trace")
@@ -168,6 +171,13 @@ def _groups_parser(stages: Any) -> None:
         help="CSV file with the columns file, cell and group, one line per trace",
     )
     _trace_options(groups)
+    groups.add_argument(
+        "--exclude",
+        action="append",
+        default=[],
+        metavar="CELL",
+        help="leave a cell out of all groups; repeat for more",
+    )
     groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
 
 
@@ -258,6 +268,7 @@ def _identify(options: argparse.Namespace) -> None:
         report=options.report,
         table=options.csv,
         posterior=options.posterior,
+        strict=options.strict,
         force=options.force,
     )
 
@@ -270,6 +281,7 @@ def _groups(options: argparse.Namespace) -> None:
         options.model,
         _read_as(options),
         options.config,
+        exclude=options.exclude,
         output=options.output,
         force=options.force,
     )

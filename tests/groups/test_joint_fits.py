@@ -178,8 +178,8 @@ def test_traces_of_different_samples_are_told() -> None:
     )
     assert same.agreement is not None
     assert same.agreement > 1e-3
-    assert not any("one and the same" in note for note in same.diagnosis.notes)
-    assert any("one and the same" in note for note in other.diagnosis.notes)
+    assert not any("one and the same" in note.text for note in same.diagnosis.notes)
+    assert any("one and the same" in note.text for note in other.diagnosis.notes)
 
 
 def test_condensed_rows_have_the_sums_of_all_samples(uneven: list[Problem]) -> None:

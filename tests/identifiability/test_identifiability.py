@@ -172,7 +172,7 @@ def test_verdicts_on_the_papers_cases(case: str, verdicts: list[str]) -> None:
     diagnosis, _ = told(case)
     assert [finding.verdict for finding in diagnosis.findings] == verdicts
     pulls = case != "endothelial_cell"
-    assert ["would have to pull" in note for note in diagnosis.notes] == [True] * pulls
+    assert ["would have to pull" in note.text for note in diagnosis.notes] == [True] * pulls
     trades = [(trade.members, trade.finding.quantity.label) for trade in diagnosis.trades]
     assert trades == ([(("c", "c_p"), "c + c_p")] if case == "liquid_drop_1" else [])
     total = diagnosis.findings[-1]
@@ -220,8 +220,8 @@ def test_a_wrong_model_is_doubted() -> None:
     trace = trace + 0.01 * response.max() * np.random.default_rng(0).standard_normal(len(times))
     case_problem = posed_for(DAMPER, times, trace)
     diagnosis = diagnose(case_problem, DAMPER, run("least_squares", case_problem), confidence=0.95)
-    assert any("residuals are correlated" in note for note in diagnosis.notes)
-    assert any("times the noise of the trace" in note for note in diagnosis.notes)
+    assert any("residuals are correlated" in note.text for note in diagnosis.notes)
+    assert any("times the noise of the trace" in note.text for note in diagnosis.notes)
 
 
 @pytest.mark.parametrize(("times", "said"), [(0.5, False), (1.5, False), (2.5, True), (27, True)])
@@ -231,11 +231,11 @@ def test_a_noise_that_leaves_more_than_it_is_is_doubted(times: float, said: bool
     noise_rad = times * found.misfit_rad
     told = diagnose(case_problem, MODEL, found, confidence=0.95, noise_rad=noise_rad)
     words = f"The noise that was given is {times:.2g} times what the fit leaves"
-    assert any(note.startswith(words) for note in told.notes) == said
+    assert any(note.text.startswith(words) for note in told.notes) == said
     # Of a trace without noise nothing is left at all, whatever noise it is held against.
     exact = replace(found, misfit_rad=1e-3 * noise_rad)
     told = diagnose(case_problem, MODEL, exact, confidence=0.95, noise_rad=noise_rad)
-    assert not any("that was given" in note for note in told.notes)
+    assert not any("that was given" in note.text for note in told.notes)
 
 
 def test_the_valley_is_as_deep_along_the_sum_as_the_profile_says() -> None:

@@ -23,6 +23,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.groups.replicates import joint_problem
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.whiteness import one_in
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
@@ -98,8 +99,11 @@ def fitted_jointly(
     agreement = _agreement(problems, diagnosis.likelihood.best, noise_rad)
     if agreement < _DISAGREE:
         diagnosis.notes.append(
-            "The traces do not tell of one and the same sample (replicates of one would differ as "
-            f"much {one_in(agreement)}): the cell changed, or the intervals are too narrow."
+            Note(
+                DOUBT,
+                "The traces do not tell of one and the same sample (replicates of one would differ "
+                f"as much {one_in(agreement)}): the cell changed, or the intervals are too narrow.",
+            )
         )
     return JointFit(diagnosis, tuple(levels), agreement)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
+from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTION, Note, compute_status
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, find_trade_offs
@@ -38,14 +39,19 @@ class Diagnosis:
     grip
         Force of the jaws on the sample of the best fit.
     notes
-        Doubts about the result, in sentences.
+        Notes on the result, with weights.
     """
 
     likelihood: Likelihood
     findings: list[Finding]
     trades: list[Trade]
     grip: Grip
-    notes: list[str]
+    notes: list[Note]
+
+    @property
+    def status(self) -> str:
+        """Status of the fit by these notes: ok, doubtful or rejected."""
+        return compute_status(self.notes)
 
 
 def diagnose(
@@ -94,51 +100,64 @@ def diagnose(
         found = missed
     grip = problem.residuals.grip(likelihood.best)
     notes = [
-        f"The confidence set of {finding.quantity.label} has {1 + len(finding.gaps)} separate "
-        "parts; the limits are the outermost ones."
+        Note(
+            HARMLESS,
+            f"The confidence set of {finding.quantity.label} has {1 + len(finding.gaps)} separate "
+            "parts; the limits are the outermost ones.",
+        )
         for finding in findings
         if finding.gaps
     ]
     notes += [*_noise(likelihood), *_pulling(grip, problem.residuals.duration_s)]
     if not found.converged:
         notes.append(
-            "The fit has not converged to its last digits: further Newton steps increase "
-            "chi-squared. Rely on its verdicts, not on its digits."
+            Note(
+                DOUBT,
+                "The fit has not converged to its last digits: further Newton steps increase "
+                "chi-squared. Rely on its verdicts, not on its digits.",
+            )
         )
     return Diagnosis(likelihood, findings, trades, grip, notes)
 
 
-def _pulling(grip: Grip, last_s: float) -> Iterator[str]:
-    """Yield a doubt if, with the best fit, the jaws would have to pull at the sample."""
+def _pulling(grip: Grip, last_s: float) -> Iterator[Note]:
+    """Yield a note if, with the best fit, the jaws would have to pull at the sample.
+
+    A loss of contact would show in the misfit: with a good fit the sample stuck.
+    """
     if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
-        yield (
+        yield Note(
+            HARMLESS,
             f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
-            "there: fit only the samples before that."
+            "there: fit only the samples before that.",
         )
 
 
-def _noise(likelihood: Likelihood) -> Iterator[str]:
+def _noise(likelihood: Likelihood) -> Iterator[Note]:
     """Yield doubts about the residuals and about the noise that was given."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return
     doubts = list(doubts_about_noise(residuals.left(likelihood.best)))
-    yield from doubts
+    yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
-        yield (
-            "Intervals that allow for such noise are those of measurement.noise_model: coloured, "
-            "or --noise-model coloured."
+        yield Note(
+            HARMLESS,
+            "If the set-up is right, measurement.noise_model: coloured, or --noise-model coloured, "
+            "gives intervals that allow for such noise.",
         )
     if _too_little(likelihood):
-        yield (
+        yield Note(
+            DOUBT,
             f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
-            "fit leaves: its value, or its unit, is not the right one."
+            "fit leaves: its value, or its unit, is not the right one.",
         )
     scale = residuals.noise_scale_rad
     if misfit_rad > _TOO_MUCH * scale:
-        yield (
+        yield Note(
+            REJECTION,
             f"The misfit is {misfit_rad / scale:.2g} times the noise of the trace: the model, the "
-            "protocol, the gripper or the unit is not the right one."
+            "protocol, the gripper or the unit is not the right one.",
         )
 
 

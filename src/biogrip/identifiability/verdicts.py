@@ -95,6 +95,11 @@ class Finding:
         return "not determined: the trace fits with any value"
 
     @property
+    def best_in_words(self) -> str:
+        """Best estimate with its unit."""
+        return f"{self.value:.3g}{self._unit}"
+
+    @property
     def _unit(self) -> str:
         return f" {self.quantity.unit}" if self.quantity.unit else ""
 

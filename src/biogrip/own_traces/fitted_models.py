@@ -10,6 +10,7 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identify.answer import Identification
 from biogrip.identify.least_squares import LeastSquaresSettings
@@ -133,7 +134,7 @@ def judge_again(
     models: FittedModels,
     confidence: float,
     noise_rad: float | None,
-) -> tuple[Diagnosis, list[str]]:
+) -> tuple[Diagnosis, list[Note]]:
     """Diagnose a trace again if fits of other models found a lower chi^2 within the search range.
 
     Parameters
@@ -150,7 +151,7 @@ def judge_again(
     diagnosis
         The new diagnosis, or the one so far.
     notes
-        Sentences; one if the lower chi^2 is outside the search range.
+        Notes; one if the lower chi^2 is outside the search range.
     """
     own = models.own
     if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
@@ -160,10 +161,11 @@ def judge_again(
         return diagnose(fit.problem, model, own, confidence=confidence, noise_rad=noise_rad), []
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
-    return diagnosis, [
+    text = (
         f"Outside the search range{where}, the model fits better: χ² is lower by {-increase:.3g}. "
         "The limits hold for samples within the range."
-    ]
+    )
+    return diagnosis, [Note(DOUBT, text)]
 
 
 def _power_laws(duration_s: float) -> list[str]:

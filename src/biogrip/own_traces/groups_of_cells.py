@@ -14,7 +14,7 @@ from tabulate import tabulate
 from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import rounded_numbers
-from biogrip.errors import BiogripError
+from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
 from biogrip.groups.cell_table import Cell, read_cells
@@ -28,6 +28,7 @@ from biogrip.groups.group_findings import (
 )
 from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.groups.population import FEWEST_CELLS
+from biogrip.identifiability.fit_status import DOUBTFUL, OK, REJECTED, Note
 from biogrip.identify.answer import Identification
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
@@ -43,11 +44,12 @@ from biogrip.terminal import visible, visible_lines
 
 @dataclass(frozen=True)
 class _TraceProblem:
-    """A recorded trace that can be used, its fit problem and the settings of the fit."""
+    """A usable recorded trace: its fit problem, the settings of the fit, and notes on its noise."""
 
     trace: Path
     problem: Problem
     settings: judgement.Settings
+    notes: list[Note]
 
 
 def groups(
@@ -56,6 +58,7 @@ def groups(
     read_as: ReadAs,
     config: Path | None,
     *,
+    exclude: Sequence[str],
     output: Path | None,
     force: bool,
 ) -> int:
@@ -67,6 +70,8 @@ def groups(
         CSV file, see `read_cells`.
     model, read_as, config
         Fields of `IdentifyOptions`.
+    exclude
+        Names of cells to leave out.
     output
         JSON file. By default it is beside the table.
     force
@@ -84,7 +89,7 @@ def groups(
     """
     if problem := trace_file_problem(table):
         raise BiogripError(f"TABLE: {problem}")
-    cells = read_cells(table)
+    cells = _without(read_cells(table), exclude)
     written = output or table.with_suffix(".compared.json")
     traces = [trace for cell in cells for trace in cell.traces]
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
@@ -133,6 +138,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
                 confidence=confidence,
                 noise_rad=case_problem.noise_rad,
             )
+            fit.diagnosis.notes.extend(note for each in usable for note in each.notes)
             judged.append(JudgedCell(cell.name, cell.group, fit))
             data.append(
                 {
@@ -154,7 +160,16 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         )
     # The reference group is the first in the table, even if none of its traces can be used.
     names = list(dict.fromkeys(cell.group for cell in cells))
-    findings = findings_of_groups(judged, names, confidence)
+    status = {cell.name: cell.fit.diagnosis.status for cell in judged}
+    kept = [cell for cell in judged if status[cell.name] != REJECTED]
+    if not kept:
+        raise BiogripError(
+            f"{visible(options.trace)}: the fits of all cells are rejected; the first: "
+            f"{data[0]['reasons'][0]}"
+        )
+    findings = findings_of_groups(kept, names, confidence)
+    certain = [cell for cell in kept if status[cell.name] == OK]
+    without = findings_of_groups(certain, names, confidence) if certain else []
     found = {
         WRITTEN_BY: __version__,
         "table": str(options.trace),
@@ -164,6 +179,11 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
+        "rejected": [name for name, own in status.items() if own == REJECTED],
+        "doubtful": [name for name, own in status.items() if own == DOUBTFUL],
+        "differences_without_doubtful": [
+            _difference_data(each) for each in differences_of_groups(without)
+        ],
         "skipped": traces.skipped,
     }
     write_text(output, json.dumps(rounded_numbers(found), indent=1) + "\n")
@@ -177,6 +197,8 @@ def in_words(found: dict[str, Any]) -> str:
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
+    if found["rejected"]:
+        parts.append(f"Left out, as their fits are rejected: {', '.join(found['rejected'])}.")
     if found["differences"]:
         parts.append(_differences_in_words(found["differences"], percent))
     elif len({row["group"] for row in found["groups"]}) > 1:
@@ -184,8 +206,33 @@ def in_words(found: dict[str, Any]) -> str:
             f"No quantity is determined in {FEWEST_CELLS} cells or more of two groups: "
             "nothing is compared."
         )
+    if found["doubtful"]:
+        names = ", ".join(found["doubtful"])
+        rows = found["differences_without_doubtful"]
+        compared = _differences_in_words(rows, percent) if rows else "too few cells to compare."
+        parts.append(f"Without the cells whose fits are doubtful, {names}:\n{compared}")
     parts += [f"Skipped: {each['reason']}" for each in found["skipped"]]
     return "\n\n".join(parts)
+
+
+def _without(cells: list[Cell], exclude: Sequence[str]) -> list[Cell]:
+    """Return the cells without some, which must be there and not be all.
+
+    Raises
+    ------
+    BiogripError
+        With the nearest name if there is no such cell.
+    """
+    names = [cell.name for cell in cells]
+    for name in exclude:
+        if name not in names:
+            raise BiogripError(
+                f"--exclude: found '{name}'.{nearest(name, names)} Allowed: {', '.join(names)}."
+            )
+    kept = [cell for cell in cells if cell.name not in exclude]
+    if not kept:
+        raise BiogripError("--exclude: found all cells, allowed is to keep one at least.")
+    return kept
 
 
 class _Traces:
@@ -223,11 +270,13 @@ class _Traces:
             )
         settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)
+        notes: list[Note] = []
         if case.problem.coloured:
             # All cells share one gripper: its calibration error is common to them, not noise.
             assumed = replace(case.problem, uncertainty={})
-            problem = settings.fit(assumed, recorded.time_s, rotation_rad, 0).problem
-        return _TraceProblem(trace, problem, settings)
+            fit = settings.fit(assumed, recorded.time_s, rotation_rad, 0)
+            problem, notes = fit.problem, judgement.notes_on_fit(fit)
+        return _TraceProblem(trace, problem, settings, notes)
 
 
 def _identify(
@@ -309,13 +358,13 @@ def _difference_data(each: GroupDifference) -> dict[str, Any]:
 
 def _cell_in_words(cell: dict[str, Any]) -> str:
     width = max(len(item["quantity"]) for item in cell["quantities"])
-    lines = [f"{cell['cell']} ({cell['group']})"]
+    lines = [f"{cell['cell']} ({cell['group']}): fit {cell['fit']}"]
     lines += [
         f"  {Path(trace['file']).name}: noise {trace['noise_rad']:.3g} rad"
         for trace in cell["traces"]
     ]
     lines += [f"  {item['quantity']:<{width}}  {item['in_words']}" for item in cell["quantities"]]
-    lines += [f"  Note: {note}" for note in cell["notes"]]
+    lines += [f"  {note['weight'].capitalize()}: {note['text']}" for note in cell["notes"]]
     return "\n".join(lines)
 
 

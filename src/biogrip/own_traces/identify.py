@@ -5,6 +5,7 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
+from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.many_traces import Outcome, identify_traces, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file, study_of
 from biogrip.own_traces.outputs import SAMPLES, check_output
@@ -24,6 +25,7 @@ def identify(
     report: Path | None,
     table: Path | None,
     posterior: bool,
+    strict: bool,
     force: bool,
 ) -> int:
     """Identify traces, write the results, and print them.
@@ -40,13 +42,15 @@ def identify(
         HTML and CSV file to write, if any.
     posterior
         Field of `IdentifyOptions`.
+    strict
+        If true, a rejected fit counts as a failure.
     force
         If true, replace even files that biogrip did not write.
 
     Returns
     -------
     int
-        1 if any of several traces could not be used.
+        1 if any of several traces could not be used, or with `strict` if a fit is rejected.
 
     Raises
     ------
@@ -92,7 +96,8 @@ def identify(
     said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     print(f"Written to {', '.join(map(visible, said))}.")
-    return 1 if outcome.refused else 0
+    rejected = strict and any(each["fit"] == REJECTED for each in outcome.found)
+    return 1 if outcome.refused or rejected else 0
 
 
 def _of_many(outcome: Outcome) -> str:

@@ -68,18 +68,19 @@ def identify_traces(
 def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV."""
     quantities = labels_of(outcome.found)
-    columns = ["trace", "problem", "model", "samples", "noise_rad", "misfit_rad"]
+    columns = ["trace", "problem", "fit", "model", "samples", "noise_rad", "misfit_rad"]
     columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
     rows = [
         (
             each["trace"],
             "",
+            each["fit"],
             each["model"],
             each["samples"],
             each["noise_rad"],
             each["misfit_rad"],
             *_of_quantities(each, quantities),
-            " ".join(each["notes"]),
+            " ".join(each["reasons"]),
             each["advice"] or "",
             each[WRITTEN_BY],
         )
@@ -88,7 +89,7 @@ def write_table(outcome: Outcome, table: Path) -> None:
     rows += [
         (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in outcome.refused.items()
     ]
-    write_rows(table, (*columns, "doubts", "advice", WRITTEN_BY), rows)
+    write_rows(table, (*columns, "reasons", "advice", WRITTEN_BY), rows)
 
 
 def _of_quantities(found: Mapping[str, Any], quantities: Iterable[str]) -> list[object]:

@@ -16,6 +16,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identifiability.fit_status import HARMLESS, Note
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
 from biogrip.own_traces.fitted_models import judge_again, models_tried
@@ -127,7 +128,8 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         progress.done()
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
-        said = exact_data(diagnosis)
+        gaps = [Note(HARMLESS, text) for text in recording.notes_on_gaps(recorded)]
+        said = exact_data(diagnosis, [*gaps, *judgement.notes_on_fit(fit), *doubts])
         data = {
             WRITTEN_BY: __version__,
             "trace": str(options.trace),
@@ -136,7 +138,6 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             "confidence": confidence,
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
-            "notes": [*recording.notes_on_gaps(recorded), *fit.notes(), *said["notes"], *doubts],
             "noise_model": fit.noise_data(),
             **models.data(),
             "assumed": assumed(case),

@@ -7,6 +7,7 @@ from scipy.special import chdtrc
 
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.fit_status import DOUBT, HARMLESS, Note
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Progress
@@ -18,7 +19,7 @@ from biogrip.study.study import Case, Study
 
 def second_opinion(
     study: Study, case: Case, recorded: Measurements, diagnosis: Diagnosis, progress: Progress
-) -> list[str]:
+) -> list[Note]:
     """Fit an offset and a drift along, and return a warning if they lower chi^2 significantly.
 
     The test is a likelihood ratio: if neither is in the trace, the decrease of chi^2 follows a
@@ -36,8 +37,8 @@ def second_opinion(
 
     Returns
     -------
-    list of str
-        At most one sentence. Empty if both terms are declared already, or the model is nonlinear.
+    list of Note
+        At most one. Empty if both terms are declared already, or the model is nonlinear.
     """
     case_problem = case.problem
     added = 2 - case_problem.offset - case_problem.drift
@@ -64,16 +65,18 @@ def second_opinion(
         problem, also.searched, found, confidence=case.confidence, noise_rad=case_problem.noise_rad
     )
     changed = [
-        f"{after.quantity.label} would be {after.words()}"
+        f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
         for before, after in zip(diagnosis.findings, other.findings, strict=True)
         if _differ(before, after)
     ]
-    return [
+    text = (
         "An offset and a drift of the instrument, fitted along, explain the trace far better "
         f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} "
         f"traces): {'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, "
-        "identify the trace with --offset --drift."
-    ]
+        "identify the trace with --offset --drift. If the sample flows, it may be its flow: under "
+        "a constant torque a drift and a damper without a spring give the same line."
+    )
+    return [Note(DOUBT if changed else HARMLESS, text)]
 
 
 def fall_of(

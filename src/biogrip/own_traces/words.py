@@ -16,20 +16,29 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
+from biogrip.products.files.verdicts import FIT_REJECTED
 from biogrip.terminal import visible, visible_lines
 
 STRONG = 3.0
 """Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
 
-_COLOURS = {DETERMINED: 32, BOUNDED_ABOVE: 33, BOUNDED_BELOW: 33, NOT_DETERMINED: 31}
+_COLOURS = {
+    DETERMINED: 32,
+    BOUNDED_ABOVE: 33,
+    BOUNDED_BELOW: 33,
+    NOT_DETERMINED: 31,
+    FIT_REJECTED: 90,
+}
 
 
 def in_words(found: Mapping[str, Any]) -> str:
     """Return the result of `identify_trace` for one trace as plain text."""
     width = max(len(item["quantity"]) for item in found["quantities"])
     lines = [
-        f"{visible(found['trace'])}: {found['samples']} samples, "
-        f"noise {found['noise_rad']:.3g} rad, misfit {found['misfit_rad']:.3g} rad",
+        f"{visible(found['trace'])}: fit {found['fit']}",
+        *(f"  {visible(reason)}" for reason in found["reasons"]),
+        f"{found['samples']} samples, scatter of neighbours {found['scatter_rad']:.3g} rad, "
+        f"misfit {found['misfit_rad']:.3g} rad",
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
             f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
@@ -44,11 +53,16 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
     if "drift_rad_per_s" in found:
         lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
-    lines += [f"Note: {visible(note)}" for note in found["notes"]]
+    lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def further_notes(found: Mapping[str, Any]) -> list[str]:
+    """Return the texts of the notes that are no reasons for the fit's status."""
+    return [note["text"] for note in found["notes"] if note["text"] not in found["reasons"]]
 
 
 def _posterior(posterior: Mapping[str, Any]) -> list[str]:
@@ -90,15 +104,17 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
     lines = []
     if found:
         labels = labels_of(found)
-        rows = [[visible(each["trace"]), *_cells(each, labels), _doubts(each)] for each in found]
+        rows = [[visible(each["trace"]), each["fit"], *_cells(each, labels)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
-        header = ["trace", *(with_unit(label, units[label]) for label in labels), "doubts"]
+        header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
         lines += [f"Sums hold provided {words}." for words in provided]
         lines += [
-            f"{visible(each['trace'])}: {visible(note)}" for each in found for note in each["notes"]
+            f"{visible(each['trace'])}: {note['weight']}: {visible(note['text'])}"
+            for each in found
+            for note in each["notes"]
         ]
         lines += [taken_for_granted(found[0])] if found[0]["by_default"] else []
     if refused:
@@ -142,15 +158,13 @@ def _cells(found: Mapping[str, Any], labels: Sequence[str]) -> list[str]:
 def limits_in_short(quantity: Mapping[str, Any]) -> str:
     """Return value and limits of a quantity in a few characters."""
     low, high = quantity["low"], quantity["high"]
+    if quantity["verdict"] == FIT_REJECTED:
+        return "rejected"
     if low is not None and high is not None:
         return f"{quantity['value']:.3g} ({low:.3g} to {high:.3g})"
     if low is not None:
         return f"≥ {low:.2g}"
     return "?" if high is None else f"≤ {high:.2g}"
-
-
-def _doubts(found: Mapping[str, Any]) -> str:
-    return str(len(found["notes"])) if found["notes"] else ""
 
 
 def _coloured(text: str, verdict: str) -> str:

@@ -72,7 +72,8 @@ def test_every_tenth_seed_is_judged_in_full(tmp_path: Path, target: Path) -> Non
     study = study_of(OVERLAY)
     expected = tmp_path / "expected.json"
     expected.write_text(
-        '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": []}'
+        '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '
+        '"fit": "ok"}'
     )
     chosen = stage.settings(study, {"case": CASE})
     stage.estimate(chosen, range(9, 12), target, expected, [], tmp_path / "i.csv")

@@ -115,6 +115,7 @@ cases:
 def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     item = {"unit": "N/m", "value": 2.0, "low": 1.0, "high": 3.0, "excluded": [[1.5, 1.8]]}
     measured: dict[str, Any] = {
+        "fit": "ok",
         "confidence": 0.9,
         "quantities": [
             {**item, "quantity": "k", "verdict": "determined"},

@@ -1,5 +1,6 @@
 """Diagnoses as plain data and JSON files."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,38 +11,55 @@ from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
     from biogrip.identifiability.diagnosis import Diagnosis
+    from biogrip.identifiability.fit_status import Note
     from biogrip.identifiability.verdicts import Finding
 
 PATH = "results/identifiability/{case}.json"
+FIT_REJECTED = "fit rejected"
+"""Verdict on every quantity of a fit that is rejected."""
+
 EXPECTED = "results/identifiability/expected/{case}.json"
 
 
-def diagnosis_data(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return a diagnosis as plain data in SI units, rounded."""
-    data: dict[str, Any] = rounded_numbers(exact_data(diagnosis))
+def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence["Note"] = ()) -> dict[str, Any]:
+    """Return a diagnosis and further notes as plain data in SI units, rounded."""
+    data: dict[str, Any] = rounded_numbers(exact_data(diagnosis, notes))
     return data
 
 
-def exact_data(diagnosis: "Diagnosis") -> dict[str, Any]:
-    """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded."""
+def exact_data(diagnosis: "Diagnosis", notes: Sequence["Note"] = ()) -> dict[str, Any]:
+    """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded.
+
+    A rejected fit determines nothing: its quantities have the best fit as value, no limits, and
+    the verdict `FIT_REJECTED`.
+    """
+    from biogrip.identifiability.fit_status import REJECTED, compute_status, order_notes
+
     likelihood = diagnosis.likelihood
+    ordered = order_notes([*diagnosis.notes, *notes])
+    status = compute_status(ordered)
+    rejected = status == REJECTED
+    heaviest = ordered[0].weight if ordered and status != "ok" else None
     return {
+        "fit": status,
+        "reasons": [note.text for note in ordered if note.weight == heaviest],
         "samples": likelihood.problem.residuals.samples,
         "misfit_rad": likelihood.misfit_rad,
         "noise_rad": likelihood.noise_rad,
+        "scatter_rad": likelihood.problem.residuals.noise_scale_rad,
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
-        "quantities": [_finding(finding) for finding in diagnosis.findings],
+        "quantities": [_finding(each, rejected=rejected) for each in diagnosis.findings],
         "trades": [
             {
                 "members": list(trade.members),
                 "words": trade.words(),
-                **_finding(trade.finding),
+                **_finding(trade.finding, rejected=False),
             }
-            for trade in diagnosis.trades
+            for trade in ([] if rejected else diagnosis.trades)
         ],
         "jaw_force": dict(vars(diagnosis.grip)),
-        "notes": diagnosis.notes,
+        "notes": [dict(vars(note)) for note in ordered],
     }
 
 
@@ -53,7 +71,9 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     BiogripError
         If the file is missing or invalid.
     """
-    return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
+    return read_object(
+        path, "verdicts", {"fit", "quantities", "trades", "notes"}, "holds no verdicts"
+    )
 
 
 def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
@@ -61,22 +81,26 @@ def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:
     return {q["quantity"] for q in verdicts["quantities"] if q["verdict"] != "bounded above"}
 
 
-def _finding(finding: "Finding") -> dict[str, Any]:
+def _finding(finding: "Finding", *, rejected: bool) -> dict[str, Any]:
     profile = finding.profile
     return {
         "quantity": finding.quantity.label,
         "symbol": finding.quantity.symbol,
         "unit": finding.quantity.unit,
-        "verdict": finding.verdict,
+        "verdict": FIT_REJECTED if rejected else finding.verdict,
         "value": finding.value,
-        "low": finding.low,
-        "high": finding.high,
-        "excluded": [[start, end] for start, end in finding.gaps],
+        "low": None if rejected else finding.low,
+        "high": None if rejected else finding.high,
+        "excluded": [] if rejected else [[start, end] for start, end in finding.gaps],
         "deviation": finding.deviation,
         "provided": finding.quantity.provided,
-        "in_words": finding.words(),
+        "in_words": _rejected_in_words(finding) if rejected else finding.words(),
         "profile": {
             "values": [float(value) for value in np.exp(profile.log_values)],
             "increases": [round_increase(float(increase)) for increase in profile.increases],
         },
     }
+
+
+def _rejected_in_words(finding: "Finding") -> str:
+    return f"fit rejected: the best fit, {finding.best_in_words}, is not to be used"

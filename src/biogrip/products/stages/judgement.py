@@ -11,6 +11,7 @@ from biogrip.experiment.noise import Noise, rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.fit_status import HARMLESS, REJECTION, Note
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identifiability.valley import compute_valley
 from biogrip.identify.answer import Identification, Progress, silent
@@ -128,17 +129,23 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     recorded = read_measurements(measurements, [TRACE])
     fit = settings.fit(case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, settings.confidence)
-    said = diagnosis_data(diagnosis)
+    said = diagnosis_data(diagnosis, notes_on_fit(fit))
     data = {
         "case": settings.case,
         "model": case_problem.model.name,
         "confidence": settings.confidence,
         **said,
-        "notes": [*fit.notes(), *said["notes"]],
         "noise_model": fit.noise_data(),
         "valley": valley,
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
+
+
+def notes_on_fit(fit: TraceFit) -> list[Note]:
+    """Return notes on the noise model of a fit; one that holds misfit rejects the fit."""
+    swallowed = fit.swallowed()
+    rejected = [Note(REJECTION, swallowed)] if swallowed else []
+    return [*rejected, *(Note(HARMLESS, text) for text in fit.notes())]
 
 
 def _diagnosed(

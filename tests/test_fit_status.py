@@ -1,0 +1,130 @@
+"""Fits that are rejected determine nothing, and right set-ups are ok."""
+
+import csv
+import json
+from contextlib import redirect_stdout
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.cli import main
+from biogrip.experiment.protocol import hold, torque_history
+from biogrip.experiment.sample import MODELS
+from biogrip.identifiability.fit_status import (
+    DOUBT,
+    DOUBTFUL,
+    HARMLESS,
+    OK,
+    REJECTED,
+    REJECTION,
+    Note,
+    compute_status,
+    order_notes,
+)
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.problems import GRIPPER
+
+FEW = "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: []}\n"
+TIMES = np.arange(0.0, 400.0, 0.5)
+SAMPLE = [20.0, 5.0, 300.0]
+
+
+def response(step_s: float = 200.0) -> Array:
+    """The rotation under the default protocol, but for the time of its step."""
+    torque = torque_history((hold(step_s, 1.6e-9), hold(400.0 - step_s, 0.32e-9)))
+    network = MODELS["liquid_drop"].network([SAMPLE])
+    return rotation(step_response(GRIPPER, network), torque, TIMES)[0]
+
+
+RIGHT = response()
+SIGMA = 0.02 * float(np.sqrt(np.mean(RIGHT**2)))
+# The torque comes 5 % of the trace late; a step 10 % late; five standard deviations from 260 s on.
+WRONG = {
+    "late torque": np.concatenate((np.zeros(40), RIGHT[:-40])),
+    "late step": response(220.0),
+    "jump": RIGHT + 5 * SIGMA * (TIMES > 260.0),
+}
+
+
+def written(path: Path, clean: Array, seed: int) -> Path:
+    noise = SIGMA * np.random.default_rng(seed).standard_normal(len(TIMES))
+    np.savetxt(
+        path, np.c_[TIMES, clean + noise], "%.9g", ",", header="time_s,rotation_rad", comments=""
+    )
+    return path
+
+
+def command(*arguments: object) -> tuple[int, str]:
+    with redirect_stdout(StringIO()) as said:
+        status = main([*map(str, arguments)])
+    return status, said.getvalue()
+
+
+def test_the_heaviest_note_decides() -> None:
+    light, middle, heavy = (Note(weight, weight) for weight in (HARMLESS, DOUBT, REJECTION))
+    assert compute_status([]) == compute_status([light]) == OK
+    assert compute_status([light, middle]) == DOUBTFUL
+    assert compute_status([middle, heavy, light]) == REJECTED
+    assert order_notes([light, heavy, middle]) == [heavy, middle, light]
+
+
+@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+@pytest.mark.parametrize("wrong", WRONG)
+def test_a_wrong_set_up_determines_nothing(tmp_path: Path, wrong: str, noise_model: str) -> None:
+    (tmp_path / "few.yaml").write_text(FEW)
+    trace, found, table = (tmp_path / name for name in ("t.csv", "t.json", "table.csv"))
+    written(trace, WRONG[wrong], 0)
+    options = ["--config", tmp_path / "few.yaml", "--noise-model", noise_model, "--output", found]
+    status, said = command("identify", trace, "--strict", "--csv", table, *options)
+    data = json.loads(found.read_text())
+    assert status == 1
+    assert f"{trace}: fit rejected" in said.splitlines()
+    assert "determined:" not in said
+    assert data["fit"] == REJECTED
+    assert data["reasons"][0] in said
+    assert {item["verdict"] for item in data["quantities"]} == {"fit rejected"}
+    assert all(item["low"] is item["high"] is None for item in data["quantities"])
+    assert data["trades"] == []
+    with table.open(newline="") as rows:
+        assert [row["fit"] for row in csv.DictReader(rows)] == [REJECTED]
+    assert command("identify", trace, "--force", *options)[0] == 0
+
+
+@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+def test_a_right_set_up_is_ok(tmp_path: Path, noise_model: str) -> None:
+    (tmp_path / "few.yaml").write_text(FEW)
+    traces = [written(tmp_path / f"{seed}.csv", RIGHT, seed) for seed in range(5)]
+    options = ["--config", tmp_path / "few.yaml", "--noise-model", noise_model, "--strict"]
+    assert command("identify", *traces, *options)[0] == 0
+    found = [json.loads(trace.with_suffix(".identified.json").read_text()) for trace in traces]
+    assert [each["fit"] for each in found] == [OK] * len(traces)
+
+
+def test_groups_leave_rejected_cells_out_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "few.yaml").write_text(FEW)
+    rows = ["file,cell,group"]
+    for seed in range(7):
+        clean = WRONG["late step"] if seed == 6 else RIGHT * (1 + 0.02 * (seed % 3))
+        name = written(tmp_path / f"{seed}.csv", clean, seed).name
+        rows.append(f"{name},cell {seed},{'one' if seed % 2 else 'other'}")
+    table = tmp_path / "groups.csv"
+    table.write_text("\n".join(rows) + "\n")
+    options = ["--config", tmp_path / "few.yaml", "--output", tmp_path / "found.json", "--force"]
+    status, said = command("groups", table, *options)
+    data = json.loads((tmp_path / "found.json").read_text())
+    assert status == 0
+    assert data["rejected"] == ["cell 6"]
+    assert "Left out, as their fits are rejected: cell 6." in said
+    counted = {name for row in data["groups"] for name in row["not_determined"]}
+    counted |= {cell["cell"] for row in data["groups"] for cell in row["determined"]}
+    assert counted == {f"cell {seed}" for seed in range(6)}
+    _, said = command("groups", table, "--exclude", "cell 6", "--exclude", "cell 5", *options)
+    assert "cell 5" not in said
+    assert "Left out, as their fits" not in said
+    assert command("groups", table, "--exclude", "cell6", *options)[0] == 1
+    assert "--exclude: found 'cell6'. Did you mean 'cell 6'?" in capsys.readouterr().err
