@@ -25,7 +25,8 @@ from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages import judgement, posterior, recording
+from biogrip.products.stages import posterior, recording
+from biogrip.products.stages.judgement import fit_judged
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
@@ -104,9 +105,9 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         recorded = options.read_as.read(options.trace, case.gripper, case.problem)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
-        settings, case_problem = judgement.settings_of(study, case), case.problem
-        fit = settings.fit(
-            case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
+        case_problem = case.problem
+        fit = fit_judged(
+            case, case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
         )
         progress.done()
         progress.doing("finding confidence limits")
@@ -148,7 +149,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             progress.done()
             progress.doing("sampling the posterior")
             data["posterior"], drawn = posterior.posterior_of_trace(
-                posterior.settings_of(study, case),
+                case,
                 case_problem,
                 partial(case_problem.for_model, fit.problem),
                 limits_in(said),
