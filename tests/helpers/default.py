@@ -6,6 +6,7 @@ from typing import Any
 import yaml
 
 from biogrip.products.plan import Plan
+from biogrip.products.uses import Used
 from biogrip.study.load import load_study
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Study
@@ -21,6 +22,11 @@ def study_of(overlay: str = "") -> Study:
 def plan_of(overlay: str = "") -> Plan:
     """Its jobs where nothing is done yet."""
     return Plan(study_of(overlay), Path("nowhere"))
+
+
+def seen(**values: object) -> Any:
+    """What a product sees of a study or a case, made up."""
+    return Used(values)
 
 
 STUDY = study_of()

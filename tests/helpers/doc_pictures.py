@@ -20,7 +20,7 @@ from biogrip.arrays import Array
 from biogrip.cli import main as command
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
-from biogrip.products.figures.profiles import Settings, draw_profiles
+from biogrip.products.figures.profiles import draw_profiles
 from biogrip.products.figures.style import (
     BLUE,
     FITTED,
@@ -114,7 +114,7 @@ def identified() -> dict[str, Any]:
 
 def example_profiles() -> Figure:
     """Profiles of the example trace."""
-    return draw_profiles(Settings("data/example_trace.csv", {}), identified())
+    return draw_profiles("data/example_trace.csv", {}, identified())
 
 
 def example_fit() -> Figure:

@@ -164,9 +164,11 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import COLUMN_IN, figure
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import of_cases
+from biogrip.products.uses import simulated
+from biogrip.study.study import Study
 
 
-def draw(settings: None, targets: list[Path]) -> Figure:
+def draw(_: Study, targets: list[Path]) -> Figure:
     """Draw the largest rotation of every case."""
     drawn = figure(COLUMN_IN, 2)
     highest = [read_target(target)[2].max() for target in targets]
@@ -178,8 +180,7 @@ HEIGHTS = drawing(
     draw,
     name="heights",
     caption="How high every case rises, side by side.",
-    settings=lambda study: None,
-    reads={"targets": of_cases(TARGETS, lambda study: study.simulated)},
+    reads={"targets": of_cases(TARGETS, simulated)},
     sheet="study_figures",
 )
 '''
@@ -190,22 +191,16 @@ TABLE = Recipe(
     new={
         "products/tables/noise_levels.py": '''"""How noisy the cases' traces are."""
 
-from collections.abc import Mapping
-
-from biogrip.experiment.noise import Noise
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.study.study import Study
 
 
-def settings(study: Study) -> dict[str, Noise]:
-    """Choose the noise of every case."""
-    return {name: study.cases[name].noise for name in study.simulated}
-
-
-def levels(noises: Mapping[str, Noise]) -> Table:
+def levels(study: Study) -> Table:
     """List kind and level of the cases' noise."""
     columns = (Column("case", "Case"), Column("kind", "Kind"), Column("level", "Level"))
+    noises = {name: case.noise for name, case in study.cases.items()}
     return Table(
         "Noise of the cases.", columns, [(name, n.kind, n.level) for name, n in noises.items()]
     )
@@ -216,7 +211,7 @@ NOISE_LEVELS = table(
     name="noise_levels",
     item="noise",
     caption="Kind and level of the noise of every case.",
-    settings=settings,
+    uses=from_study(cases=each(simulated, "noise")),
     sheet="tables",
 )
 '''

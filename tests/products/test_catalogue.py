@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -21,9 +21,10 @@ from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
 from biogrip.products.product import Product
 from biogrip.products.report import page
+from biogrip.products.uses import Used, using
 from biogrip.running.rules import Rule, files_of, make_rules
 from biogrip.study.source import overlaid, read_config
-from tests.helpers.default import plan_of
+from tests.helpers.default import STUDY, plan_of
 from tests.helpers.places import ROOT
 
 EVERYTHING = """
@@ -114,6 +115,14 @@ def test_the_sheets_make_every_job_of_every_product_once(everything: list[Rule])
         assert sorted(made, key=str) == sorted(map(dict, product.jobs(plan)), key=str), product.name
 
 
+def test_a_table_or_figure_is_named_as_its_file() -> None:
+    """With what it is of, or that it is a figure, where another has the file's name."""
+    for product in products().values():
+        if product.category in ("Tables", "Figures"):
+            stem = Path(product.writes.get("csv") or product.writes["png"]).stem.split("_{")[0]
+            assert product.name in (stem, f"{stem}_of_case", f"{stem}_figure")
+
+
 def test_the_page_names_the_rule_that_makes_each_file(everything: list[Rule]) -> None:
     """Cases have not all the same figures, so there are several rules of a sheet."""
     rules = {
@@ -122,7 +131,7 @@ def test_the_page_names_the_rule_that_makes_each_file(everything: list[Rule]) ->
         for job in rule.jobs
         for pattern in rule.outputs.values()
     }
-    shown = page.settings(everything[0].plan.study, {})
+    shown = page.content(everything[0].plan.study, {})
     entries = (*shown.figures, *shown.tables)
     assert {entry.file: entry.rule for entry in entries} == {e.file: rules[e.file] for e in entries}
     assert {"case_figures", "case_figures_2"} < {entry.rule for entry in entries}
@@ -157,6 +166,8 @@ def changed(value: Any) -> Iterator[Any]:
             if field.init:
                 for other in changed(getattr(value, field.name)):
                     yield replace(value, **{field.name: other})
+    elif isinstance(value, Used):
+        yield from (Used(other) for other in changed(vars(value)))
     elif isinstance(value, Mapping):
         # Where there are many they are all alike.
         for key, inner in islice(value.items(), 5):
@@ -193,22 +204,25 @@ def test_a_digest_changes_with_every_setting(everything: list[Rule]) -> None:
                 assert ours == digest(product.settings(rule.plan.study, job))
                 others = [digest(other) for other in changed(settings)]
                 assert ours not in others, product.name
-                assert len(others) >= (settings is not None)
+                assert others or not vars(settings)
 
 
-@dataclass(frozen=True)
-class Settings:
-    held: object
+def test_what_is_not_declared_cannot_be_read() -> None:
+    view = using("title study.shown", seeds=lambda _: 3)(STUDY.cases["liquid_drop_2"])
+    assert (view.title, view.study.shown, view.seeds) == ("Liquid drop, case 2", "genetic", 3)
+    for read in (lambda: view.noise, lambda: view.study.methods, lambda: setattr(view, "seeds", 4)):
+        with pytest.raises(AttributeError, match=r"uses: title, study, seeds|uses: shown|config"):
+            read()
 
 
 @pytest.mark.parametrize("wrapped", [float, lambda x: [x], lambda x: {"a": x}, np.array])
 def test_a_digest_has_twelve_digits(wrapped: Callable[[float], object]) -> None:
     """What is computed may differ beyond them from one processor to another."""
-    ours = digest(Settings(wrapped(1.5)))
+    ours = digest(Used({"held": wrapped(1.5)}))
     for digits in (3, 6, 9, 11):
-        assert digest(Settings(wrapped(1.5 * (1 + 10.0**-digits)))) != ours
+        assert digest(Used({"held": wrapped(1.5 * (1 + 10.0**-digits))})) != ours
     for beyond in (1e-13, -1e-13, 3e-14):
-        assert digest(Settings(wrapped(1.5 * (1 + beyond)))) == ours
+        assert digest(Used({"held": wrapped(1.5 * (1 + beyond))})) == ours
 
 
 def digests() -> str:
@@ -233,7 +247,7 @@ def test_a_digest_is_the_same_in_every_process() -> None:
 
 @pytest.mark.parametrize("value", [b"bytes", object(), iter([1])], ids=lambda v: str(type(v)))
 def test_a_digest_refuses_what_it_does_not_know(value: object) -> None:
-    for settings in (value, [value], {"key": value}, Settings(value)):
+    for settings in (value, [value], {"key": value}, Used({"held": value})):
         with pytest.raises(TypeError, match="settings cannot hold"):
             digest(settings)
 

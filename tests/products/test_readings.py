@@ -11,7 +11,7 @@ from biogrip.products.files.readings import READINGS
 from biogrip.products.plan import Plan
 from biogrip.products.stages.identification import IDENTIFICATION
 from biogrip.products.stages.measurement import MEASUREMENT
-from biogrip.products.stages.readings import READ, settings
+from biogrip.products.stages.readings import READ
 from biogrip.products.stages.target import TARGET
 from biogrip.products.tables.readings import READINGS_TABLE
 from biogrip.study.study import Study
@@ -80,7 +80,7 @@ def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:
 
 
 def test_a_reading_changes_only_what_it_says(study: Study) -> None:
-    found = settings(study, CASE).readings
+    found = study.case(CASE["case"]).readings
     assert found["patience"].problem == found["printed"].problem
     assert (found["printed"].genetic.patience, found["patience"].genetic.min_generations) == (
         20,

@@ -52,11 +52,11 @@ def study() -> Study:
 
 @pytest.fixture
 def maps(study: Study) -> HeatMaps:
-    return heat_maps(study, study.sweeps["both"])
+    return heat_maps(study, {"sweep": "both"})
 
 
-def settings(study: Study) -> stage.Settings:
-    return stage.settings(study, {"sweep": "both", "case": CASE})
+def find_zeros(study: Study) -> stage.Swept:
+    return stage.find_zeros(study, {"sweep": "both", "case": CASE})
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def identifications(study: Study, tmp_path: Path) -> list[Path]:
 @pytest.fixture
 def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     output = tmp_path / "judged" / f"{CASE}.csv"
-    stage.judge(settings(study), identifications, [], output)
+    stage.judge(find_zeros(study), identifications, [], output)
     return output
 
 
@@ -157,7 +157,7 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
     text = replaced(SWEEPS, "values: [0, 0.2]", "values: [0.2]")
     text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
-    stage.judge(settings(study_of(text)), identifications, [], tmp_path / "x.csv")
+    stage.judge(find_zeros(study_of(text)), identifications, [], tmp_path / "x.csv")
     assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
 
 
@@ -165,7 +165,7 @@ def test_a_missing_point_is_named(
     study: Study, identifications: list[Path], tmp_path: Path
 ) -> None:
     with pytest.raises(BiogripError, match=r"cell--both--0--gaussian-peak: no file of identific"):
-        stage.judge(settings(study), identifications[1:], [], tmp_path / "x.csv")
+        stage.judge(find_zeros(study), identifications[1:], [], tmp_path / "x.csv")
 
 
 def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:
@@ -202,7 +202,7 @@ def test_the_table_says_what_of_the_gripper_the_config_calls_reconstructed(
     marked: str, said: str | None, judged: Path
 ) -> None:
     study = study_of(f"{SWEEPS}\nreconstructed: {marked}\n")
-    caption = robustness(heat_maps(study, study.sweeps["both"]), [judged]).caption
+    caption = robustness(heat_maps(study, {"sweep": "both"}), [judged]).caption
     assert ("econstructed" in caption) == (said is not None)
     assert said is None or caption.endswith(f": {said}.")
     # Of any config's heat maps the report says the same.

@@ -245,8 +245,8 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
     """What only some cases have is not taken for what all have."""
     volts = "protocol: {phases: [{duration_s: 100.0, voltage_V: 10.0}]}"
     study = load(tmp_path, f"cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}")
-    settings = coverage.settings(study)
-    (phase,) = settings["endothelial_cell"].problem.phases
+    shown: Any = coverage.COVERAGE.settings(study, {})
+    (phase,) = shown.cases["endothelial_cell"].problem.phases
     actuator = study.actuator
     assert phase.duration_s == 100.0
     assert phase.left.value_Nm == pytest.approx(float(torque(actuator, 10.0)))
@@ -258,9 +258,9 @@ def test_cases_in_volts_and_in_torque_share_a_study(tmp_path: Path) -> None:
         cases: {{endothelial_cell: {{{volts}}}, my_drop: {{{DROP}}}}}
     """,
     )
-    changed = coverage.settings(wider)
-    assert digest(changed["endothelial_cell"]) != digest(settings["endothelial_cell"])
-    assert digest(changed["my_drop"]) == digest(settings["my_drop"])
+    changed: Any = coverage.COVERAGE.settings(wider, {})
+    assert digest(changed.cases["endothelial_cell"]) != digest(shown.cases["endothelial_cell"])
+    assert digest(changed.cases["my_drop"]) == digest(shown.cases["my_drop"])
 
 
 @pytest.mark.parametrize(("noise_model", "along"), [("white", False), ("coloured", True)])

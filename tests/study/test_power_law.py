@@ -71,7 +71,7 @@ def test_the_study_of_power_law_cells_compares_springpots_with_branches(tmp_path
         "liquid_drop",
     }
     for case in study.cases.values():
-        assert {"generalized_maxwell", "fractional_maxwell"} <= set(study.models_of(case))
+        assert {"generalized_maxwell", "fractional_maxwell"} <= set(case.models)
 
 
 def test_a_number_without_a_unit_is_written_without_brackets() -> None:

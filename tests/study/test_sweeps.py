@@ -106,7 +106,7 @@ def test_a_whole_number_is_the_same_point_however_it_is_written(tmp_path: Path) 
 def test_heat_maps_have_values_in_the_axis_unit(tmp_path: Path) -> None:
     text = SWEEP.replace("{label: level,", '{label: level, unit: "%", unit_in_si: 0.01,')
     study = load(tmp_path, text)
-    shown = heat_maps(study, study.sweeps["noise"])
+    shown = heat_maps(study, {"sweep": "noise"})
     assert shown.rows == ShownAxis("level (%)", {"0.1": "10", "0.02": "2"}, reconstructed=False)
     assert shown.columns.values == {"a": "a", "b": "b"}
     # Kind and reference are reconstructed by the default study.

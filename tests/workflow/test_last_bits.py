@@ -81,7 +81,7 @@ def make(folder: Path, environment: dict[str, str]) -> None:
         calls += [["make", "target", "--case", case], ["make", "measurement", *batch]]
         calls += [["make", "identification", *batch, "--method", method] for method in METHODS]
         calls += [["make", "judgement", "--case", case], ["make", "model_fits", *batch]]
-        calls.append(["make", "identifications", "errors", "--case", case])
+        calls.append(["make", "identifications", "errors_of_case", "--case", case])
     python_path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     environment = {**environment, "PYTHONPATH": python_path}
     in_process(environment, "-c", DONE, given=json.dumps(calls), folder=folder)

@@ -68,7 +68,7 @@ JOBS = {
     "model_fits": BATCH,
     "expectation": CASE,
     "judgement": CASE,
-    "errors": CASE,
+    "errors_of_case": CASE,
     "methods": (),
     "sampling_evidence": (),
     "fit": CASE,
@@ -84,10 +84,13 @@ def wildcards_of(job: tuple[str, ...]) -> dict[str, str]:
     return {key.removeprefix("--"): text for key, text in pairs}
 
 
+KINDS = ("csv", "md", "tex")
+
+
 @pytest.mark.parametrize(
     ("names", "job", "files"),
     [
-        (("errors",), CASE, [f"tables/errors_liquid_drop_2.{k}" for k in ("csv", "md", "tex")]),
+        (("errors_of_case",), CASE, [f"tables/errors_liquid_drop_2.{kind}" for kind in KINDS]),
         (("target",), CASE, ["targets/liquid_drop_2.csv"]),
         (("measurement",), BATCH, ["measurements/liquid_drop_2/seeds_1-1.parquet"]),
         (
@@ -134,7 +137,7 @@ def test_a_batch_of_another_plan_is_made(tiny_copy: Path, monkeypatch: pytest.Mo
 def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
     """As all tests here but in a process of its own."""
     (tiny_copy / "results" / "tables" / "errors_liquid_drop_2.csv").unlink()
-    done = biogrip(tiny_copy, "make", "errors", *CASE)
+    done = biogrip(tiny_copy, "make", "errors_of_case", *CASE)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
     assert results_of(tiny_copy) == results_of(tiny)
     done = biogrip(tiny_copy, "make", "erors", *CASE)
@@ -146,16 +149,16 @@ def test_a_command_is_typed_in_a_shell(tiny: Path, tiny_copy: Path) -> None:
     ("arguments", "message"),
     [
         (("erors", *CASE), "no product 'erors'. Did you mean 'errors'? Allowed: "),
-        (("errors",), "errors: is made with --case, which is missing."),
+        (("errors_of_case",), "errors_of_case: is made with --case, which is missing."),
         (
             ("identification", *CASE, *METHOD, "--batch", "seeds_0-24"),
             "--batch: found 'seeds_0-24'. Did you mean 'seeds_0-0'? Allowed: seeds_0-0, seeds_1-1.",
         ),
         (
-            ("errors", "--case", "liquid_drop_3"),
+            ("errors_of_case", "--case", "liquid_drop_3"),
             "--case: found 'liquid_drop_3'. Did you mean 'liquid_drop_2'? Allowed: liquid_drop_2.",
         ),
-        (("errors", *BATCH), "--batch: does not go with errors."),
+        (("errors_of_case", *BATCH), "--batch: does not go with errors_of_case."),
         (("methods", *CASE), "--case: does not go with methods."),
         (("measurement", *CASE), "measurement: is made with --batch, which is missing."),
         (
@@ -191,7 +194,7 @@ def test_a_folder_without_a_study_is_said(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["make", "errors", *CASE]) == 1
+    assert main(["make", "errors_of_case", *CASE]) == 1
     said = capsys.readouterr().err
     assert said.startswith("biogrip: results/study.json: there is none, as no study was run here")
     assert list(tmp_path.iterdir()) == []
@@ -207,7 +210,7 @@ def test_a_damaged_study_is_said(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "results").mkdir()
     (tmp_path / "results" / "study.json").write_text(text)
-    assert main(["make", "errors", *CASE]) == 1
+    assert main(["make", "errors_of_case", *CASE]) == 1
     said = capsys.readouterr().err
     assert said.startswith("biogrip: results/study.json: cannot be read as a study")
     assert said.count("\n") == 1

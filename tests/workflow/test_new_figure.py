@@ -22,9 +22,11 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import COLUMN_IN, figure
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import Weight, of_cases, the
+from biogrip.products.uses import from_case, simulated
+from biogrip.study.study import Case, Study
 
 
-def draw(settings: None, targets: list[Path]) -> Figure:
+def draw(_: Study, targets: list[Path]) -> Figure:
     """Draw the largest rotation of every case."""
     drawn = figure(COLUMN_IN, 2)
     highest = [read_target(target)[2].max() for target in targets]
@@ -32,13 +34,13 @@ def draw(settings: None, targets: list[Path]) -> Figure:
     return drawn
 
 
-def draw_case(title: str, target: Path) -> Figure:
+def draw_case(case: Case, target: Path) -> Figure:
     """Draw the response of a case."""
     time_s, _, rotation = read_target(target)
     drawn = figure(COLUMN_IN, 2)
     axes = drawn.subplots()
     axes.plot(time_s, rotation)
-    axes.set_title(title)
+    axes.set_title(case.title)
     return drawn
 
 
@@ -46,17 +48,16 @@ HEIGHTS = drawing(
     draw,
     name="heights",
     caption="How high every case rises, side by side.",
-    settings=lambda study: None,
-    reads={"targets": of_cases(TARGETS, lambda study: study.simulated)},
+    reads={"targets": of_cases(TARGETS, simulated)},
     weight=Weight(7, 1234),
 )
 HEIGHT = drawing(
     draw_case,
     name="height",
     caption="How high one case rises, on its own.",
-    settings=lambda study, case: case.title,
+    uses=from_case("title"),
     reads={"target": the(TARGETS)},
-    cases=lambda study: study.simulated,
+    cases=simulated,
     weight=Weight(8, 2345),
 )
 '''

@@ -102,7 +102,7 @@ def test_what_a_person_made_is_known_as_what_a_job_made(
 ) -> None:
     monkeypatch.chdir(copied)
     Path("results/tables/errors.csv").unlink()
-    assert main(["make", "all_errors"]) == 0
+    assert main(["make", "errors"]) == 0
     assert main(["verify"]) == 0
 
 
@@ -161,7 +161,7 @@ def test_nothing_is_made_by_hand_through_a_link(
         Path(name).rename("elsewhere")
         Path(name).symlink_to(Path("elsewhere").absolute())
         before = {path: path.read_bytes() for path in sorted(Path("elsewhere").rglob("*.csv"))}
-        assert main(["make", "errors", "--case", "liquid_drop_2"]) == 1
+        assert main(["make", "errors_of_case", "--case", "liquid_drop_2"]) == 1
         assert f"{name}: " in capsys.readouterr().err
         assert {
             path: path.read_bytes() for path in sorted(Path("elsewhere").rglob("*.csv"))

@@ -125,7 +125,7 @@ def test_a_setting_reruns_nothing_that_does_not_use_it(
 def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: Path) -> None:
     run = snakemake(tiny_copy, "-n", config=TINY + NEW_CASE)
     assert run.status == 0, run.output
-    together = {"all_errors", "tables", "model_difference", "study_figures", "contact_loss"}
+    together = {"errors", "tables", "model_difference", "study_figures", "contact_loss"}
     together.add("report")
     jobs = run.all_jobs()
     assert together <= set(jobs)
@@ -133,9 +133,9 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: P
     # Two batches of seeds, two methods; what is left is done once for the case.
     batches = {"measurement": 2, "identification": 4, "model_fits": 2, "intervals": 2}
     assert {rule: jobs.pop(rule) for rule in batches} == batches
-    once = {"target", "identifications", "all_times", "all_intervals", "all_model_fits"}
-    once |= {"judgement", "expectation", "errors", "verdicts", "case_figures"}
-    assert jobs == dict.fromkeys(once, 1)
+    joined = {"identifications", "timings_of_case", "coverage_of_case", "selection_of_case"}
+    once = {"target", "judgement", "expectation", "errors_of_case", "verdicts", "case_figures"}
+    assert jobs == dict.fromkeys(joined | once, 1)
 
 
 def test_a_setting_of_the_genetic_algorithm_leaves_other_methods_alone(tiny_copy: Path) -> None:
@@ -182,7 +182,7 @@ def test_an_edited_method_reruns_its_identifications_and_what_follows(tree: Tree
     with edited(tree.root / "src/biogrip/identify/genetic.py"):
         run = tree.run("-n", config=TINY)
     jobs = run.all_jobs()
-    assert (jobs["identification"], jobs["identifications"], jobs["errors"]) == (2, 1, 1)
+    assert (jobs["identification"], jobs["identifications"], jobs["errors_of_case"]) == (2, 1, 1)
     untouched = {"target", "measurement", "judgement", "expectation", "model_fits", "intervals"}
     untouched |= {"model_difference"}
     assert not untouched & set(jobs)

@@ -61,7 +61,7 @@ def test_all_asks_for_heat_maps_but_for_no_figure_of_a_point(study: Path) -> Non
     assert run.jobs("case_figures") == run.jobs("verdicts") == 1
     assert run.jobs("identification") == 2
     fresh = snakemake(study, "-n", "--forceall", config=SWEEP)
-    assert fresh.jobs("robustness_map") == fresh.jobs("robustness") == 1
+    assert fresh.jobs("robustness_figure") == fresh.jobs("robustness") == 1
     assert fresh.jobs("case_figures") == 1
     assert fresh.jobs("identification") == 2 * (4 + 1)
 

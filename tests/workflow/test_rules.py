@@ -33,8 +33,8 @@ def test_a_table_of_errors_plans_only_what_it_needs(tmp_path: Path) -> None:
         "measurement": 3,
         "identification": 12,
         "identifications": 3,
-        "errors": 3,
-        "all_errors": 1,
+        "errors_of_case": 3,
+        "errors": 1,
         "total": 25,
     }
 

@@ -13,7 +13,6 @@ from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identify.answer import Identification
-from biogrip.identify.least_squares import LeastSquaresSettings
 from biogrip.identify.model_choice import FittedModel, advice, ranked
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
@@ -108,17 +107,15 @@ def models_tried(
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
     power_laws = _power_laws(case_problem.torque.end_s) if few and not named else []
-    candidates = tuple(dict.fromkeys((*study.models_of(case), *power_laws)))
+    candidates = tuple(dict.fromkeys((*case.models, *power_laws)))
     if len(candidates) < 2:
         return FittedModels(chosen)
-    settings = case.method("least_squares")
-    assert isinstance(settings, LeastSquaresSettings)
     found = fit_models(
         {
             name: [case_problem.for_model(fit.problem, CANDIDATES[name].model)]
             for name in candidates
         },
-        settings,
+        case.least_squares,
         {name: [stream(study.study_seed, case.name, 0, f"model {name}")] for name in candidates},
         done,
         near={chosen: diagnosis.likelihood.best[None]},

@@ -36,19 +36,20 @@ from biogrip.own_traces.one_trace import IdentifyOptions, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages import judgement
+from biogrip.products.stages.judgement import fit_judged, notes_on_fit
 from biogrip.progress import Progress
+from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
 
 
 @dataclass(frozen=True)
 class _TraceProblem:
-    """A usable recorded trace: its fit problem, the settings of the fit, and notes on its noise."""
+    """A usable recorded trace: its fit problem, its case, and notes on its noise."""
 
     trace: Path
     problem: Problem
-    settings: judgement.Settings
+    case: Case
     notes: list[Note]
 
 
@@ -268,26 +269,25 @@ class _Traces:
                 f"{visible(trace)}: found the same rotations as in {visible(before)}, "
                 "allowed is each trace once."
             )
-        settings = judgement.settings_of(study, case)
         problem = case.problem.of(recorded.time_s, rotation_rad)
         notes: list[Note] = []
         if case.problem.coloured:
             # All cells share one gripper: its calibration error is common to them, not noise.
             assumed = replace(case.problem, uncertainty={})
-            fit = settings.fit(assumed, recorded.time_s, rotation_rad, 0)
-            problem, notes = fit.problem, judgement.notes_on_fit(fit)
-        return _TraceProblem(trace, problem, settings, notes)
+            fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
+            problem, notes = fit.problem, notes_on_fit(fit)
+        return _TraceProblem(trace, problem, case, notes)
 
 
 def _identify(
     case_problem: _TraceProblem, progress: Callable[[int, float], None]
 ) -> Callable[[Problem], Identification]:
     """Return a function that finds global optima with the seeds and budget of `identify_trace`."""
-    settings = case_problem.settings
+    case = case_problem.case
 
     def found(problem: Problem) -> Identification:
-        rng = stream(settings.study_seed, settings.case, 0, "identifiability")
-        return best_fit(problem, settings.least_squares, rng, progress)
+        rng = stream(case.study.study_seed, case.name, 0, "identifiability")
+        return best_fit(problem, case.least_squares, rng, progress)
 
     return found
 

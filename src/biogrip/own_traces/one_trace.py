@@ -26,7 +26,8 @@ from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages import judgement, posterior, recording
+from biogrip.products.stages import posterior, recording
+from biogrip.products.stages.judgement import fit_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
@@ -105,9 +106,9 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         recorded = options.read_as.read(options.trace, case.gripper, case.problem)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
-        settings, case_problem = judgement.settings_of(study, case), case.problem
-        fit = settings.fit(
-            case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
+        case_problem = case.problem
+        fit = fit_judged(
+            case, case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
         )
         progress.done()
         progress.doing("finding confidence limits")
@@ -129,7 +130,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
         gaps = [Note(HARMLESS, text) for text in recording.notes_on_gaps(recorded)]
-        said = exact_data(diagnosis, [*gaps, *judgement.notes_on_fit(fit), *doubts])
+        said = exact_data(diagnosis, [*gaps, *notes_on_fit(fit), *doubts])
         data = {
             WRITTEN_BY: __version__,
             "trace": str(options.trace),
@@ -149,7 +150,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             progress.done()
             progress.doing("sampling the posterior")
             data["posterior"], drawn = posterior.posterior_of_trace(
-                posterior.settings_of(study, case),
+                case,
                 case_problem,
                 partial(case_problem.for_model, fit.problem),
                 limits_in(said),

@@ -22,7 +22,6 @@ from biogrip.own_traces.words import (
 )
 from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.fit import draw_fit
-from biogrip.products.figures.profiles import Settings as ProfileSettings
 from biogrip.products.figures.profiles import draw_profiles
 from biogrip.products.figures.residual_diagnosis import draw_residuals
 from biogrip.products.figures.results import fit_of
@@ -77,7 +76,7 @@ def _figures(identified: Identified) -> dict[str, Figure]:
     figures = {
         "Trace, best fit and residuals": draw_fit(fit, "best fit", ""),
         "Residuals: over time, autocorrelation, distribution": draw_residuals(fit),
-        "Profile likelihoods": draw_profiles(ProfileSettings("", {}), data),
+        "Profile likelihoods": draw_profiles("", {}, data),
     }
     if identified.samples is not None:
         figures["Posterior: marginals and pairs of parameters"] = draw_corner(

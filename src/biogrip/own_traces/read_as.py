@@ -68,7 +68,7 @@ class ReadAs:
         BiogripError
             With file, line and column, if the trace cannot be used.
         """
-        return recording.read_checked(recording.Settings(gripper, problem, self.columns), file)
+        return recording.read_checked(file, gripper, problem, self.columns)
 
     def check(self) -> None:
         """Refuse option values that the config would refuse.

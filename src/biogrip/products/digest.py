@@ -1,7 +1,7 @@
 """A short fingerprint of settings, by which the workflow knows that they have changed.
 
-What can be called in them, as the network of a sample model, is told by the source files of
-the module that it stands in.
+What can be called in them, as the network of a sample model or a method of a value's class, is
+told by the source files of the module that it stands in.
 """
 
 import hashlib
@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from biogrip.experiment.sample import CANDIDATES, Sample
-from biogrip.products.source_files import fingerprint
+from biogrip.products.source_files import fingerprint, followed
+from biogrip.products.uses import Used
 
 _LETTERS = 12
 # Values derived from the config may differ in the last bits between processors.
@@ -27,8 +28,8 @@ def digest(settings: object) -> str:
     Parameters
     ----------
     settings
-        Frozen dataclasses, mappings, sequences, arrays, text, numbers, None, and
-        functions of the package.
+        Views, frozen dataclasses, mappings, sequences, arrays, text, numbers, None,
+        and functions of the package.
     """
     code: set[str] = set()
     text = json.dumps(_plain(settings, code))
@@ -51,6 +52,8 @@ def _plain(value: object, code: set[str]) -> Any:
     if isinstance(value, float | complex):
         return f"{value:.{_DIGITS}g}"
     if is_dataclass(value) and not isinstance(value, type):
+        if followed(module := type(value).__module__):
+            code.add(module)
         own = [
             [field.name, _plain(getattr(value, field.name), code)]
             for field in fields(value)
@@ -61,6 +64,8 @@ def _plain(value: object, code: set[str]) -> Any:
             code |= modules
             own.append(["model", model])
         return own
+    if isinstance(value, Used):
+        value = vars(value)
     if isinstance(value, Mapping):
         return [[str(key), _plain(inner, code)] for key, inner in value.items()]
     if isinstance(value, list | tuple):

@@ -9,10 +9,12 @@ import pandas as pd
 from biogrip.errors import BiogripError
 from biogrip.identifiability.at_truth import headlines
 from biogrip.identify.methods import Method
+from biogrip.products.plan import Wildcards
 from biogrip.products.product import Reads
 from biogrip.products.stages.sweep_points import POINTS
+from biogrip.products.uses import marked
 from biogrip.study.study import Study
-from biogrip.study.sweeps import Axis, Sweep
+from biogrip.study.sweeps import Axis
 
 
 @dataclass(frozen=True)
@@ -68,8 +70,9 @@ class HeatMaps:
     reconstructed: tuple[str, ...]
 
 
-def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
+def heat_maps(study: Study, job: Wildcards) -> HeatMaps:
     """Return the settings that the table and the heat maps of a sweep depend on."""
+    sweep = study.sweeps[job["sweep"]]
     titles = {name: study.cases[name].title for name in sweep.cases}
     return HeatMaps(
         sweep.title,
@@ -78,7 +81,7 @@ def heat_maps(study: Study, sweep: Sweep) -> HeatMaps:
         _shown(study, sweep.rows),
         _shown(study, sweep.columns),
         study.near_noise_tolerance,
-        study.reconstructed("gripper"),
+        marked("gripper")(study),
     )
 
 

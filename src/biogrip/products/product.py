@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.products.plan import Plan, Wildcards
+from biogrip.products.uses import Uses
 from biogrip.study.study import Study
 
 PUBLISHED_TABLE_KINDS = (".csv", ".md", ".tex")
@@ -82,10 +83,11 @@ class Product:
     writes
         Output files by name, as patterns with the job's wildcards in braces.
     make
-        Function that makes the outputs, called with the settings, and by keyword with the files of
-        `reads` and `writes` (lists if there may be several), and ``seeds`` or ``seed`` if any.
-    settings
-        Function of study and wildcards that returns all of the config that the product uses.
+        Function that makes the outputs, called with the view of `uses`, and by keyword with the
+        files of `reads` and `writes` (lists if there may be several), and ``method``, ``seeds`` or
+        ``seed`` if any.
+    uses
+        What it uses of the config: the function can read nothing else.
     jobs
         Function that returns the wildcards of every job in a plan.
     message
@@ -107,7 +109,7 @@ class Product:
     name: str
     writes: Mapping[str, str]
     make: Callable[..., None]
-    settings: Callable[[Study, Wildcards], object]
+    uses: Uses
     jobs: Callable[[Plan], Iterable[Wildcards]]
     message: str
     reads: Mapping[str, Reads] = field(default_factory=dict)
@@ -123,6 +125,10 @@ class Product:
     def module(self) -> str:
         """Name of the module that declares the product and holds its code."""
         return self.make.__module__
+
+    def settings(self, study: Study, job: Wildcards) -> object:
+        """Return the view of what a job uses."""
+        return self.uses(study, job)
 
     def inputs(self, plan: Plan, job: Wildcards) -> dict[str, list[str]]:
         """Return the input files of a job by name."""
@@ -141,6 +147,8 @@ class Product:
             if reads.one:
                 (given[name],) = given[name]
         given |= {name: Path(file) for name, file in self.outputs(job).items()}
+        if "method" in job:
+            given["method"] = job["method"]
         if "batch" in job:
             given["seeds"] = plan.seeds_of(job["batch"])
         if "seed" in job:
@@ -151,41 +159,3 @@ class Product:
 def wildcards_of(names: Iterable[str]) -> list[Wildcards]:
     """Return the wildcards of jobs that are one per case."""
     return [{"case": name} for name in names]
-
-
-@dataclass(frozen=True)
-class Scope:
-    """Scope of a table or figure: one for the study, one per case, or one per sweep.
-
-    Parameters
-    ----------
-    cases
-        Function that names the cases; None if the scope is not cases.
-    sweeps
-        True for one per sweep.
-    when
-        Condition for a study to have it.
-    """
-
-    cases: Callable[[Study], Iterable[str]] | None
-    sweeps: bool
-    when: Callable[[Study], bool]
-
-    @property
-    def whose(self) -> str:
-        """Wildcard of the scope in braces; empty for one per study."""
-        return "{case}" if self.cases else "{sweep}" if self.sweeps else ""
-
-    def jobs(self, plan: Plan) -> list[Wildcards]:
-        """Return the wildcards of its jobs in a plan."""
-        if not self.when(plan.study):
-            return []
-        if self.sweeps:
-            return [{"sweep": sweep} for sweep in plan.study.sweeps]
-        return wildcards_of(self.cases(plan.study)) if self.cases else [{}]
-
-    def settings(self, choose: Callable[..., object], study: Study, job: Wildcards) -> object:
-        """Return `choose` of the study, or of the study and the job's case or sweep."""
-        if self.sweeps:
-            return choose(study, study.sweeps[job["sweep"]])
-        return choose(study, study.case(job["case"])) if self.cases else choose(study)

@@ -3,7 +3,7 @@
 Snakemake does not follow imports. Here every ``import`` statement inside the
 package is followed, without running anything; but not to what only says what there
 is to do, nor to the lists of methods and models that there are: what a job uses of
-these is in the digest of its settings (`biogrip.products.digest`), or among the
+these is in the digest of what it uses (`biogrip.products.digest`), or among the
 modules that its product names.
 """
 
@@ -20,7 +20,7 @@ _SAYING = (
     "biogrip.study",
     "biogrip.identify.methods",
     "biogrip.experiment.models",
-    *(f"biogrip.products.{name}" for name in ("product", "plan", "digest")),
+    *(f"biogrip.products.{name}" for name in ("declared", "product", "plan", "digest", "uses")),
     *(f"biogrip.products.{folder}.declared" for folder in ("tables", "figures")),
 )
 
@@ -77,7 +77,7 @@ def _imports(module: str) -> list[str]:
             found.update(f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.Import):
             found.update(alias.name for alias in node.names)
-    return [name for name in sorted(found) if _is_ours(name)]
+    return [name for name in sorted(found) if followed(name)]
 
 
 def _executed(tree: ast.Module) -> Iterator[ast.stmt]:
@@ -101,6 +101,8 @@ def _of_branches(statement: ast.stmt) -> list[ast.ExceptHandler] | list[ast.matc
     return statement.cases if isinstance(statement, ast.Match) else []
 
 
-def _is_ours(name: str) -> bool:
+@cache
+def followed(name: str) -> bool:
+    """Return whether a module is the package's, and not one that only says what there is to do."""
     says_only = any(name == said or name.startswith(f"{said}.") for said in _SAYING)
     return name.startswith("biogrip.") and not says_only and _file(name) is not None

@@ -4,10 +4,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, cast
 
+from biogrip.design.settings import DesignSettings
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import Sample, with_fixed
+from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
 from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import Published, Truth
 from biogrip.identifiability.posterior_settings import PosteriorSettings
@@ -26,6 +28,9 @@ from biogrip.study.sweeps import Sweep, make_sweeps, point_blocks
 from biogrip.study.typed import built, plain
 from biogrip.traces.recordings import Columns
 
+if TYPE_CHECKING:
+    from biogrip.identify.least_squares import LeastSquaresSettings
+
 
 @dataclass(frozen=True)
 class Case:
@@ -37,16 +42,13 @@ class Case:
         Name used in files.
     block
         Config block, with the study's blocks merged in.
-    actuator
-        Comb drive of the study.
-    study_seeds
-        Number of seeds of each simulated case.
+    study
+        The study that it belongs to.
     """
 
     name: str
     block: CaseBlock
-    actuator: CombDrive
-    study_seeds: int
+    study: "Study"
 
     @property
     def title(self) -> str:
@@ -61,7 +63,12 @@ class Case:
     @property
     def seeds(self) -> int:
         """Number of traces; 1 for a recorded trace."""
-        return 1 if self.recorded else self.study_seeds
+        return 1 if self.recorded else self.study.config.seeds
+
+    @property
+    def actuator(self) -> CombDrive:
+        """Comb drive of the study."""
+        return self.study.actuator
 
     @cached_property
     def sample(self) -> Sample:
@@ -120,6 +127,22 @@ class Case:
         return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
 
     @property
+    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
+        """Protocol and sampling."""
+        return self.phases, self.sampling
+
+    @property
+    def searched(self) -> SampleModel:
+        """Sample model without fixed parameters."""
+        return self.problem.searched
+
+    @property
+    def design(self) -> DesignSettings:
+        """Inputs of designs for a case that has them."""
+        assert self.block.design is not None
+        return self.block.design
+
+    @property
     def noise(self) -> Noise:
         """Noise to add to the simulated rotation."""
         return self.block.measurement.noise
@@ -146,9 +169,8 @@ class Case:
 
     @property
     def file(self) -> str:
-        """Path of the recorded trace."""
-        assert self.block.measurement.file is not None
-        return self.block.measurement.file
+        """Path of the recorded trace; empty for a simulated case."""
+        return self.block.measurement.file or ""
 
     @property
     def columns(self) -> Columns:
@@ -198,12 +220,39 @@ class Case:
         """Return the settings of an identification method."""
         return self.block.of_methods.of(name)
 
+    @cached_property
+    def methods(self) -> dict[str, object]:
+        """Settings of the study's identification methods by name."""
+        return {name: self.method(name) for name in self.study.methods}
+
     @property
-    def mutation_start(self) -> int:
-        """First generation in which children mutate."""
+    def least_squares(self) -> "LeastSquaresSettings":
+        """Settings of the least-squares fits that judgements are based on."""
+        return cast("LeastSquaresSettings", self.method("least_squares"))
+
+    @property
+    def genetic(self) -> GeneticSettings:
+        """Settings of the genetic algorithm."""
         settings = self.block.of_methods.block("genetic_algorithm")
         assert isinstance(settings, GeneticSettings)
-        return settings.mutation_start
+        return settings
+
+    @property
+    def mutation_start(self) -> int | None:
+        """First generation in which children mutate; None if the shown method has no mutation."""
+        mutates = "genetic_algorithm" in self.study.shown_method.blocks
+        return self.genetic.mutation_start if mutates else None
+
+    @property
+    def readings(self) -> dict[str, "Case"]:
+        """The case under each reading of the paper, by the reading's name."""
+        return {name: cases[self.name] for name, cases in self.study.readings.items()}
+
+    @property
+    def models(self) -> dict[str, Sample]:
+        """Sample models to fit to the case's traces by name, see `CANDIDATES`."""
+        names = (*self.study.config.model_selection.models, self.sample.candidate)
+        return {name: CANDIDATES[name] for name in names}
 
     @property
     def confidence(self) -> float:
@@ -214,6 +263,12 @@ class Case:
     def posterior(self) -> PosteriorSettings | None:
         """Settings of posterior sampling, if the posterior is sampled."""
         return self.block.posterior
+
+    @property
+    def compared_models(self) -> dict[str, Sample]:
+        """Sample models whose evidence is compared, by name; none if it is not asked for."""
+        asked = self.posterior and self.posterior.evidence and not self.fixed
+        return self.models if asked else {}
 
     @property
     def coverage_seeds(self) -> int:
@@ -266,8 +321,7 @@ class Study:
         return found
 
     def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
-        actuator, seeds = self.config.actuator, self.config.seeds
-        return {name: Case(name, block, actuator, seeds) for name, block in blocks.items()}
+        return {name: Case(name, block, self) for name, block in blocks.items()}
 
     def case(self, name: str) -> Case:
         """Return a case of the study or of a sweep's point."""
@@ -294,13 +348,24 @@ class Study:
         return self.methods[0]
 
     @property
+    def shown_method(self) -> Method:
+        """Declaration of the shown method."""
+        return METHODS[self.shown]
+
+    @property
+    def fitting_method(self) -> Method:
+        """Least squares if the study has it, else the shown method."""
+        return METHODS["least_squares" if "least_squares" in self.methods else self.shown]
+
+    @property
+    def reading_titles(self) -> dict[str, str]:
+        """Titles of the readings by name."""
+        return {name: block.title for name, block in self.config.readings.items()}
+
+    @property
     def selects_models(self) -> bool:
         """True if every trace is fitted with several sample models."""
         return bool(self.config.model_selection.models)
-
-    def models_of(self, case: Case) -> tuple[str, ...]:
-        """Return the sample models to fit to a case's traces, see `CANDIDATES`."""
-        return tuple(dict.fromkeys((*self.config.model_selection.models, case.sample.candidate)))
 
     @property
     def batch_size(self) -> int | None:
@@ -339,19 +404,24 @@ class Study:
         return own.pop() if len(own) == 1 else self.config.protocol.torques(self.config.actuator)
 
     @property
+    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
+        """Protocol and sampling, for cases that do not change them."""
+        phases = self.config.protocol.torques(self.config.actuator)
+        return phases, self.config.measurement.sampling
+
+    @property
     def ranges(self) -> dict[str, GeneRange]:
         """Search ranges of the study, for cases that do not change them."""
         return dict(vars(self.config.search_range))
 
-    def reconstructed(self, block: str) -> tuple[str, ...]:
-        """Return marked keys of a block, or the block itself: the paper omits their values."""
-        marked = self.config.reconstructed
-        return tuple(key for key in marked if key == block or key.startswith(f"{block}."))
+    @property
+    def reconstructed(self) -> tuple[str, ...]:
+        """Dotted keys, or whole blocks, whose values the paper omits."""
+        return self.config.reconstructed
 
     def is_reconstructed(self, key: str) -> bool:
         """Return whether a dotted key is marked as reconstructed, i.e. omitted in the paper."""
-        marked = self.config.reconstructed
-        return any(key == name or key.startswith(f"{name}.") for name in marked)
+        return any(key == name or key.startswith(f"{name}.") for name in self.reconstructed)
 
     @property
     def simulated(self) -> list[str]:

@@ -17,7 +17,7 @@ from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.files.traces import write_target
 from biogrip.products.stages import model_difference
 from biogrip.response.simulation import simulated_rotation
-from tests.helpers.default import STUDY, study_of
+from tests.helpers.default import STUDY, seen, study_of
 
 CASE = "liquid_drop_1"
 
@@ -58,7 +58,7 @@ def files(tmp_path: Path) -> dict[str, Any]:
 def drawn(study_overlay: str, files: dict[str, Any]) -> Figure:
     study = study_of(study_overlay)
     with styled():
-        return scatter.draw(scatter.settings(study, study.cases[CASE]), **files)
+        return scatter.draw(study.cases[CASE], **files)
 
 
 def test_no_band_is_drawn_of_what_is_not_determined(files: dict[str, Any]) -> None:
@@ -90,29 +90,24 @@ def test_the_band_has_the_confidence_of_the_study(files: dict[str, Any]) -> None
 def test_each_case_is_compared_under_its_own_protocol(tmp_path: Path) -> None:
     own = "protocol: {phases: [{duration_s: 10.0, torque_Nm: 0.8e-9}]}"
     study = study_of(f"cases: {{{CASE}: {{{own}}}}}")
-    settings = model_difference.settings(study)
-    protocols = {name: case.phases for name, case in settings.cases.items()}
+    protocols = {name: case.phases for name, case in study.cases.items()}
     assert len(protocols[CASE]) == 1
     assert len(protocols["liquid_drop_2"]) == 2
-    few = model_difference.Settings({CASE: settings.cases[CASE]})
+    few = seen(cases={CASE: study.cases[CASE]})
     model_difference.compare(few, tmp_path / "own.csv")
-    other = model_difference.Settings({CASE: model_difference.settings(STUDY).cases[CASE]})
-    model_difference.compare(other, tmp_path / "study.csv")
+    model_difference.compare(seen(cases={CASE: STUDY.cases[CASE]}), tmp_path / "study.csv")
     ours, theirs = (DIFFERENCES.read(tmp_path / f"{name}.csv") for name in ("own", "study"))
     assert not np.allclose(ours["difference_over_peak"], theirs["difference_over_peak"], rtol=0.1)
     with styled():
-        shown = linearisation.Settings(few.cases, {CASE: "A drop"})
-        figure = linearisation.draw(shown, tmp_path / "own.csv")
+        figure = linearisation.draw(few, tmp_path / "own.csv")
     assert figure.axes[0].get_xlim()[1] == pytest.approx(10.0, rel=0.1)
 
 
 def test_the_difference_of_the_models_is_drawn_and_small_is_yellow(tmp_path: Path) -> None:
-    cases = model_difference.settings(STUDY).cases
-    few = model_difference.Settings({CASE: cases[CASE]})
+    few = seen(cases={CASE: STUDY.cases[CASE]})
     model_difference.compare(few, tmp_path / "d.csv")
     with styled():
-        shown = linearisation.Settings(few.cases, {CASE: "A drop"})
-        figure = linearisation.draw(shown, tmp_path / "d.csv")
+        figure = linearisation.draw(few, tmp_path / "d.csv")
     curve = np.abs(np.asarray(figure.axes[0].lines[0].get_ydata()))
     # At twenty times the torque the peak is tens of mrad, and the models differ by some percent.
     assert 0.01 < curve.max() < 5

@@ -20,7 +20,7 @@ from biogrip.products.figures import comb, convergence, linkage, torque
 from biogrip.products.figures.results import scale_of
 from biogrip.products.figures.style import ALL_SEEDS, COLORS, FITTED, figure, line_of, save, styled
 from biogrip.products.product import Product
-from tests.helpers.default import STUDY
+from tests.helpers.default import STUDY, seen
 
 
 def drawn(module: Any) -> Figure:
@@ -69,7 +69,7 @@ def test_comb_has_every_finger_where_it_is() -> None:
 def test_saved_figures_are_the_same_every_time(tmp_path: Path) -> None:
     for name in ("a", "b"):
         with styled():
-            save(torque.draw(torque.settings(STUDY)), tmp_path / f"{name}.png")
+            save(torque.draw(STUDY), tmp_path / f"{name}.png")
     for suffix in (".png", ".pdf"):
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
@@ -97,9 +97,10 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
     history["best_misfit_rad"] = np.repeat(misfit, 2)
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
-    settings = convergence.Settings("A cell", METHODS["genetic"], 20, near_noise_tolerance=0.02)
+    study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
+    case = seen(title="A cell", mutation_start=20, study=study)
     files = (tmp_path / "found.csv", tmp_path / "history.parquet")
-    axes = convergence.draw(settings, *files).axes
+    axes = convergence.draw(case, *files).axes
     filled = [line for line in axes[0].lines if len(np.asarray(line.get_xdata()))]
     assert sum(line.get_color() == ALL_SEEDS for line in filled) == others
     assert sum(line.get_color() == FITTED for line in filled) == 1

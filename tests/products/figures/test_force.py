@@ -23,9 +23,9 @@ STUDY = study_of(
 
 def drawn(name: str, tmp_path: Path) -> Figure:
     file = tmp_path / f"{name}.csv"
-    target.simulate(target.settings(STUDY, {"case": name}), file)
+    target.simulate(STUDY.cases[name], file)
     with styled():
-        return force.draw(force.settings(STUDY, STUDY.cases[name]), file)
+        return force.draw(STUDY.cases[name], file)
 
 
 def labels(figure: Figure) -> list[list[str]]:

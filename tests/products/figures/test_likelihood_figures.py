@@ -13,6 +13,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.products.figures import overview, profiles, valley
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.style import figure, lay_out, styled
+from tests.helpers.default import seen
 
 BEST = 2.0
 
@@ -35,7 +36,7 @@ def written(path: Path, *items: dict[str, Any]) -> Path:
 
 def drawn(path: Path) -> Any:
     with styled():
-        return profiles.draw(profiles.Settings("A drop", {"k": 2.2}), path, [])
+        return profiles.draw(seen(title="A drop", parameters={"k": 2.2}), path, [])
 
 
 def test_a_profile_is_a_curve_and_crosses_its_threshold_at_its_limits(tmp_path: Path) -> None:
@@ -106,11 +107,11 @@ def drawn_valley(
     for column in ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"):
         frame[column] = 1
     frame.to_csv(folder / "found.csv", index=False)
-    settings = valley.Settings(
-        "A drop", METHODS["least_squares"], known.get("truth", {}), known.get("paper", {})
-    )
+    paper = seen(identified=known.get("paper", {}))
+    study = seen(fitting_method=METHODS["least_squares"])
+    case = seen(title="A drop", study=study, parameters=known.get("truth", {}), published=paper)
     with styled():
-        return valley.draw(settings, path, folder / "found.csv").axes[0]
+        return valley.draw(case, path, folder / "found.csv").axes[0]
 
 
 DEEP = [[50.0] * 5, [0.0] * 5, [60.0] * 5]

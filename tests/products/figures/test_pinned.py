@@ -71,10 +71,10 @@ JOBS = jobs()
 HEAT_MAPS = "robustness_level"
 # Those of overlays, by what they are drawn from here.
 OTHERS = {
-    HEAT_MAPS: "robustness_map",
-    "posterior_made_up": "corner",
+    HEAT_MAPS: "robustness_figure",
+    "posterior_made_up": "posterior_figure",
     "designed_map": "designed_map",
-    "sequential": "sequential_cells",
+    "sequential": "sequential_figure",
 }
 NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
@@ -152,16 +152,14 @@ def figure(
     with styled():
         if request.param == HEAT_MAPS:
             study = study_of(SWEEP)
-            return heat_map.draw(heat_maps(study, study.sweeps["level"]), judged)
+            return heat_map.draw(heat_maps(study, {"sweep": "level"}), judged)
         if request.param == "designed_map":
             designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(
-                designed_map.of_case(designed, designed.case("endothelial_cell"))
-            )
+            return designed_map.draw(designed.case("endothelial_cell"))
         if request.param == "sequential":
             cell = STUDY.cases["endothelial_cell"]
             rows = made_up(tmp_path_factory.mktemp("cells"))
-            return sequential.draw(sequential.of_case(STUDY, cell), rows)
+            return sequential.draw(cell, rows)
         return _corner()
 
 

@@ -89,9 +89,8 @@ def line(figure: Any, label: str) -> np.ndarray:
 
 
 def test_the_typical_run_is_drawn(identifications: Path, measurements: Path) -> None:
-    settings = fit.settings(STUDY, STUDY.cases[CASE])
     with styled():
-        figure = fit.draw(settings, identifications, [measurements], [])
+        figure = fit.draw(STUDY.cases[CASE], identifications, [measurements], [])
     expected = 1e3 * response([0.7, *TRUTH[1:]])
     np.testing.assert_allclose(line(figure, "typical fit (seed 1"), expected, rtol=1e-9)
     # The paper's axis is on it, and all that was measured.
@@ -108,8 +107,7 @@ def test_the_page_of_a_trace_shows_the_fit_that_it_judges(
     verdicts = tmp_path / "verdicts.json"
     verdicts.write_text(json.dumps({"quantities": items, "trades": [], "notes": []}))
     with styled():
-        settings = judged_fit.settings(STUDY, STUDY.cases[CASE])
-        figure = judged_fit.draw(settings, verdicts, measurements, [])
+        figure = judged_fit.draw(STUDY.cases[CASE], verdicts, measurements, [])
     expected = 1e3 * response([0.9, *TRUTH[1:]])
     np.testing.assert_allclose(line(figure, "best fit (seed 0)"), expected, rtol=1e-9)
     shown = SUMMARY.inputs(plan_of(), {"case": CASE})["figures"]
@@ -124,7 +122,6 @@ def test_how_far_from_its_target_a_run_ends_is_named(identifications: Path, tmp_
         history[column] = [value, value * 0.9, value, value * 1.024, value, value]
     history.assign(method="genetic").to_parquet(tmp_path / "history.parquet")
     with styled():
-        settings = evolution.settings(STUDY, STUDY.cases[CASE])
-        figure = evolution.draw(settings, identifications, tmp_path / "history.parquet")
+        figure = evolution.draw(STUDY.cases[CASE], identifications, tmp_path / "history.parquet")
     titles = [axes.get_title(loc="right") for axes in figure.axes]
     assert titles == ["seed 1 ends 2.4 % above the target"] * 4

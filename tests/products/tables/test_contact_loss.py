@@ -1,16 +1,16 @@
-from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from biogrip.products.tables import contact_loss
+from biogrip.products.tables.contact_loss import CONTACT_LOSS, contact_loss
 from biogrip.products.tables.layout import Cell
-from tests.helpers.default import study_of
+from tests.helpers.default import seen, study_of
 
 
 def rows_of(overlay: str) -> dict[tuple[Cell, Cell], dict[str, Cell]]:
-    settings = contact_loss.settings(study_of(overlay))
-    few = {name: replace(case, seeds=3) for name, case in settings.cases.items()}
-    found = contact_loss.contact_loss(replace(settings, cases=few))
+    study: Any = CONTACT_LOSS.settings(study_of(overlay), {})
+    few = {name: seen(**vars(case) | {"seeds": 3}) for name, case in study.cases.items()}
+    found = contact_loss(seen(study_seed=study.study_seed, cases=few))
     names = [column.name for column in found.columns]
     rows = [dict(zip(names, row, strict=True)) for row in found.rows]
     return {(row["case"], row["quantity"]): row for row in rows}

@@ -8,7 +8,7 @@ import pytest
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import write_target
 from biogrip.products.stages import intervals as stage
-from biogrip.products.tables.coverage import coverage, settings
+from biogrip.products.tables.coverage import coverage
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import study_of
 
@@ -50,7 +50,7 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
         (CASE, "c", 0, 0.1, "", "", "", "not determined", "", ""),
     ]
     INTERVALS.write(tmp_path / "i.csv", rows)
-    made = coverage(settings(study_of(OVERLAY)), [target], [tmp_path / "i.csv"], [])
+    made = coverage(study_of(OVERLAY), [target], [tmp_path / "i.csv"], [])
     names = [column.name for column in made.columns]
     found = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
     assert list(found) == ["k", "k_p", "c_p"]
@@ -75,8 +75,7 @@ def test_every_tenth_seed_is_judged_in_full(tmp_path: Path, target: Path) -> Non
         '{"quantities": [{"quantity": "k", "verdict": "determined"}], "trades": [], "notes": [], '
         '"fit": "ok"}'
     )
-    chosen = stage.settings(study, {"case": CASE})
-    stage.estimate(chosen, range(9, 12), target, expected, [], tmp_path / "i.csv")
+    stage.estimate(study.case(CASE), range(9, 12), target, expected, [], tmp_path / "i.csv")
     found = INTERVALS.read(tmp_path / "i.csv")
     judged = found[found["verdict"].notna()]
     assert judged["seed"].tolist() == [10] * 5

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from biogrip.identifiability.at_truth import bounds_percent
+from biogrip.products.designed_cases import designed_cases
 from biogrip.products.files.intervals import INTERVALS
-from biogrip.products.stages.judgement import expect, expected_settings
-from biogrip.products.stages.target import settings as target_settings
+from biogrip.products.stages.judgement import expect
 from biogrip.products.stages.target import simulate
-from biogrip.products.tables.designed import designed, settings
+from biogrip.products.tables.designed import designed
 from biogrip.study.study import Study
 from tests.helpers.default import study_of
 
@@ -35,15 +35,15 @@ cases:
 
 def expected(study: Study, folder: Path) -> Path:
     """Verdicts of the case's trace without noise."""
-    job, target, verdicts = {"case": "endothelial_cell"}, folder / "target", folder / "verdicts"
-    simulate(target_settings(study, job), target)
-    expect(expected_settings(study, job), target, [], verdicts)
+    case, target, verdicts = study.case("endothelial_cell"), folder / "target", folder / "verdicts"
+    simulate(case, target)
+    expect(case, target, [], verdicts)
     return verdicts
 
 
 def test_bounds_before_and_after(tmp_path: Path) -> None:
     study = study_of(OVERLAY.replace("SEEDS", "0"))
-    table = designed(settings(study), [expected(study, tmp_path)], [])
+    table = designed(study, [expected(study, tmp_path)], [])
     rows = {row[1]: row for row in table.rows}
     assert list(rows) == ["k", "k_p", "c", "c_p"]
     # Jump, rate and plateau at 10 Hz: three observables for four parameters.
@@ -72,7 +72,7 @@ def test_seeds_beside_it(tmp_path: Path) -> None:
         for seed, line in enumerate(lines)
     ]
     INTERVALS.write(file, rows)
-    table = designed(settings(study), [expected(study, tmp_path)], [file])
+    table = designed(study, [expected(study, tmp_path)], [file])
     row = next(row for row in table.rows if row[1] == "k")
     spread = 100 * np.std(logs, ddof=1)
     assert row[8] == pytest.approx(spread, rel=1e-6)
@@ -81,7 +81,7 @@ def test_seeds_beside_it(tmp_path: Path) -> None:
 
 
 def test_only_cases_that_are_sampled_in_bursts_have_such_experiments() -> None:
-    assert settings(study_of()).cases == {}
-    assert list(settings(study_of(OVERLAY.replace("SEEDS", "0"))).cases) == ["endothelial_cell"]
+    assert designed_cases(study_of()) == []
+    assert designed_cases(study_of(OVERLAY.replace("SEEDS", "0"))) == ["endothelial_cell"]
     seldom = OVERLAY[: OVERLAY.index("      bursts:")].replace("SEEDS", "0")
-    assert settings(study_of(seldom)).cases == {}
+    assert designed_cases(study_of(seldom)) == []

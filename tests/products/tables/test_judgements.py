@@ -1,7 +1,6 @@
 """Tables of methods, models, coverage and verdicts, recomputed by hand."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +13,12 @@ from biogrip.experiment.sample import MODELS, Sample
 from biogrip.experiment.truth import Published, Truth
 from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import columns
-from biogrip.products.tables import verdicts as verdicts_table
 from biogrip.products.tables.layout import Table
-from biogrip.products.tables.methods import Settings, methods
-from biogrip.products.tables.models import Settings as Models
+from biogrip.products.tables.methods import methods
 from biogrip.products.tables.models import models
-from biogrip.products.tables.models import settings as compared
 from biogrip.products.tables.timings import timings
 from biogrip.products.tables.verdicts import verdicts
-from tests.helpers.default import study_of
+from tests.helpers.default import seen, study_of
 
 
 def rows(table: Table) -> list[dict[str, Any]]:
@@ -30,12 +26,11 @@ def rows(table: Table) -> list[dict[str, Any]]:
     return [dict(zip(names, row, strict=True)) for row in table.rows]
 
 
-def settings(parameters: dict[str, float], samples: int) -> Settings:
+def study(parameters: dict[str, float], samples: int) -> Any:
     """Of one case, a drop."""
     truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
-    return Settings(
-        {"drop": (truth, samples)}, METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02
-    )
+    cases = {"drop": seen(truth=truth, samples=samples)}
+    return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 
 
 def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
@@ -50,7 +45,7 @@ def test_methods_are_counted_against_the_lowest_known(tmp_path: Path) -> None:
             lines.append(["drop", method, seed, 8.0, 1.0, 3.0, 2.0, misfit, 1.02, 5, n, "stalled"])
     pd.DataFrame(lines, columns=head).to_csv(path, index=False)
     parameters = {"k": 10.0, "k_p": 1.0, "c": 4.0, "c_p": 1.0}
-    first, second = rows(methods(settings(parameters, 1000), [path]))
+    first, second = rows(methods(study(parameters, 1000), [path]))
     # 1000 (1.0004^2 - 1) = 0.80: at the optimum; the others are far above.
     assert (first["seeds"], first["optimum_share"]) == (3, pytest.approx(1 / 3))
     assert second["optimum_share"] == 1.0
@@ -65,7 +60,7 @@ def test_the_lowest_known_may_be_the_truth(tmp_path: Path) -> None:
     line = ["drop", "genetic", 0, 8.0, 1.0, 3.0, 2.0, 1.1, 1.0, 5, 100, "stalled"]
     pd.DataFrame([line], columns=list(columns(MODELS["generalized_maxwell"]))).to_csv(path)
     parameters = dict.fromkeys(["k", "k_p", "c", "c_p"], 1.0)
-    (made,) = rows(methods(settings(parameters, 100), [path]))
+    (made,) = rows(methods(study(parameters, 100), [path]))
     assert made["median_rise"] == pytest.approx(100 * (1.1**2 - 1))
 
 
@@ -83,7 +78,8 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
     names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
     tried = {name: Sample(name) for name in ("damper", "maxwell")}
-    damper, maxwell = rows(models(Models({"drop": "maxwell"}, tried), [path]))
+    drop = seen(recorded=False, sample=Sample("maxwell"), models=tried)
+    damper, maxwell = rows(models(seen(cases={"drop": drop}), [path]))
     # A parameter costs 2 by AIC, ln 1000 = 6.9 by BIC.
     assert (damper["chosen_by_aic"], maxwell["chosen_by_aic"]) == (1, 2)
     assert (damper["chosen_by_bic"], maxwell["chosen_by_bic"]) == (2, 1)
@@ -93,20 +89,19 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
 
 
 def test_what_made_the_traces_is_tried_and_marked(tmp_path: Path) -> None:
-    study = study_of("""
+    two = study_of("""
 model_selection: {models: [damper, generalized_maxwell]}
 cases:
   two: {sample: {model: generalized_maxwell, branches: 2,
                  k_1: 30, k_2: 10, k_p: 12.3, c_1: 150, c_2: 600, c_p: 0}}
-""")
-    tried = study.models_of(study.cases["two"])
+""").cases["two"]
+    tried = tuple(two.models)
     assert tried == ("damper", "generalized_maxwell", "generalized_maxwell_2")
     path = tmp_path / "fits.csv"
     fits = [["two", name, 0, 4, 1000, 1.0] for name in tried]
     names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
-    shown = replace(compared(study), made_by={"two": "generalized_maxwell_2"})
-    found = rows(models(shown, [path]))
+    found = rows(models(seen(cases={"two": two}), [path]))
     marked = [row["model"] for row in found if "made the traces" in row["model"]]
     assert marked == ["generalized Maxwell-Wiechert model, 2 branches (made the traces)"]
     assert [row["parameters"] for row in found] == [1, 4, 6]
@@ -128,7 +123,7 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     files = [tmp_path / "a.json", tmp_path / "b.json"]
     for file, content in zip(files, (measured, expected), strict=True):
         file.write_text(json.dumps(content))
-    known = verdicts_table.Settings("x", "X", {"k": 2.5, "c": 1.0, "c_p": 0.5})
+    known = seen(name="x", title="X", parameters={"k": 2.5, "c": 1.0, "c_p": 0.5})
     table = verdicts(known, files[0], files[1:])
     k, total = rows(table)
     assert k["excluded"] == "1.5 to 1.8"
@@ -139,7 +134,8 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
     assert (total["target"], total["value"], total["high"]) == (1.5, None, 3.0)
     assert total["expected_verdict"] is None
     assert "c and c_p trade against each other: determined is c + c_p." in table.caption
-    assert rows(verdicts(replace(known, parameters={}), files[0], []))[0]["target"] is None
+    recorded = seen(**vars(known) | {"parameters": {}})
+    assert rows(verdicts(recorded, files[0], []))[0]["target"] is None
     files[0].write_text("{}")
     with pytest.raises(BiogripError, match=r"a\.json: holds no verdicts"):
         verdicts(known, files[0], files[1:])
@@ -148,5 +144,5 @@ def test_verdicts_are_listed_beside_what_was_expected(tmp_path: Path) -> None:
 def test_timings_are_summed(tmp_path: Path) -> None:
     path = tmp_path / "times.csv"
     path.write_text("case,method,seed,cpu_s\nx,genetic,0,0.1\nx,genetic,1,0.3\nx,genetic,2,0.2\n")
-    (row,) = rows(timings(METHODS, [path]))
+    (row,) = rows(timings(seen(identifiers=METHODS), [path]))
     assert (row["median_cpu_s"], row["total_cpu_s"]) == (pytest.approx(0.2), pytest.approx(0.6))

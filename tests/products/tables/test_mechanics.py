@@ -1,13 +1,14 @@
-from dataclasses import replace
+from typing import Any
 
 import pytest
 
-from biogrip.products.tables import mechanics
-from tests.helpers.default import STUDY, study_of
+from biogrip.products.tables.mechanics import MECHANICS, mechanics
+from biogrip.study.study import Study
+from tests.helpers.default import STUDY, seen, study_of
 
 
-def rows_of(study: object = STUDY) -> list[dict[str, object]]:
-    found = mechanics.mechanics(mechanics.settings(study))  # type: ignore[arg-type]
+def rows_of(study: Study = STUDY) -> list[dict[str, object]]:
+    found = mechanics(study)
     names = [column.name for column in found.columns]
     return [dict(zip(names, row, strict=True)) for row in found.rows]
 
@@ -49,9 +50,8 @@ def test_the_papers_samples() -> None:
 
 
 def test_the_nonlinear_model_differs_little() -> None:
-    linear = mechanics.settings(STUDY)
-    nonlinear = [replace(case, nonlinear=True) for case in linear]
-    for one, other in zip(
-        mechanics.mechanics(linear).rows, mechanics.mechanics(nonlinear).rows, strict=True
-    ):
+    linear: Any = MECHANICS.settings(STUDY, {})
+    cases = {n: seen(**vars(c) | {"nonlinear_target": True}) for n, c in linear.cases.items()}
+    nonlinear = mechanics(seen(cases=cases))
+    for one, other in zip(mechanics(linear).rows, nonlinear.rows, strict=True):
         assert one[2:6] == pytest.approx(other[2:6], rel=5e-3)

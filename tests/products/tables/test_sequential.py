@@ -22,10 +22,10 @@ from biogrip.products.stages.sequence import (
     SEQUENCE,
     TRUTH,
     sequence,
-    settings,
+    sequences,
 )
 from biogrip.products.tables.sequential import ALL, IN_WORDS, sequential
-from tests.helpers.default import study_of
+from tests.helpers.default import seen, study_of
 
 OVERLAY = """
 only: [endothelial_cell]
@@ -59,7 +59,7 @@ def made_up(folder: Path) -> list[Path]:
 
 
 def test_counts_of_made_up_cells(tmp_path: Path) -> None:
-    table = sequential({"endothelial_cell": (3, 0.95)}, made_up(tmp_path))
+    table = sequential(seen(cases={"endothelial_cell": seen(confidence=0.95)}), made_up(tmp_path))
     names = [column.name for column in table.columns]
     found = pd.DataFrame(table.rows, columns=names).set_index(["way", "experiments", "quantity"])
     assert len(found) == 4 * 2 * 5
@@ -108,7 +108,7 @@ def test_a_cell_of_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(within_reach, "best_torques", search)
     study = study_of(OVERLAY)
     assert len(SEQUENCE.jobs(Plan(study, tmp_path))) == 3  # type: ignore[arg-type]
-    chosen = settings(study, {"case": "endothelial_cell", "seed": "0"})
+    chosen = sequences(study, {"case": "endothelial_cell", "seed": "0"})
     sequence(chosen, 0, tmp_path / "cell.csv")
     found = SEQUENCES.read(tmp_path / "cell.csv").set_index(["way", "experiments", "quantity"])
     assert len(found) == 4 * 2 * 4

@@ -1,6 +1,5 @@
 import csv
 import re
-from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -12,14 +11,15 @@ from biogrip.experiment.truth import Published, Truth
 from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
 from biogrip.products.files.rows import escape_formula
-from biogrip.products.tables.all_errors import all_errors
-from biogrip.products.tables.errors import ERRORS, Settings, errors
+from biogrip.products.tables.errors import errors
+from biogrip.products.tables.errors_of_case import ERRORS_OF_CASE, errors_of_case
 from biogrip.products.tables.layout import Column, Table, write
+from tests.helpers.default import seen
 from tests.helpers.places import ROOT
 
-SETTINGS = Settings(
-    "drop",
-    Truth(
+CASE = seen(
+    name="drop",
+    truth=Truth(
         "A drop",
         Sample("generalized_maxwell"),
         {"k": 8.0, "k_p": 0.0, "c": 4.0, "c_p": 1.0},
@@ -29,8 +29,7 @@ SETTINGS = Settings(
             error_percent={"k": "10", "k_p": "-", "c": "25", "c_p": ">100"},
         ),
     ),
-    "genetic",
-    near_noise_tolerance=0.02,
+    study=seen(shown="genetic", near_noise_tolerance=0.02),
 )
 
 
@@ -50,7 +49,7 @@ def identifications(tmp_path: Path) -> Path:
 
 
 def test_error_table_is_the_arithmetic_it_says(identifications: Path) -> None:
-    made = errors(SETTINGS, identifications)
+    made = errors_of_case(CASE, identifications)
     names = [column.name for column in made.columns]
     rows = {row[1]: dict(zip(names, row, strict=True)) for row in made.rows}
     assert list(rows) == ["k", "k_p", "c", "c_p", "c + c_p"]
@@ -89,14 +88,14 @@ def test_a_table_says_the_same_in_all_its_files(tmp_path: Path) -> None:
 
 
 def test_unknown_tables_and_files_are_explained(tmp_path: Path) -> None:
-    files = {kind: tmp_path / f"t.{kind}" for kind in ERRORS.writes}
+    files = {kind: tmp_path / f"t.{kind}" for kind in ERRORS_OF_CASE.writes}
     with pytest.raises(BiogripError, match="Did you mean 'errors'"):
         chosen(["erors"])
     with pytest.raises(BiogripError, match=r"gone.csv: cannot be read as identifications"):
-        ERRORS.make(SETTINGS, identifications=tmp_path / "gone.csv", **files)
+        ERRORS_OF_CASE.make(CASE, identifications=tmp_path / "gone.csv", **files)
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
     with pytest.raises(BiogripError, match=r"other.csv, line 1: wanted the columns case"):
-        ERRORS.make(SETTINGS, identifications=tmp_path / "other.csv", **files)
+        ERRORS_OF_CASE.make(CASE, identifications=tmp_path / "other.csv", **files)
     assert not any(file.exists() for file in files.values())
 
 
@@ -144,12 +143,12 @@ def test_the_published_tables_hold_nothing_that_is_escaped() -> None:
 def test_the_tolerance_that_a_heading_names_is_the_one_that_was_used(
     identifications: Path, tmp_path: Path
 ) -> None:
-    settings = replace(SETTINGS, near_noise_tolerance=0.005)
-    made = errors(settings, identifications)
+    study = seen(shown="genetic", near_noise_tolerance=0.005)
+    made = errors_of_case(seen(**vars(CASE) | {"study": study}), identifications)
     assert made.columns[-1].heading == "Share within 0.5 % of the noise"
     # 1.001 and 1.0046.
     assert made.rows[0][-1] == pytest.approx(2 / 11)
     write(made, tmp_path / "t.csv")
-    joined = all_errors(0.005, [tmp_path / "t.csv"])
+    joined = errors(study, [tmp_path / "t.csv"])
     assert joined.columns == made.columns
     assert joined.rows[0][6] == 5

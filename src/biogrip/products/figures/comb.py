@@ -13,12 +13,13 @@ from biogrip.instrument import actuator
 from biogrip.instrument.actuator import CombDrive
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLACK, BLUE, ORANGE, PAGE_IN, figure, panel
-from biogrip.products.figures.torque import Settings, settings
+from biogrip.products.uses import from_study
+from biogrip.study.study import Study
 
 
-def draw(settings: Settings) -> Figure:
+def draw(study: Study) -> Figure:
     """Draw all fingers, the first few enlarged, and eq. (9) with the operating points."""
-    comb, steps = settings.actuator, torque_history(settings.phases)
+    comb, steps = study.actuator, torque_history(study.phases)
     drawn = figure(PAGE_IN, 4.4)
     places = drawn.add_gridspec(2, 2, height_ratios=[1.0, 1.3], width_ratios=[1.1, 1.0])
     whole = drawn.add_subplot(places[0, :])
@@ -122,6 +123,6 @@ COMB = drawing(
     caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest, (a) on "
     "its side; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
-    settings=settings,
+    uses=from_study("actuator phases"),
     rule="study_figures",
 )

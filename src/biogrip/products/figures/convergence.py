@@ -1,6 +1,5 @@
 """Figure 8: the best misfit over generations."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,63 +8,35 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 
-from biogrip.identify.methods import Method
 from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.products.figures.style import ALL_SEEDS, COLUMN_IN, FITTED, TARGET, figure
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import every, from_case
+from biogrip.study.study import Case
 
 _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a case's convergence figure.
-
-    Parameters
-    ----------
-    title, method
-        Title of the case, and method whose histories are drawn.
-    mutation_start
-        First generation in which children mutate; None for methods without mutation.
-    near_noise_tolerance
-        Share by which a misfit may exceed the noise to count as near it.
-    """
-
-    title: str
-    method: Method
-    mutation_start: int | None
-    near_noise_tolerance: float
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the convergence of a case depends on."""
-    method = study.identifiers[study.shown]
-    mutates = "genetic_algorithm" in method.blocks
-    start = case.mutation_start if mutates else None
-    return Settings(case.title, method, start, study.near_noise_tolerance)
-
-
-def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
+def draw(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting the typical seed.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     identifications, histories
         Files of the case, CSV and Parquet.
     """
-    found = read_identifications(identifications, settings.method.name)
+    found = read_identifications(identifications, case.study.shown_method.name)
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())
     unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
     shown = int(typical(found)["seed"])
-    history = read_history(histories, settings.method.name, shown)
-    reached = near_noise(found, settings.near_noise_tolerance)
+    history = read_history(histories, case.study.shown_method.name, shown)
+    reached = near_noise(found, case.study.near_noise_tolerance)
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
@@ -80,22 +51,23 @@ def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
     label = "noise in the trace" if noisy else "lowest misfit"
     axes.axhline(0, color=TARGET, linestyle="--", linewidth=0.8, label=label)
     last = int(history["generation"].max())
-    if settings.mutation_start is not None and settings.mutation_start <= last:
-        _mutation(axes, settings.mutation_start, last)
+    start = case.mutation_start
+    if start is not None and start <= last:
+        _mutation(axes, start, last)
     axes.set_yscale("symlog", linthresh=1, linscale=0.5)
     axes.set_ylim(bottom=-0.8)
     ticks = [tick for tick in _TICKS if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlim(0, last)
-    axes.set_xlabel(settings.method.step)
+    axes.set_xlabel(case.study.shown_method.step)
     axes.set_ylabel(f"best misfit above {'noise' if noisy else 'the lowest'} (%)")
     if noisy:
-        words = near_noise_words(settings.near_noise_tolerance)
-        near = 100 * settings.near_noise_tolerance
+        words = near_noise_words(case.study.near_noise_tolerance)
+        near = 100 * case.study.near_noise_tolerance
         axes.axhline(near, color=TARGET, linestyle="-.", linewidth=0.8, label=words)
     share = f": {reached.sum()} of {len(found)} {words}" if noisy else ""
-    axes.set_title(settings.title + share)
+    axes.set_title(case.title + share)
     axes.legend(loc="upper right")
     return drawn
 
@@ -121,8 +93,8 @@ CONVERGENCE = drawing(
     name="convergence",
     caption="Figure 8 of the paper: the best misfit of every seed over the RMS of the noise in its "
     "trace, step by step. Typical is the seed of median excess at the end.",
-    settings=settings,
+    uses=from_case("title mutation_start study.shown_method study.near_noise_tolerance"),
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
-    cases=lambda study: study.cases,
+    cases=every,
     rule="case_figures",
 )

@@ -5,7 +5,6 @@ half and 95 % of the samples.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,13 +17,14 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import Parameter, Sample, with_fixed
+from biogrip.experiment.sample import Parameter, with_fixed
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, COLUMN_IN, ORANGE, PAGE_IN, SHADE, figure
 from biogrip.products.files.posterior import POSTERIOR, SAMPLES, read_posterior, read_samples
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import from_case, sampled
+from biogrip.study.study import Case
 
 # Most parameters that fit into a column's width.
 _MOST_IN_COLUMN = 4
@@ -36,45 +36,20 @@ _BEYOND = 0.002
 _WIDE = 5.0
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a case's corner plot.
-
-    Parameters
-    ----------
-    title
-        Title of the case.
-    sample, fixed
-        Sample model, and fixed parameters by name.
-    parameters
-        True values by name; empty if unknown.
-    """
-
-    title: str
-    sample: Sample
-    fixed: Mapping[str, float]
-    parameters: Mapping[str, float]
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the figure of a case depends on."""
-    return Settings(case.title, case.sample, case.fixed, case.parameters)
-
-
-def draw(settings: Settings, posterior: Path, samples: Path) -> Figure:
+def draw(case: Case, posterior: Path, samples: Path) -> Figure:
     """Draw the posterior of a case.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     posterior, samples
         Summary of the posterior, JSON, and its samples, Parquet.
     """
-    model = with_fixed(settings.sample.model, settings.fixed)
+    model = with_fixed(case.sample.model, case.fixed)
     values = read_samples(samples, model)
     return draw_corner(
-        model.parameters, values, read_posterior(posterior), settings.parameters, settings.title
+        model.parameters, values, read_posterior(posterior), case.parameters, case.title
     )
 
 
@@ -213,13 +188,13 @@ def _few(low: float, high: float) -> tuple[list[float], list[str]]:
 
 CORNER = drawing(
     draw,
-    name="corner",
+    name="posterior_figure",
     file="posterior",
     caption="Posterior of one seed: each parameter alone, and each against each other, over "
     "logarithms. Outlined: the least regions with half and 95 % of the samples; shaded: the "
     "interval; dotted: the median; orange: the truth.",
-    settings=settings,
+    uses=from_case("title sample fixed parameters"),
     reads={"posterior": the(POSTERIOR), "samples": the(SAMPLES)},
-    cases=lambda study: study.sampled,
+    cases=sampled,
     weight=JUDGEMENT,
 )

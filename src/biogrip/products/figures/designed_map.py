@@ -7,9 +7,10 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.products.designed_cases import WELL, CaseSettings, bounds, designed_cases, settings
+from biogrip.products.designed_cases import USED, WELL, bounds, designed_cases
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
+from biogrip.products.uses import from_case
 from biogrip.study.study import Case, Study
 
 _STIFFNESSES = np.geomspace(1e-3, 1e2, 16)
@@ -17,12 +18,7 @@ _DAMPINGS = np.geomspace(1e-2, 1e3, 16)
 _SHOWN_PERCENT = (0.1, 1000.0)
 
 
-def of_case(study: Study, case: Case) -> CaseSettings:
-    """Return the settings that a case's map depends on."""
-    return settings(study)[case.name]
-
-
-def draw(case: CaseSettings) -> Figure:
+def draw(case: Case) -> Figure:
     """Draw maps of the bounds over k_p and c, in the study's experiment and in the case's own.
 
     Parameters
@@ -30,11 +26,12 @@ def draw(case: CaseSettings) -> Figure:
     case
         Both experiments; k and c_p of all samples in the map are the case's.
     """
-    symbols = [parameter.symbol for parameter in case.model.parameters]
+    symbols = [parameter.symbol for parameter in case.searched.parameters]
     drawn = figure(PAGE_IN, 3.6)
     grid = drawn.subplots(2, len(symbols), sharex=True, sharey=True, squeeze=False)
     samples = samples_of(case)
-    for row, (experiment, whose) in enumerate(((case.before, "study's"), (case.after, "own"))):
+    experiments = (case.study.experiment, "study's"), (case.experiment, "own")
+    for row, (experiment, whose) in enumerate(experiments):
         percent = 100 * bounds(case, experiment, samples).T
         for column, symbol in enumerate(symbols):
             axes = grid[row, column]
@@ -50,12 +47,12 @@ def draw(case: CaseSettings) -> Figure:
     return drawn
 
 
-def samples_of(case: CaseSettings) -> Array:
+def samples_of(case: Case) -> Array:
     """Return parameters of the map's samples, (n, n_parameters), with k_p varying fastest."""
     stiffness, damping = np.meshgrid(_STIFFNESSES, _DAMPINGS)
-    values = {name: np.full(stiffness.size, case.parameters[name]) for name in case.model.names}
+    values = {name: np.full(stiffness.size, case.parameters[name]) for name in case.searched.names}
     values |= {"k_p": stiffness.ravel(), "c": damping.ravel()}
-    return np.stack([values[name] for name in case.model.names], axis=1)
+    return np.stack([values[name] for name in case.searched.names], axis=1)
 
 
 def _map(axes: Axes, percent: Array) -> QuadMesh:
@@ -76,7 +73,7 @@ def _map(axes: Axes, percent: Array) -> QuadMesh:
     return mesh
 
 
-def _mark(axes: Axes, case: CaseSettings) -> None:
+def _mark(axes: Axes, case: Case) -> None:
     """Mark the case, if it is inside the map."""
     k_p, c = case.parameters["k_p"], case.parameters["c"]
     if _STIFFNESSES[0] <= k_p <= _STIFFNESSES[-1]:
@@ -88,7 +85,7 @@ def _mapped(study: Study) -> list[str]:
     return [
         name
         for name in designed_cases(study)
-        if {"k_p", "c"} <= set(study.cases[name].problem.searched.names)
+        if {"k_p", "c"} <= set(study.cases[name].searched.names)
     ]
 
 
@@ -98,6 +95,6 @@ DESIGNED_MAP = drawing(
     caption="Cramér-Rao bounds of every parameter, all of them free, over the parallel spring "
     "k_p and the branch's damper c of a sample, in the study's experiment (above) and in the "
     f"case's own (below), at the same noise. The line is {100 * WELL:g} %, the star the case.",
-    settings=of_case,
+    uses=from_case(USED),
     cases=_mapped,
 )

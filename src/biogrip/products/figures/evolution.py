@@ -1,52 +1,37 @@
 """Figure 10: parameters of the best individual over generations."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.experiment.truth import Truth
-from biogrip.identify.methods import Method
 from biogrip.identify.success import typical
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import read_history, seeds_in_words, typical_in_words
 from biogrip.products.figures.style import ALL_SEEDS, FITTED, PAGE_IN, PAPER, TARGET, figure
 from biogrip.products.files.identifications import HISTORIES, PATH, read_identifications
 from biogrip.products.product import the
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import every, from_case
+from biogrip.study.study import Case
 
 
-@dataclass(frozen=True)
-class Settings:
-    """The sample, and the method whose histories are drawn."""
-
-    truth: Truth
-    method: Method
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the evolution of a case depends on."""
-    return Settings(case.truth, study.identifiers[study.shown])
-
-
-def draw(settings: Settings, identifications: Path, histories: Path) -> Figure:
+def draw(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw every parameter over generations for all seeds, highlighting the typical seed.
 
     Parameters
     ----------
-    settings
-        The sample and the method.
+    case
+        The case.
     identifications, histories
         Files of the case, CSV and Parquet.
     """
-    truth, step = settings.truth, settings.method.step
-    found = read_identifications(identifications, settings.method.name)
+    truth, step = case.truth, case.study.shown_method.step
+    found = read_identifications(identifications, case.study.shown_method.name)
     shown = int(typical(found)["seed"])
     parameters = truth.model.parameters
     columns = [parameter.column for parameter in parameters]
-    history = read_history(histories, settings.method.name, shown, columns)
+    history = read_history(histories, case.study.shown_method.name, shown, columns)
     identified = truth.published.identified
     drawn = figure(PAGE_IN, 3.9)
     grid = drawn.subplots(2, -(-len(parameters) // 2), sharex=True).ravel()
@@ -108,8 +93,8 @@ EVOLUTION = drawing(
     caption="As Figure 10 of the paper: the parameters of the best individual, step by step, for "
     "every seed. Typical is the seed of median excess of the misfit over the noise in its trace. "
     "Named above each panel: how far from the target it ends.",
-    settings=settings,
+    uses=from_case("truth study.shown_method"),
     reads={"identifications": the(PATH), "histories": the(HISTORIES)},
-    cases=lambda study: study.cases,
+    cases=every,
     rule="case_figures",
 )

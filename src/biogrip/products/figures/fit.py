@@ -1,58 +1,40 @@
 """Figures 9, 11 and 12: target, noisy measurement, a typical fit and its residuals."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import Fit, scale_of, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
 from biogrip.products.files.identifications import PATH
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.product import of_batches, the
-from biogrip.products.stages.calibrated import calibration_of
-from biogrip.study.study import Case, Study
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Title, assumptions and method of a case's fit, and y-limits of the paper's figure."""
-
-    title: str
-    problem: CaseProblem
-    method: Method
-    axis_rad: tuple[float, ...]
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the fit of a case depends on."""
-    method = study.identifiers[study.shown]
-    return Settings(case.title, case.problem, method, case.published.axis_rad)
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.uses import every, from_case
+from biogrip.study.study import Case
 
 
 def draw(
-    settings: Settings, identifications: Path, measurements: list[Path], calibrated: list[Path]
+    case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
     """Draw the fit of a case's typical seed.
 
     Parameters
     ----------
-    settings
+    case
         The case.
     identifications, measurements, calibrated
         Files of the case: CSV, Parquet, and YAML if its gripper was calibrated.
     """
-    problem = settings.problem.calibrated(calibrated)
-    fit = typical_fit(problem, settings.method.name, identifications, measurements)
-    ended = f"{settings.method.step} {fit.generations}"
+    problem = case.problem.calibrated(calibrated)
+    fit = typical_fit(problem, case.study.shown_method.name, identifications, measurements)
+    ended = f"{case.study.shown_method.step} {fit.generations}"
     recorded = fit.target_rad is None
     label = f"fit ({ended})" if recorded else f"typical fit (seed {fit.seed}, {ended})"
-    return draw_fit(fit, label, settings.title, settings.axis_rad)
+    return draw_fit(fit, label, case.title, case.published.axis_rad)
 
 
 def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
@@ -93,12 +75,12 @@ FIT = drawing(
     caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and its fit, of the "
     "seed of median excess of the misfit over the noise in its trace; and below the residuals of "
     "the measurement (points) and of the target (line).",
-    settings=settings,
+    uses=from_case("title problem published.axis_rad study.shown_method"),
     reads={
         "identifications": the(PATH),
         "measurements": of_batches(MEASUREMENTS),
-        "calibrated": calibration_of(),
+        "calibrated": CALIBRATED,
     },
-    cases=lambda study: study.cases,
+    cases=every,
     rule="case_figures",
 )

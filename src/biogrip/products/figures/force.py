@@ -1,76 +1,39 @@
 """Force of the jaws on the sample, and rotation of jaws that cannot pull."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import Sample
-from biogrip.instrument.gripper import Gripper
+from biogrip.experiment.protocol import torque_history
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import scale_of
 from biogrip.products.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, figure
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import the
+from biogrip.products.uses import from_case, simulated
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.unilateral import UnilateralResponse, unilateral_response
-from biogrip.study.study import Case, Study
+from biogrip.study.study import Case
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Title of a case, and all inputs of its target except the sampling.
-
-    Parameters
-    ----------
-    title
-        Title.
-    gripper, phases, sample, parameters, nonlinear, unilateral
-        Inputs of the target.
-    """
-
-    title: str
-    gripper: Gripper
-    phases: tuple[Phase, ...]
-    sample: Sample
-    parameters: Mapping[str, float]
-    nonlinear: bool
-    unilateral: bool
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the force in a case depends on."""
-    return Settings(
-        case.title,
-        case.gripper,
-        case.phases,
-        case.sample,
-        case.parameters,
-        case.nonlinear_target,
-        case.unilateral,
-    )
-
-
-def draw(settings: Settings, target: Path) -> Figure:
+def draw(case: Case, target: Path) -> Figure:
     """Draw the jaw force under bilateral contact, and the rotation with and without adhesion.
 
     Parameters
     ----------
-    settings
+    case
         The case.
     target
         Its target, CSV.
     """
     time_s, _, rotation = read_target(target)
-    torque = torque_history(settings.phases)
-    network = settings.sample.model.sample(settings.parameters)
+    torque = torque_history(case.phases)
+    network = case.sample.model.sample(case.parameters)
     # Without inertia, since the jaws ring for less than a sampling interval after a step.
     sticking = jaw_force(
-        settings.gripper, network, torque, time_s, nonlinear=settings.nonlinear, inertia=False
+        case.gripper, network, torque, time_s, nonlinear=case.nonlinear_target, inertia=False
     )[0]
     drawn = figure(COLUMN_IN, 3.2)
     forces, rotations = drawn.subplots(2, 1, sharex=True, height_ratios=[1.25, 1])
@@ -85,20 +48,20 @@ def draw(settings: Settings, target: Path) -> Figure:
             label="the jaws would have to pull",
         )  # fmt: skip
     apart = None
-    if pulling and not settings.nonlinear:
-        apart = unilateral_response(settings.gripper, network, torque, time_s)
+    if pulling and not case.nonlinear_target:
+        apart = unilateral_response(case.gripper, network, torque, time_s)
         shown = _from_loss(apart, apart.jaw_force_N)
         forces.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     forces.set_ylabel(f"jaw force ({unit})")
     low, high = float(negative.min()), factor * float(sticking.max())
     forces.set_ylim(low - 0.08 * (high - low), high + (0.62 if apart else 0.42) * (high - low))
     forces.legend(loc="upper right")
-    forces.set_title(settings.title)
+    forces.set_title(case.title)
 
     factor, unit = scale_of(rotation, "rad")
-    name = "target" + (", jaws that let go" if settings.unilateral else "")
+    name = "target" + (", jaws that let go" if case.unilateral else "")
     rotations.plot(time_s, factor * rotation, color=BLACK, label=name)
-    if apart and not settings.unilateral:
+    if apart and not case.unilateral:
         shown = _from_loss(apart, apart.rotation_rad[0])
         rotations.plot(time_s, factor * shown, "--", color=ORANGE, label="jaws that let go")
     rotations.set_ylabel(f"rotation ({unit})")
@@ -124,8 +87,8 @@ FORCE = drawing(
     caption="The force of the jaws on the sample if they hold it throughout, as the model has it. "
     "Where it is negative the sample would have to stick to jaws that pull it; below, the target "
     "and, where a linear model allows, the rotation of jaws that let go there.",
-    settings=settings,
+    uses=from_case("title gripper phases sample parameters nonlinear_target unilateral"),
     reads={"target": the(TARGETS)},
-    cases=lambda study: study.simulated,
+    cases=simulated,
     rule="case_figures",
 )

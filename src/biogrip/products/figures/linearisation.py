@@ -1,7 +1,5 @@
 """Difference of the linear from the nonlinear model, over angle and torque."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,48 +12,34 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, PAGE_IN, TARGET, figure, panel
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
-from biogrip.products.stages.model_difference import Compared, scaled
-from biogrip.products.stages.model_difference import settings as compared
+from biogrip.products.stages.model_difference import network_of, scaled
 from biogrip.products.tables.linearisation import CAPTION, LIMIT_PERCENT
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 _SHOWN_FACTOR = 20.0
 _MOST_CASES = 3
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Cases to compare and their titles, by name."""
-
-    cases: Mapping[str, Compared]
-    titles: Mapping[str, str]
-
-
-def settings(study: Study) -> Settings:
-    """Return the simulated cases and their titles."""
-    cases = compared(study).cases
-    return Settings(cases, {name: study.cases[name].title for name in cases})
-
-
-def draw(settings: Settings, differences: Path) -> Figure:
+def draw(study: Study, differences: Path) -> Figure:
     """Draw the difference for the last case at twenty times the torque, and maps of a few.
 
     Parameters
     ----------
-    settings
-        Settings of the comparison.
+    study
+        The study with its simulated cases.
     differences
         The comparison of the models, CSV.
     """
     comparison = DIFFERENCES.read(differences)
-    cases = dict(list(settings.cases.items())[:_MOST_CASES])
+    cases = dict(list(study.cases.items())[:_MOST_CASES])
     drawn = figure(PAGE_IN, 2.6)
     traces, *maps = drawn.subplots(1, 1 + len(cases), width_ratios=[1.2] + [1] * len(cases))
     last = list(cases)[-1]
     _difference(traces, cases[last])
-    panel(traces, "a", f"{settings.titles[last]}, {_SHOWN_FACTOR:g} x torque")
+    panel(traces, "a", f"{cases[last].title}, {_SHOWN_FACTOR:g} x torque")
     for index, name in enumerate(cases):
         rows = comparison[comparison["case"] == name]
         grid = rows.pivot(
@@ -84,14 +68,14 @@ def draw(settings: Settings, differences: Path) -> Figure:
         axes.set_xlabel(r"$\hat\theta_2$ (deg)")
         if index == 0:
             axes.set_ylabel("torque / protocol's torque")
-        panel(axes, "bcd"[index], settings.titles[name], most_letters=19)
+        panel(axes, "bcd"[index], cases[name].title, most_letters=19)
     drawn.colorbar(mesh, ax=maps, label="difference (% of peak)", pad=0.01)
     return drawn
 
 
-def _difference(axes: Axes, case: Compared) -> None:
+def _difference(axes: Axes, case: Case) -> None:
     """Draw the nonlinear minus the linear rotation, as the curves themselves look the same."""
-    gripper, network = case.gripper, case.network
+    gripper, network = case.gripper, network_of(case)
     torque = scaled(torque_history(case.phases), _SHOWN_FACTOR)
     time_s = np.linspace(0, torque.end_s, 1001)
     response = step_response(gripper, network, symmetric=torque.symmetric, inertia=False)
@@ -108,13 +92,13 @@ def _difference(axes: Axes, case: Compared) -> None:
     axes.annotate(peak, (0.98, 0.99), xycoords="axes fraction", ha="right", va="top", fontsize=7)
 
 
-LINEARISATION_MAP = drawing(
+LINEARISATION_FIGURE = drawing(
     draw,
-    name="linearisation_map",
+    name="linearisation_figure",
     file="linearisation",
     caption=f"(a) Nonlinear minus linear rotation of one case. (b to d) {CAPTION}",
-    settings=settings,
+    uses=from_study(cases=each(simulated, "title sample parameters gripper phases")),
     reads={"differences": the(DIFFERENCES.path)},
-    when=lambda study: bool(study.simulated),
+    when=simulated,
     rule="study_figures",
 )

@@ -1,7 +1,6 @@
 """Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,8 +14,8 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.elements import damper, spring
 from biogrip.products.figures.nomenclature import nomenclature
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
-from biogrip.products.stages.model_difference import Compared
-from biogrip.products.stages.model_difference import settings as compared
+from biogrip.products.stages.model_difference import network_of
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Study
 
@@ -27,27 +26,14 @@ _ARROW = {"arrowstyle": "->", "lw": 1, "color": BLACK, "shrinkA": 0, "shrinkB": 
 _VISIBLE_RAD = 0.012
 
 
-@dataclass(frozen=True)
-class Settings:
-    """The gripper, and the cases whose largest rotation is drawn."""
-
-    gripper: Gripper
-    cases: tuple[Compared, ...]
-
-
-def settings(study: Study) -> Settings:
-    """Return the gripper and the simulated cases."""
-    return Settings(study.gripper, tuple(compared(study).cases.values()))
-
-
-def draw(settings: Settings) -> Figure:
+def draw(study: Study) -> Figure:
     """Draw linkage, tips, nomenclature and networks."""
-    gripper = settings.gripper
+    gripper = study.gripper
     drawn = figure(PAGE_IN, 4.8)
     (whole, tips), (names, networks) = drawn.subplots(2, 2, width_ratios=[1.15, 1])
     _linkage(whole, gripper)
     panel(whole, "a", "linkage A-B-C-D, to scale")
-    _tips(tips, gripper, _largest_rotation_rad(settings))
+    _tips(tips, gripper, _largest_rotation_rad(study))
     panel(tips, "b", "tips B and C")
     nomenclature(names)
     panel(names, "c", "angles and displacements, not to scale", most_letters=40)
@@ -99,13 +85,15 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
     axes.set_axis_off()
 
 
-def _largest_rotation_rad(settings: Settings) -> float:
+def _largest_rotation_rad(study: Study) -> float:
     """Return the largest rotation of all samples, or a visible one if there is none."""
     peaks = [0.0]
-    for case in settings.cases:
+    for case in study.cases.values():
         torque = torque_history(case.phases)
         time_s = np.linspace(0.0, torque.end_s, 401)
-        rotation = simulated_rotation(case.gripper, case.network, torque, time_s, nonlinear=False)
+        rotation = simulated_rotation(
+            case.gripper, network_of(case), torque, time_s, nonlinear=False
+        )
         peaks.append(float(rotation.max()))
     return max(peaks) or _VISIBLE_RAD
 
@@ -210,6 +198,6 @@ LINKAGE = drawing(
     "displacements u of the tips and x of the node between spring and damper, all to the right; "
     "(d) the constitutive models. Arm length and angle are those of the config; in the default "
     "study they are reconstructed.",
-    settings=settings,
+    uses=from_study("gripper", cases=each(simulated, "sample parameters gripper phases")),
     rule="study_figures",
 )

@@ -1,6 +1,5 @@
 """Moduli of all fits over frequency, and sensitivities over time."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,11 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array, BoolArray
-from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import Network, SampleModel
-from biogrip.experiment.truth import Truth
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import Method
 from biogrip.identify.success import near_noise
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.overview import shown_cases
@@ -35,7 +31,8 @@ from biogrip.products.figures.style import (
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import Weight, of_cases
-from biogrip.study.study import Study
+from biogrip.products.uses import each, from_study, simulated
+from biogrip.study.study import Case, Study
 
 NEAR = 0.1
 """Relative spread of nine tenths of the fits below which the experiment determines a modulus."""
@@ -48,48 +45,19 @@ _STYLES: tuple[dict[str, Any], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class ShownCase:
-    """True values, assumptions of the identification and noise of a drawn sample."""
-
-    truth: Truth
-    problem: CaseProblem
-    noise: Noise
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Drawn samples, methods whose fits are drawn, and tolerance of the noise."""
-
-    cases: tuple[ShownCase, ...]
-    methods: tuple[Method, ...]
-    near_noise_tolerance: float
-
-
-def settings(study: Study) -> Settings:
-    """Return the first simulated cases, the shown method, and least squares if it is run."""
-    cases = [study.cases[name] for name in shown_cases(study)]
-    methods = [study.shown, *(["least_squares"] if "least_squares" in study.methods else [])]
-    return Settings(
-        tuple(ShownCase(case.truth, case.problem, case.noise) for case in cases),
-        tuple(study.identifiers[name] for name in dict.fromkeys(methods)),
-        study.near_noise_tolerance,
-    )
-
-
-def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -> Figure:
+def draw(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
     """Draw moduli over frequency, and sensitivities over time.
 
     Parameters
     ----------
-    settings
-        Settings of the figure.
+    study
+        The study with these cases.
     identifications, targets
         Files of the cases in their order, CSV.
     """
     drawn = figure(PAGE_IN, 4.4)
-    axes = drawn.subplots(2, len(settings.cases), squeeze=False, height_ratios=[1.35, 1])
-    files = zip(settings.cases, identifications, targets, strict=True)
+    axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
+    files = zip(study.cases.values(), identifications, targets, strict=True)
     for column, (case, identified, target) in enumerate(files):
         time_s, _, rotation = read_target(target)
         logs = case.problem.logs(case.truth.parameters)
@@ -97,7 +65,7 @@ def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -
         sigma = standard_deviation(rotation, case.noise)
         # Without noise there is nothing to compare with: NaN.
         relative = sensitivity / np.where(sigma > 0, sigma, np.nan)
-        _moduli(axes[0, column], settings, case, identified, time_s)
+        _moduli(axes[0, column], study, case, identified, time_s)
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
         panel(axes[0, column], "abc"[column], case.truth.title, _TITLE_LETTERS)
         panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
@@ -110,8 +78,8 @@ def draw(settings: Settings, identifications: list[Path], targets: list[Path]) -
 
 def _moduli(
     axes: Axes,
-    settings: Settings,
-    case: ShownCase,
+    study: Study,
+    case: Case,
     identified: Path,
     time_s: Array,
 ) -> None:
@@ -120,11 +88,11 @@ def _moduli(
     omega = np.geomspace(slowest / 30, 30 * fastest, _POINTS)
     model = case.problem.model
     near = []
-    for method in settings.methods:
+    for method in {m.name: m for m in (study.shown_method, study.fitting_method)}.values():
         found = first_seeds(read_identifications(identified, method.name))
         fits = found[[p.column for p in model.parameters]].to_numpy(float)
         moduli = _modulus(model.network(fits), omega)
-        near.append(moduli[near_noise(found, settings.near_noise_tolerance)])
+        near.append(moduli[near_noise(found, study.near_noise_tolerance)])
         style = line_of(method) | {"linewidth": 0.4, "alpha": 0.45}
         for index, modulus in enumerate(moduli):
             label = method.title if index == 0 else None
@@ -187,12 +155,15 @@ MODULI = drawing(
     f"near the noise agree on the modulus to {NEAR:.0%}, whatever their parameters. Lower row: how "
     "much the rotation changes with the logarithm of each parameter, in standard deviations of one "
     "measured value's noise; within the shaded band a single value does not show it.",
-    settings=settings,
+    uses=from_study(
+        "shown_method fitting_method near_noise_tolerance",
+        cases=each(shown_cases, "truth problem noise"),
+    ),
     reads={
         "identifications": of_cases(PATH, shown_cases),
         "targets": of_cases(TARGETS, shown_cases),
     },
-    when=lambda study: bool(study.simulated),
+    when=simulated,
     rule="study_figures",
     weight=Weight(10, 2000),
 )

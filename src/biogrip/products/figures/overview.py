@@ -1,6 +1,5 @@
 """Overview of a study: one fit, and the scatter of all identifications about the truth."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from biogrip.arrays import Array
 from biogrip.experiment.truth import Truth
-from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.success import near_noise, near_noise_words
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import (
@@ -37,7 +35,8 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.files.verdicts import EXPECTED, bounded_on_a_side, read_verdicts
 from biogrip.products.product import Reads, Weight, of_cases
-from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.study.study import Study
 
 _WORST = 1e3
@@ -47,42 +46,13 @@ _TITLE_LETTERS = 19
 _MOST_CASES = 3
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the overview.
-
-    Parameters
-    ----------
-    cases
-        True values of the first few simulated cases.
-    problem
-        Assumptions of the first case's identification.
-    method
-        Method whose identifications are drawn.
-    near_noise_tolerance
-        Share by which a misfit may exceed the noise to count as near it.
-    """
-
-    cases: tuple[Truth, ...]
-    problem: CaseProblem
-    method: str
-    near_noise_tolerance: float
-
-
 def shown_cases(study: Study) -> list[str]:
     """Return names of the first simulated cases, as many as fit."""
     return study.simulated[:_MOST_CASES]
 
 
-def settings(study: Study) -> Settings:
-    """Return the settings of the overview."""
-    cases = [study.cases[name] for name in shown_cases(study)]
-    truths = tuple(case.truth for case in cases)
-    return Settings(truths, cases[0].problem, study.shown, study.near_noise_tolerance)
-
-
 def draw(
-    settings: Settings,
+    study: Study,
     identifications: list[Path],
     expected: list[Path],
     measurements: list[Path],
@@ -92,26 +62,26 @@ def draw(
 
     Parameters
     ----------
-    settings
-        Settings of the figure.
+    study
+        The study with these cases.
     identifications, expected
         CSV and JSON files of the cases, in their order.
     measurements, calibrated
         Files of the first case: Parquet, and YAML if its gripper was calibrated.
     """
-    cases = settings.cases
+    cases = list(study.cases.values())
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))
-    problem = settings.problem.calibrated(calibrated)
-    fit = typical_fit(problem, settings.method, identifications[0], measurements)
-    _fit(axes[0], cases[0], fit)
+    problem = cases[0].problem.calibrated(calibrated)
+    fit = typical_fit(problem, study.shown, identifications[0], measurements)
+    _fit(axes[0], cases[0].truth, fit)
     seeds = 0
     for index, (case, path) in enumerate(zip(cases, identifications, strict=True)):
-        found = read_identifications(path, settings.method)
+        found = read_identifications(path, study.shown)
         seeds = len(found)
-        tolerance = settings.near_noise_tolerance
+        tolerance = study.near_noise_tolerance
         bounded = bounded_on_a_side(read_verdicts(expected[index]))
-        _scatter(axes[index + 1], case, first_seeds(found), tolerance, index, bounded)
+        _scatter(axes[index + 1], case.truth, first_seeds(found), tolerance, index, bounded)
     legend: dict[str, Any] = {}
     for panel_axes in axes[1:]:
         legend |= {
@@ -231,16 +201,14 @@ OVERVIEW = drawing(
     caption="(a) Target, noisy measurement and typical fit of the first case. (b to d) Identified "
     "over target value of every seed of the first three cases, for c + c_p and each parameter that "
     "traces can tell from zero; triangles at the edge stand for values off the axis.",
-    settings=settings,
+    uses=from_study("shown near_noise_tolerance", cases=each(shown_cases, "truth problem")),
     reads={
         "identifications": of_cases(PATH, shown_cases),
         "expected": of_cases(EXPECTED, shown_cases),
         "measurements": Reads(lambda plan, _: plan.batch_files(MEASUREMENTS, _first(plan.study))),
-        "calibrated": Reads(
-            lambda plan, _: calibration_of().files(plan, {"case": _first(plan.study)})
-        ),
+        "calibrated": Reads(lambda plan, _: CALIBRATED.files(plan, {"case": _first(plan.study)})),
     },
-    when=lambda study: bool(study.simulated),
+    when=simulated,
     rule="study_figures",
     weight=Weight(10, 2000),
 )

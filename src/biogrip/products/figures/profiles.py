@@ -1,7 +1,6 @@
 """Profile likelihoods: increase of chi-squared over the values of each quantity."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,33 +18,21 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.stages.expected import verdicts_expected
-from biogrip.study.study import Case, Study
+from biogrip.products.stages.expected import VERDICTS_EXPECTED
+from biogrip.products.uses import every, from_case
+from biogrip.study.study import Case
 
 _HIGHEST = 12.0
 # Ratio of the ends above which an axis is logarithmic.
 _WIDE = 5.0
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Title and true parameters of a case; none if they are unknown."""
-
-    title: str
-    parameters: Mapping[str, float]
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the profiles of a case depend on."""
-    return Settings(case.title, case.parameters)
-
-
-def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
+def draw(case: Case, measured: Path, expected: list[Path]) -> Figure:
     """Draw the profile of every quantity of a case, with confidence limits.
 
     Parameters
     ----------
-    settings
+    case
         The case.
     measured
         Verdicts on the judged trace, JSON.
@@ -53,11 +40,14 @@ def draw(settings: Settings, measured: Path, expected: list[Path]) -> Figure:
         Verdicts on the trace without noise, JSON, if the truth is known.
     """
     others = [read_verdicts(path) for path in expected]
-    return draw_profiles(settings, read_verdicts(measured), others)
+    return draw_profiles(case.title, case.parameters, read_verdicts(measured), others)
 
 
 def draw_profiles(
-    settings: Settings, found: Mapping[str, Any], others: Sequence[Mapping[str, Any]] = ()
+    title: str,
+    truths: Mapping[str, float],
+    found: Mapping[str, Any],
+    others: Sequence[Mapping[str, Any]] = (),
 ) -> Figure:
     """Draw profiles from loaded verdicts; see `draw`."""
     foreseen = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
@@ -77,8 +67,8 @@ def draw_profiles(
                 line.set_label(label)
         _limits(axes, item)
         names = item["quantity"].split(" + ")
-        if set(names) <= set(settings.parameters):
-            truth = sum(settings.parameters[name] for name in names)
+        if set(names) <= set(truths):
+            truth = sum(truths[name] for name in names)
             axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
         low, high = _window(item)
         if high / low > _WIDE:
@@ -94,7 +84,7 @@ def draw_profiles(
     grid[0].set_ylabel("rise of χ²")
     handles, labels = grid[0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside lower right", ncols=5)
-    drawn.suptitle(settings.title, x=0.01, ha="left", fontsize=8)
+    drawn.suptitle(title, x=0.01, ha="left", fontsize=8)
     return drawn
 
 
@@ -141,9 +131,9 @@ PROFILES = drawing(
     caption="Profile likelihoods of one seed, and without noise (grey); shaded: the confidence "
     "interval; dashed: its threshold; dotted: the increase at an end of the search range above "
     "which the interval has a limit on that side.",
-    settings=settings,
-    reads={"measured": the(PATH), "expected": verdicts_expected()},
-    cases=lambda study: study.cases,
+    uses=from_case("title parameters"),
+    reads={"measured": the(PATH), "expected": VERDICTS_EXPECTED},
+    cases=every,
     rule="case_figures",
     weight=JUDGEMENT,
 )

@@ -158,12 +158,12 @@ def _symbol(quantity: str) -> str:
     return "$" + re.sub(r"_(\w+)", r"_{\1}", quantity) + "$"
 
 
-ROBUSTNESS_MAP = drawing(
+ROBUSTNESS_FIGURE = drawing(
     draw,
-    name="robustness_map",
+    name="robustness_figure",
     file="robustness",
     caption=CAPTION,
-    settings=heat_maps,
+    uses=heat_maps,
     reads={"points": points_of_cases()},
     sweeps=True,
     rule="",

@@ -1,7 +1,6 @@
 """Errors over seeds as distributions, beside the Cramer-Rao bound and the paper's value."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from statistics import NormalDist
 from typing import Any
@@ -13,13 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, standard_deviation
-from biogrip.experiment.truth import Truth
+from biogrip.experiment.noise import standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.verdicts import DETERMINED
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import SHOWN_SEEDS, seeds_in_words
 from biogrip.products.figures.style import (
@@ -34,8 +30,9 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.stages.calibrated import calibration_of
-from biogrip.study.study import Case, Study
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.uses import from_case, simulated
+from biogrip.study.study import Case
 
 # Bound of a logarithm above which an axis shows decades instead of percent.
 _LOOSE = 0.25
@@ -43,24 +40,8 @@ _WIDTHS = 8.0
 _DECADES = 1e4
 
 
-@dataclass(frozen=True)
-class Settings:
-    """True values, assumptions of the identification, noise and confidence level of a case."""
-
-    truth: Truth
-    problem: CaseProblem
-    methods: Mapping[str, Method]
-    noise: Noise
-    confidence: float
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the scatter of a case depends on."""
-    return Settings(case.truth, case.problem, study.identifiers, case.noise, case.confidence)
-
-
 def draw(
-    settings: Settings,
+    case: Case,
     identifications: Path,
     target: Path,
     expected: Path,
@@ -70,8 +51,8 @@ def draw(
 
     Parameters
     ----------
-    settings
-        The sample.
+    case
+        The case.
     identifications, target
         Files of the case, CSV.
     expected
@@ -82,11 +63,11 @@ def draw(
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)
-    truth, case_problem = settings.truth, settings.problem.calibrated(calibrated)
+    truth, case_problem = case.truth, case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     log_truth = case_problem.logs(truth.parameters)
     _, sensitivity = case_problem.of(time_s, rotation).residuals(log_truth)
-    noise_rad = standard_deviation(rotation, settings.noise)
+    noise_rad = standard_deviation(rotation, case.noise)
     quantities = parameters_and_sum(case_problem.searched)
     drawn, grid = row_of_panels(len(quantities), 3.1)
     for index, (axes, quantity) in enumerate(zip(grid, quantities, strict=True)):
@@ -101,17 +82,17 @@ def draw(
         # The bound is a tangent at the truth: no use if the quantity is not determined, or if it
         # is zero.
         known = limit if limit and verdict == DETERMINED else np.inf
-        _quantity(axes, settings, found["method"], ratios.to_numpy(float), known)
+        _quantity(axes, case, found["method"], ratios.to_numpy(float), known)
         _paper(axes, truth.published.identified, [p.name for p in names], value)
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], _title(quantity, known, verdict), 60)
         if index == 0:
             axes.set_ylabel("identified / target")
-    _legend(drawn, settings, list(found["method"].unique()), found["seed"].nunique())
+    _legend(drawn, case, list(found["method"].unique()), found["seed"].nunique())
     return drawn
 
 
 def _quantity(
-    axes: Axes, settings: Settings, methods: "pd.Series[str]", ratios: Array, limit: float
+    axes: Axes, case: Case, methods: "pd.Series[str]", ratios: Array, limit: float
 ) -> None:
     """Draw one column of points per method, with points beyond the axis at its edge."""
     loose = limit > _LOOSE
@@ -125,7 +106,7 @@ def _quantity(
         x = place + 0.6 * ((np.arange(len(shown)) * 0.618034) % 1 - 0.5)
         inside = (shown > bottom) & (shown < top)
         dots: dict[str, Any] = {
-            "color": line_of(settings.methods[name])["color"],
+            "color": line_of(case.study.identifiers[name])["color"],
             "linestyle": "",
             "markeredgewidth": 0,
             "alpha": 0.55,
@@ -141,7 +122,7 @@ def _quantity(
         axes.plot([place, place], [low, high], color=TARGET, linewidth=1.0)
         axes.plot([place - 0.3, place + 0.3], [middle, middle], color=TARGET, linewidth=1.4)
     if np.isfinite(limit):
-        reach = NormalDist().inv_cdf((1 + settings.confidence) / 2) * limit
+        reach = NormalDist().inv_cdf((1 + case.confidence) / 2) * limit
         # Of the logarithm, straight where the axis is.
         low, high = (np.exp(-reach), np.exp(reach)) if loose else (1 - reach, 1 + reach)
         axes.axhspan(low, high, color=SHADE, zorder=0, linewidth=0)
@@ -169,11 +150,11 @@ def _title(quantity: Quantity, limit: float, verdict: str) -> str:
     return f"{quantity.symbol}: {known}"
 
 
-def _legend(drawn: Figure, settings: Settings, methods: list[str], seeds: int) -> None:
+def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
     handles: list[Any] = []
     axes = drawn.axes[0]
     for name in methods:
-        method = settings.methods[name]
+        method = case.study.identifiers[name]
         color = line_of(method)["color"]
         handles += axes.plot(
             [], [], "o", color=color, markersize=4, label=method.title, markeredgewidth=0
@@ -181,10 +162,10 @@ def _legend(drawn: Figure, settings: Settings, methods: list[str], seeds: int) -
     handles += axes.plot(
         [], [], "^", color=TARGET, markersize=4, label="beyond the axis", markeredgewidth=0
     )
-    percent = f"{100 * settings.confidence:g} %"
+    percent = f"{100 * case.confidence:g} %"
     label = f"{percent} by the Cramér-Rao bound (named above), rest known"
     handles.append(axes.fill([], [], color=SHADE, label=label)[0])
-    truth = settings.truth
+    truth = case.truth
     if truth.published.identified:
         handles += axes.plot([], [], color=PAPER, linestyle=(0, (4, 2)), label="paper")
     drawn.legend(handles=handles, loc="outside lower left", ncols=3)
@@ -199,14 +180,14 @@ SCATTER = drawing(
     "traces determine it: the confidence interval by the Cramér-Rao bound, with parameters "
     "without information fixed; dashed: the paper. Bars are quartiles, triangles "
     "stand for values beyond the axis.",
-    settings=settings,
+    uses=from_case("truth problem noise confidence study.identifiers"),
     reads={
         "identifications": the(PATH),
         "target": the(TARGETS),
         "expected": the(EXPECTED),
-        "calibrated": calibration_of(),
+        "calibrated": CALIBRATED,
     },
-    cases=lambda study: study.simulated,
+    cases=simulated,
     rule="case_figures",
     weight=JUDGEMENT,
 )

@@ -14,7 +14,8 @@ from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.product import Reads
 from biogrip.products.stages.sequence import AFTER, BEFOREHAND, REPEATED, TRUTH, sequenced
 from biogrip.products.tables.sequential import IN_WORDS, files_of, half_widths, known_well
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import from_case, to_identify
+from biogrip.study.study import Case
 
 _STYLES: dict[str, dict[str, Any]] = {
     REPEATED: {"color": GREY, "marker": "s", "linestyle": "-"},
@@ -27,21 +28,17 @@ _STYLES: dict[str, dict[str, Any]] = {
 _OPEN = 100.0
 
 
-def of_case(_: Study, case: Case) -> dict[str, str]:
-    """Return the symbols of the case's parameters by name."""
-    return {p.name: p.symbol for p in case.problem.searched.parameters}
-
-
-def draw(symbols: dict[str, str], rows: list[Path]) -> Figure:
+def draw(case: Case, rows: list[Path]) -> Figure:
     """Draw the share of cells in which each quantity is known, and the intervals' half widths.
 
     Parameters
     ----------
-    symbols
-        Symbols by quantity.
+    case
+        The case.
     rows
         Estimates and limits for each cell, CSV.
     """
+    symbols = {p.name: p.symbol for p in case.problem.searched.parameters}
     found = pd.concat([SEQUENCES.read(file) for file in rows])
     found = found.assign(well=known_well(found), half=half_widths(found))
     drawn = figure(PAGE_IN, 3.8)
@@ -80,14 +77,14 @@ def _lines(axes: Axes, values: "pd.Series[float]") -> None:
 
 SEQUENTIAL_FIGURE = drawing(
     draw,
-    name="sequential_cells",
+    name="sequential_figure",
     file="sequential",
     caption="In how many simulated cells quantities are known to "
     f"{100 * WELL:g} %, by their interval from the profile likelihood, after so many experiments "
     "(above), and half of that interval in the median cell, `open` where it has one end (below): "
     "the study's experiment repeated; that once, and each next one designed from what all before "
     "told; one designed for all cells, repeated; one designed for the true cell, repeated.",
-    settings=of_case,
+    uses=from_case(problem=to_identify),
     reads={"rows": Reads(lambda plan, job: files_of(plan, job["case"]))},
     cases=sequenced,
 )

@@ -1,7 +1,6 @@
 """Figure 3: torque and voltage of the comb drives over time."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -10,35 +9,19 @@ from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, torque_at, torque_history
+from biogrip.experiment.protocol import torque_at, torque_history
 from biogrip.instrument import actuator
-from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
-from biogrip.instrument.gripper import Gripper
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, COLUMN_IN, GREEN, ORANGE, PURPLE, figure
+from biogrip.products.uses import from_study
 from biogrip.study.study import Study
 
 
-@dataclass(frozen=True)
-class Settings:
-    """The protocol, the comb drives, and the gripper in its neutral configuration."""
-
-    phases: tuple[Phase, ...]
-    actuator: CombDrive
-    gripper: Gripper
-    jaw_gap_m: float
-
-
-def settings(study: Study) -> Settings:
-    """Return protocol, comb drive and gripper."""
-    return Settings(study.phases, study.actuator, study.gripper, study.jaw_gap_m)
-
-
-def draw(settings: Settings) -> Figure:
+def draw(study: Study) -> Figure:
     """Draw torque and voltage of both arms against time."""
-    comb = settings.actuator
-    history = torque_history(settings.phases)
+    comb = study.actuator
+    history = torque_history(study.phases)
     # Include both sides of every jump, and enough points for ramps and sinusoids.
     grid = np.linspace(0, history.end_s, 4001)
     time_s = np.sort(np.concatenate((grid, history.time_s, np.nextafter(history.time_s, -1))))
@@ -51,7 +34,7 @@ def draw(settings: Settings) -> Figure:
     upper.set_ylim(0, 1.4 * most)
 
     highest = 0.0
-    for touching_Nm, colour, label in _touching(settings):
+    for touching_Nm, colour, label in _touching(study):
         volts = [actuator.voltage(comb, touching_Nm + torque) for torque in arms]
         _line(lower, time_s, ends, volts, "V", colour, label)
         highest = max(highest, *(float(v.max()) for v in volts))
@@ -67,11 +50,11 @@ def draw(settings: Settings) -> Figure:
     return drawn
 
 
-def _touching(settings: Settings) -> Iterator[tuple[float, str, str]]:
+def _touching(study: Study) -> Iterator[tuple[float, str, str]]:
     """Yield torques that hold the jaws at the extreme sample sizes, and zero, as in the paper."""
     for size_m, colour in ((SMALLEST_M, PURPLE), (LARGEST_M, GREEN)):
         try:
-            found = contact(settings.gripper, settings.jaw_gap_m, settings.actuator, size_m)
+            found = contact(study.gripper, study.jaw_gap_m, study.actuator, size_m)
         except BiogripError:
             # This gripper does not reach such a sample.
             continue
@@ -112,6 +95,6 @@ TORQUE = drawing(
     caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
     "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
     "the smallest and at the largest sample that the gripper takes.",
-    settings=settings,
+    uses=from_study("phases actuator gripper jaw_gap_m"),
     rule="study_figures",
 )

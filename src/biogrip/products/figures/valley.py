@@ -1,7 +1,5 @@
 """Chi-squared over c and c_p, whose valley shows that only their sum is determined."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +9,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array
-from biogrip.identify.methods import Method
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import first_seeds, seeds_in_words
 from biogrip.products.figures.style import COLUMN_IN, FITTED, PAPER, TARGET, figure
@@ -20,7 +17,8 @@ from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.verdicts import PATH as VERDICTS
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 _LEVELS = [0.0, 1.0, 3.84, 10.83, 30.0, 100.0, 300.0, 1000.0]
 # Increase of chi^2 up to which axes show the valley; margin as a share of what they show; largest
@@ -43,48 +41,20 @@ _TRUE = _POINTS | {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a case's valley figure.
-
-    Parameters
-    ----------
-    title
-        Title of the case.
-    method
-        Method whose fits are drawn.
-    parameters, identified
-        True values and the paper's, by name; empty if unknown.
-    """
-
-    title: str
-    method: Method
-    parameters: Mapping[str, float]
-    identified: Mapping[str, float]
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the valley of a case depends on."""
-    method = "least_squares" if "least_squares" in study.methods else study.shown
-    return Settings(
-        case.title, study.identifiers[method], case.parameters, case.published.identified
-    )
-
-
-def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
+def draw(case: Case, measured: Path, identifications: Path) -> Figure:
     """Draw the increase of chi-squared over the two exchangeable dampers of a case.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     measured, identifications
         Verdicts with a valley, JSON, and identifications, CSV, of the case.
     """
     found = read_verdicts(measured)
     valley = found["valley"]
     x, y = valley["x"], valley["y"]
-    identified = read_identifications(identifications, settings.method.name)
+    identified = read_identifications(identifications, case.study.fitting_method.name)
     drawn = figure(COLUMN_IN, 3.1)
     axes = drawn.subplots()
     colours = colormaps["cividis_r"](np.linspace(0, 0.95, len(_LEVELS)))
@@ -107,12 +77,12 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     drawn_seeds = seeds_in_words(len(identified))
     columns = [f"{item['name']}_Ns_per_m" for item in (x, y)]
     points = first_seeds(identified)[columns].to_numpy(float)
-    label = f"{settings.method.title}, {drawn_seeds}"
+    label = f"{case.study.fitting_method.title}, {drawn_seeds}"
     known = [
         (np.array([[place[x["name"]], place[y["name"]]]]), style, name)
         for place, style, name in (
-            (settings.identified, _THE_PAPERS, "paper"),
-            (settings.parameters, _TRUE, "truth"),
+            (case.published.identified, _THE_PAPERS, "paper"),
+            (case.parameters, _TRUE, "truth"),
         )
         if {x["name"], y["name"]} <= set(place)
     ]
@@ -125,7 +95,7 @@ def draw(settings: Settings, measured: Path, identifications: Path) -> Figure:
     axes.set_ylim(low[1], high[1])
     axes.set_xlabel(f"{x['symbol']} ({x['unit']})")
     axes.set_ylabel(f"{y['symbol']} ({y['unit']})")
-    axes.set_title(settings.title)
+    axes.set_title(case.title)
     axes.set_box_aspect(1)
     drawn.legend(loc="outside lower center", ncols=2)
     bar = drawn.colorbar(filled, ax=axes, ticks=list(np.sqrt(_LEVELS)))
@@ -161,7 +131,7 @@ VALLEY = drawing(
     f"is below {_DEEP:g}: the valley along which they trade against each other and, if it is that "
     "deep, its arm along which c is that of a branch too weak and slow to be seen (it goes on "
     "further). White: not computed.",
-    settings=settings,
+    uses=from_case("title parameters published.identified study.fitting_method"),
     reads={"measured": the(VERDICTS), "identifications": the(IDENTIFICATIONS)},
     cases=lambda study: [name for name, case in study.cases.items() if case.has_valley],
     rule="case_figures",

@@ -1,81 +1,50 @@
 """Waterfall plot: sorted increase of chi-squared over the global optimum, by method."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from biogrip.identify.methods import Method
 from biogrip.identify.success import chi_square_increase, near_noise_words
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import COLUMN_IN, TARGET, figure, line_of
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import the
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import from_case, simulated
+from biogrip.study.study import Case
 
 _LOWEST = 1e-3
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of a case's waterfall plot.
-
-    Parameters
-    ----------
-    title
-        The case in print.
-    methods
-        By what its traces were identified.
-    samples
-        Number of samples in a trace.
-    optimum_tolerance, near_noise_tolerance
-        Tolerances of the global optimum and of the noise.
-    """
-
-    title: str
-    methods: Mapping[str, Method]
-    samples: int
-    optimum_tolerance: float
-    near_noise_tolerance: float
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the waterfall of a case depends on."""
-    tolerances = study.optimum_tolerance, study.near_noise_tolerance
-    return Settings(case.title, study.identifiers, case.samples, *tolerances)
-
-
-def draw(settings: Settings, identifications: Path) -> Figure:
+def draw(case: Case, identifications: Path) -> Figure:
     """Draw the sorted increases of chi-squared over the lowest known, for every method.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     identifications
         Files of the case, CSV.
     """
     found = read_identifications(identifications)
-    increase = np.maximum(chi_square_increase(found, settings.samples), _LOWEST)
-    tolerance = settings.optimum_tolerance
+    increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
+    tolerance = case.study.optimum_tolerance
     drawn = figure(COLUMN_IN, 3.15)
     axes = drawn.subplots()
     methods = found["method"].unique()
     curves = []
     # Where curves coincide each is seen beside the thinner ones on top of it.
     for name, width in zip(methods, np.linspace(3.2, 1.0, len(methods)), strict=True):
-        method = settings.methods[name]
+        method = case.study.identifiers[name]
         mine = np.sort(increase[found["method"] == name])
         share = 100 * np.mean(mine <= tolerance)
         place = 100 * (np.arange(len(mine)) + 0.5) / len(mine)
         label = f"{method.title}: {share:.0f} %"
         curves += axes.plot(place, mine, label=label, linewidth=width, **line_of(method))
-    near = settings.samples * ((1 + settings.near_noise_tolerance) ** 2 - 1)
+    near = case.samples * ((1 + case.study.near_noise_tolerance) ** 2 - 1)
     # Limits are named in the legend, since a curve may cover any place along them.
-    words = near_noise_words(settings.near_noise_tolerance)
+    words = near_noise_words(case.study.near_noise_tolerance)
     line: dict[str, Any] = {"color": TARGET, "linewidth": 0.8}
     limits = [
         axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
@@ -89,7 +58,7 @@ def draw(settings: Settings, identifications: Path) -> Figure:
     axes.set_xlim(0, 100)
     axes.set_xlabel("seeds, sorted (%)")
     axes.set_ylabel("Δχ² over the lowest known")
-    axes.set_title(f"{settings.title}: share at the global optimum")
+    axes.set_title(f"{case.title}: share at the global optimum")
     # Each legend column ends with a limit; a third column would be too wide.
     half = -(-len(curves) // 2)
     handles = [*curves[:half], limits[0], *curves[half:], limits[1]]
@@ -102,8 +71,10 @@ WATERFALL = drawing(
     name="waterfall",
     caption="Increase of χ² over the global optimum at the end of each method, sorted over seeds. "
     "Dashed: tolerance of the optimum; dotted: the study's much larger tolerance of the noise.",
-    settings=settings,
+    uses=from_case(
+        "title samples study.identifiers study.optimum_tolerance study.near_noise_tolerance"
+    ),
     reads={"identifications": the(PATH)},
-    cases=lambda study: study.simulated,
+    cases=simulated,
     rule="case_figures",
 )

@@ -1,6 +1,5 @@
 """Summary page of one trace: confidence limits, notes and figures, self-contained."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import jinja2
@@ -15,46 +14,22 @@ from biogrip.products.pages.png_address import png_address
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, the, wildcards_of
 from biogrip.products.stages.judgement import TRACE
-from biogrip.study.study import Study
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 _TEMPLATE = "summary.html.j2"
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Names and template of a case's summary page.
-
-    Parameters
-    ----------
-    case, title, model
-        Name of the case, its title, and title of its sample model.
-    trace
-        Description of the trace.
-    template
-        Jinja template of the page.
-    """
-
-    case: str
-    title: str
-    model: str
-    trace: str
-    template: str
+def _template(_: Case) -> str:
+    return Path(__file__).with_name(_TEMPLATE).read_text(encoding="utf-8")
 
 
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return names and template of a case's summary page."""
-    case = study.case(job["case"])
-    trace = case.file if case.recorded else f"seed {TRACE} of the simulated traces"
-    template = Path(__file__).with_name(_TEMPLATE).read_text(encoding="utf-8")
-    return Settings(case.name, case.title, case.sample.model.title, trace, template)
-
-
-def write(settings: Settings, verdicts: Path, figures: list[Path], page: Path) -> None:
+def write(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
     """Write the summary of a case.
 
     Parameters
     ----------
-    settings
+    case
         The case.
     verdicts
         Verdicts on the judged trace, JSON.
@@ -69,10 +44,10 @@ def write(settings: Settings, verdicts: Path, figures: list[Path], page: Path) -
         If an input cannot be read.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True)
-    text = environment.from_string(settings.template).render(
-        title=settings.title,
-        model=settings.model,
-        trace=settings.trace,
+    text = environment.from_string(_template(case)).render(
+        title=case.title,
+        model=case.sample.model.title,
+        trace=case.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
         figures=[(path.stem, embedded(path)) for path in figures],
     )
@@ -102,7 +77,7 @@ SUMMARY = Product(
     "summary",
     {"page": "results/summaries/{case}.html"},
     write,
-    settings,
+    from_case("title sample file", template=_template),
     lambda plan: wildcards_of(plan.study.cases),
     message="Writing the summary page of {case}",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},

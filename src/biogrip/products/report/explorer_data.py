@@ -10,7 +10,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.digits import rounded
-from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.methods import Method
@@ -19,6 +19,7 @@ from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.traces import read_measurements, seeds_in
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.response.linear import is_symmetric
+from biogrip.study.study import Case
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,38 +29,6 @@ MOST_BYTES = 3_000_000
 """Bound on all traces in the report, so that phones can load it."""
 
 _NUMBER_BYTES = 4
-
-
-@dataclass(frozen=True)
-class ExploredCase:
-    """One case of the explorer.
-
-    Parameters
-    ----------
-    name, title
-        Name used in files, and title.
-    parameters
-        True values by name, if known.
-    problem
-        Assumptions of the identification.
-    noise
-        Noise of the rotation; None for a recorded trace.
-    nonlinear
-        True if target or identification is nonlinear: the closed form is then approximate.
-    """
-
-    name: str
-    title: str
-    parameters: Mapping[str, float]
-    problem: CaseProblem
-    noise: Noise | None
-    nonlinear: bool
-
-    def closed_form(self, time_s: Array, rotation_rad: Array, noise_rad: float) -> bool:
-        """Return whether the page can compute responses: symmetric, and without ringing."""
-        problem = self.problem
-        alike = is_symmetric(problem.gripper, problem.torque)
-        return alike and not problem.shows_inertia(time_s, rotation_rad, noise_rad)
 
 
 @dataclass(frozen=True)
@@ -74,7 +43,7 @@ class CaseFiles:
 
 
 def explorer_data(
-    cases: Sequence[ExploredCase], files: Sequence[CaseFiles], methods: Sequence[Method]
+    cases: Sequence[Case], files: Sequence[CaseFiles], methods: Sequence[Method]
 ) -> list[dict[str, Any]]:
     """Return the data for the explorer.
 
@@ -95,7 +64,7 @@ def explorer_data(
 
 
 def _case(
-    case: ExploredCase, files: CaseFiles, methods: Sequence[Method], most_bytes: int
+    case: Case, files: CaseFiles, methods: Sequence[Method], most_bytes: int
 ) -> dict[str, Any]:
     problem = case.problem.calibrated(files.calibrated)
     model = problem.model
@@ -110,7 +79,7 @@ def _case(
         own = [seed for seed in seeds if files_by_seed[seed] == path]
         traces |= read_measurements(path, own).rotation_rad if own else {}
     sigma = 0.0
-    if case.noise is not None and target is not None:
+    if target is not None:
         sigma = float(np.sqrt(np.mean(standard_deviation(target, case.noise) ** 2)))
     torque, gripper = problem.torque, problem.gripper
     shown = next(iter(traces.values())) if target is None else target
@@ -118,8 +87,10 @@ def _case(
         "name": case.name,
         "title": case.title,
         "model": model.title,
-        "closed_form": case.closed_form(time_s, shown, sigma),
-        "nonlinear": case.nonlinear,
+        # What the page can compute: symmetric arms that do not ring.
+        "closed_form": is_symmetric(case.problem.gripper, torque)
+        and not case.problem.shows_inertia(time_s, shown, sigma),
+        "nonlinear": problem.nonlinear or (not case.recorded and case.nonlinear_target),
         "truth": _network(model, case.parameters),
         "elements": _elements(problem),
         "gripper": {

@@ -15,7 +15,6 @@ from markupsafe import Markup
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
-from biogrip.identify.methods import Method
 from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
@@ -24,10 +23,11 @@ from biogrip.products.files.verdicts import PATH as VERDICTS
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.products.pages.summary import embedded
 from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Reads, Weight
-from biogrip.products.report.explorer_data import CaseFiles, ExploredCase, explorer_data
+from biogrip.products.product import Product, Reads, Weight, of_cases
+from biogrip.products.report.explorer_data import CaseFiles, explorer_data
 from biogrip.products.rule_products import group_by_rule
-from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.uses import each, every, using
 from biogrip.study.study import Study
 from biogrip.study.typed import plain
 
@@ -41,7 +41,7 @@ _FOLDERS = ("results/figures/", "results/tables/")
 # Category, and which of a product's files is shown.
 _FIGURES, _TABLES = ("Figures", "png"), ("Tables", "html")
 _STORY = "moduli"
-_FIRST = ("all_errors", "methods", "coverage", "models")
+_FIRST = ("errors", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
 
@@ -72,15 +72,13 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Settings:
+class Content:
     """Content of the report, except results.
 
     Parameters
     ----------
-    cases
-        Cases of the explorer.
-    methods
-        Methods of identification; the shown one comes first.
+    study
+        The study with the cases of the explorer and the methods.
     figures, tables
         Other content of the report.
     config
@@ -89,32 +87,25 @@ class Settings:
         Sources of the page, by file name.
     """
 
-    cases: tuple[ExploredCase, ...]
-    methods: tuple[Method, ...]
+    study: Study
     figures: tuple[Entry, ...]
     tables: tuple[Entry, ...]
     config: str
     sources: Mapping[str, str]
 
 
-def settings(study: Study, _: Wildcards) -> Settings:
+_STUDY = using(
+    "identifiers",
+    cases=each(every, "name title parameters problem recorded noise nonlinear_target"),
+)
+
+
+def content(study: Study, _: Wildcards) -> Content:
     """Return the content of the report, except results."""
     plan = Plan(study, Path("results"))
     rules = _rules(plan)
-    shown, *others = study.identifiers.values()
-    return Settings(
-        tuple(
-            ExploredCase(
-                case.name,
-                case.title,
-                case.parameters,
-                case.problem,
-                None if case.recorded else case.noise,
-                case.problem.nonlinear or (not case.recorded and case.nonlinear_target),
-            )
-            for case in study.cases.values()
-        ),
-        (shown, *others),
+    return Content(
+        _STUDY(study),
         tuple(_entries(plan, _FIGURES, rules)),
         tuple(_entries(plan, _TABLES, rules)),
         yaml.safe_dump(plain(study.config), allow_unicode=True),
@@ -123,7 +114,7 @@ def settings(study: Study, _: Wildcards) -> Settings:
 
 
 def write(
-    settings: Settings,
+    shown: Content,
     figures: list[Path],
     tables: list[Path],
     identifications: list[Path],
@@ -137,7 +128,7 @@ def write(
 
     Parameters
     ----------
-    settings
+    shown
         Content, except results.
     figures, tables
         PNG and HTML files, in the order of the entries.
@@ -153,6 +144,7 @@ def write(
     BiogripError
         If an input cannot be read.
     """
+    cases = list(shown.study.cases.values())
     files = [
         CaseFiles(
             identified,
@@ -162,30 +154,30 @@ def write(
             [path for path in calibrated if path.stem == case.name],
         )
         for case, identified, history, verdict in zip(
-            settings.cases, identifications, histories, verdicts, strict=True
+            cases, identifications, histories, verdicts, strict=True
         )
     ]
-    data = explorer_data(settings.cases, files, settings.methods)
+    data = explorer_data(cases, files, list(shown.study.identifiers.values()))
     shown_tables = [
         {"entry": entry, "html": _table(path)}
-        for entry, path in zip(settings.tables, tables, strict=True)
+        for entry, path in zip(shown.tables, tables, strict=True)
     ]
     shown_figures = [
         {"entry": entry, "image": image}
-        for entry, image in zip(settings.figures, _images(figures), strict=True)
+        for entry, image in zip(shown.figures, _images(figures), strict=True)
     ]
     environment = jinja2.Environment(
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
-    parts = environment.from_string(settings.sources["report.html.j2"]).stream(
-        style=settings.sources["report.css"],
-        scripts=[settings.sources[name] for name in _SOURCES[2:]],
+    parts = environment.from_string(shown.sources["report.html.j2"]).stream(
+        style=shown.sources["report.css"],
+        scripts=[shown.sources[name] for name in _SOURCES[2:]],
         plotly=_plotly(),
         # Prevent text of a case from closing the script element.
         data=json.dumps(data).replace("<", "\\u003c"),
         cases=[
-            {"title": case.title, "recorded": case.noise is None, **read_verdicts(v)}
-            for case, v in zip(settings.cases, verdicts, strict=True)
+            {"title": case.title, "recorded": case.recorded, **read_verdicts(v)}
+            for case, v in zip(cases, verdicts, strict=True)
         ],
         story=[item for item in shown_figures if _is_named(item, _STORY)],
         figures=[item for item in shown_figures if not _is_named(item, _STORY)],
@@ -196,7 +188,7 @@ def write(
             for item in shown_tables
             if not any(_is_named(item, name) for name in (*_FIRST, *_EVIDENCE))
         ],
-        config=settings.config,
+        config=shown.config,
         versions={"Python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
     )
@@ -280,13 +272,8 @@ def _plotly() -> str:
     return get_plotlyjs()
 
 
-def _of_every_case(pattern: str) -> Reads:
-    return Reads(lambda plan, _: [pattern.format(case=name) for name in plan.study.cases])
-
-
 def _calibrated(plan: Plan, _: Wildcards) -> list[str]:
-    one = calibration_of()
-    return [file for name in plan.study.cases for file in one.files(plan, {"case": name})]
+    return [file for name in plan.study.cases for file in CALIBRATED.files(plan, {"case": name})]
 
 
 def _measurements(plan: Plan, _: Wildcards) -> list[str]:
@@ -297,15 +284,15 @@ REPORT = Product(
     "report",
     {"page": PAGE},
     write,
-    settings,
+    content,
     lambda plan: [{}],
     message="Writing the page of the study",
     reads={
         "figures": _reads(_FIGURES),
         "tables": _reads(_TABLES),
-        "identifications": _of_every_case(IDENTIFICATIONS),
-        "histories": _of_every_case(HISTORIES),
-        "verdicts": _of_every_case(VERDICTS),
+        "identifications": of_cases(IDENTIFICATIONS, every),
+        "histories": of_cases(HISTORIES, every),
+        "verdicts": of_cases(VERDICTS, every),
         "measurements": Reads(_measurements),
         "calibrated": Reads(_calibrated),
     },

@@ -5,10 +5,9 @@ from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Reads
 
 
-def calibration_of() -> Reads:
-    """Return the input with the calibration of the job's case; no file if it uses none."""
-    return Reads(_files)
-
-
 def _files(plan: Plan, job: Wildcards) -> list[str]:
     return [CALIBRATIONS.format(**job)] if plan.study.case(job["case"]).is_calibrated else []
+
+
+CALIBRATED = Reads(_files)
+"""The calibration of the job's case; no file if it uses none."""

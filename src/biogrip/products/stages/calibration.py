@@ -1,6 +1,5 @@
 """Stage 0: calibration of the gripper's arms by a test without sample."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.experiment.noise import Noise, add_noise
@@ -8,50 +7,34 @@ from biogrip.experiment.protocol import sample_times
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.instrument.calibrated_gripper import CALIBRATIONS, calibration_yaml
-from biogrip.instrument.calibration import CalibrationTest, FreeMotion, calibrate, free_motion
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.calibration import FreeMotion, calibrate, free_motion
 from biogrip.products.files.parquet import table_of, write_tables
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
-from biogrip.study.study import Study
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 
-@dataclass(frozen=True)
-class Settings:
-    """True gripper and calibration test of a case."""
-
-    study_seed: int
-    case: str
-    gripper: Gripper
-    test: CalibrationTest
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that a case's calibration depends on."""
-    case = study.case(job["case"])
-    return Settings(study.study_seed, case.name, case.gripper, case.calibration)
-
-
-def run(settings: Settings, gripper: Path, records: Path) -> None:
+def run(case: Case, gripper: Path, records: Path) -> None:
     """Simulate both arms' free motion with noise, and identify their properties.
 
     Parameters
     ----------
-    settings
-        The gripper and the test.
+    case
+        The case.
     gripper
         The calibrated gripper, YAML.
     records
         The records, Parquet.
     """
-    test = settings.test
+    test = case.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")
     causes = test.step_torque_Nm, test.impulse_Nms
     columns, found = {"time_s": time_s}, {}
     for name in ("left", "right"):
-        motion = free_motion(getattr(settings.gripper, name), time_s, *causes)
-        rng = stream(settings.study_seed, settings.case, 0, f"calibration {name}")
+        motion = free_motion(getattr(case.gripper, name), time_s, *causes)
+        rng = stream(case.study.study_seed, case.name, 0, f"calibration {name}")
         record = FreeMotion(
             time_s,
             add_noise(motion.step_rad, noise, rng),
@@ -72,7 +55,7 @@ CALIBRATION = Product(
     "calibration",
     {"gripper": CALIBRATIONS, "records": CALIBRATIONS.replace(".yaml", ".parquet")},
     run,
-    settings,
+    from_case("name gripper calibration study.study_seed"),
     _jobs,
     message="Calibrating the gripper of {case} without a sample",
     weight=Weight(30, 1000),

@@ -2,12 +2,10 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.experiment.noise import rms
 from biogrip.experiment.random_streams import stream
-from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.identifier import identifier
 from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import (
@@ -20,44 +18,17 @@ from biogrip.products.files.identifications import (
     write_timings,
 )
 from biogrip.products.files.traces import MEASUREMENTS, read_measurements
-from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, the
-from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.stages.groups import groups
+from biogrip.products.uses import from_case, to_identify
 from biogrip.progress import Progress
-from biogrip.study.study import Study
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the identification of a case by one method.
-
-    Parameters
-    ----------
-    study_seed, case
-        Random streams derive from them.
-    problem
-        Assumptions of the identification.
-    method, of_method
-        Name of the method and its settings.
-    """
-
-    study_seed: int
-    case: str
-    problem: CaseProblem
-    method: str
-    of_method: object
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that the identification of a case by a method depends on."""
-    case, method = study.case(job["case"]), job["method"]
-    problem, of_method = case.problem.to_identify(), case.method(method)
-    return Settings(study.study_seed, case.name, problem, method, of_method)
+from biogrip.study.study import Case
 
 
 def identify(
-    settings: Settings,
+    case: Case,
+    method: str,
     seeds: Sequence[int],
     measurements: Path,
     calibrated: list[Path],
@@ -69,8 +40,10 @@ def identify(
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
+    method
+        Name of the method.
     seeds
         Seeds of the batch.
     measurements
@@ -82,16 +55,15 @@ def identify(
     timing
         Processor times, CSV; for traces identified together, the mean.
     """
-    case, method = settings.case, settings.method
-    case_problem = settings.problem.calibrated(calibrated)
-    identified = identifier(method, settings.of_method)
+    case_problem = case.problem.calibrated(calibrated)
+    identified = identifier(method, case.methods[method])
     recorded = read_measurements(measurements, list(seeds))
-    progress = Progress(f"{case}, {method}", len(seeds))
-    whose = case, method, case_problem.model, case_problem.searched, case_problem.fixed
+    progress = Progress(f"{case.name}, {method}", len(seeds))
+    whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []
     for group in groups(seeds):
         traces = [recorded.rotation_rad[seed] for seed in group]
-        rngs = [stream(settings.study_seed, case, seed, method) for seed in group]
+        rngs = [stream(case.study.study_seed, case.name, seed, method) for seed in group]
         start = time.process_time()
         problems = [case_problem.of(recorded.time_s, trace) for trace in traces]
         answers = identified(problems, rngs, progress.within)
@@ -109,10 +81,10 @@ IDENTIFICATION = Product(
     "identification",
     {"parameters": BATCHES, "history": HISTORY_BATCHES, "timing": TIMINGS.batch_path},
     identify,
-    settings,
+    from_case("name study.study_seed methods.{method}", problem=to_identify),
     lambda plan: plan.method_jobs([*plan.study.cases, *plan.study.points]),
     message="Identifying {case} by {method}, {batch}",
-    reads={"measurements": the(MEASUREMENTS), "calibrated": calibration_of()},
+    reads={"measurements": the(MEASUREMENTS), "calibrated": CALIBRATED},
     weight=Weight(120, 1000, group="batch"),
     modules=lambda job: (METHODS[job["method"]].module,),
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.noise import Noise, add_noise, standard_deviation
+from biogrip.experiment.noise import add_noise, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.identifiability.fisher import covariance
@@ -26,13 +26,13 @@ from biogrip.identify.trace_fit import trace_fit
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
-from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Weight, the
-from biogrip.products.stages.calibrated import calibration_of
+from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.stages.full_judgements import EVERY, Shown, judged_in_full, refitted, shown_of
 from biogrip.products.stages.groups import groups
+from biogrip.products.uses import from_case, searched_for
 from biogrip.progress import Progress
-from biogrip.study.study import Study
+from biogrip.study.study import Case
 
 # Significant digits, and those of values known to within a relative `_NARROW`.
 _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
@@ -40,49 +40,8 @@ _DIGITS, _MORE_DIGITS, _NARROW = 5, 9, 1e-3
 _TIMES = 2
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the coverage test of a case.
-
-    Parameters
-    ----------
-    study_seed, case
-        Random streams derive from them.
-    problem, least_squares
-        Assumptions of the identification, and settings of its fits.
-    parameters
-        True values by name, SI units.
-    noise
-        Noise to add to the target.
-    confidence
-        Confidence level of the intervals.
-    """
-
-    study_seed: int
-    case: str
-    problem: CaseProblem
-    least_squares: object
-    parameters: Mapping[str, float]
-    noise: Noise
-    confidence: float
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that a case's intervals depend on."""
-    case = study.case(job["case"])
-    return Settings(
-        study.study_seed,
-        case.name,
-        case.problem.searched_for(),
-        case.method("least_squares"),
-        case.parameters,
-        case.noise,
-        case.confidence,
-    )
-
-
 def estimate(
-    settings: Settings,
+    case: Case,
     seeds: Sequence[int],
     target: Path,
     expected: Path,
@@ -97,8 +56,8 @@ def estimate(
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     seeds
         Seeds of the batch.
     target
@@ -110,10 +69,10 @@ def estimate(
     intervals
         One row per quantity and seed, CSV.
     """
-    case_problem = settings.problem.calibrated(calibrated)
+    case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
     INTERVALS.write(
-        intervals, _rows(settings, case_problem, seeds, time_s, rotation, _determined(expected))
+        intervals, _rows(case, case_problem, seeds, time_s, rotation, _determined(expected))
     )
 
 
@@ -126,7 +85,7 @@ class _Quantities:
 
 
 def _rows(
-    settings: Settings,
+    case: Case,
     case_problem: CaseProblem,
     seeds: Sequence[int],
     time_s: Array,
@@ -135,15 +94,15 @@ def _rows(
 ) -> Iterator[tuple[str | int, ...]]:
     every = parameters_and_sum(case_problem.searched)
     chosen = _Quantities(every, [i for i, q in enumerate(every) if q.label in selected])
-    rest_known, informed, truth = _rest_known(settings, case_problem, time_s, rotation)
-    progress = Progress(f"{settings.case}, intervals", len(seeds))
+    rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
+    progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
     for some in groups(seeds, EVERY):
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
         for group in groups(some, _TIMES):
-            traces = _traces(settings, group, time_s, rotation)
-            likelihoods, limits = _fitted(settings, case_problem, group, time_s, traces, chosen)
+            traces = _traces(case, group, time_s, rotation)
+            likelihoods, limits = _fitted(case, case_problem, group, time_s, traces, chosen)
             known = np.tile(truth, (len(group), 1))
             if len(informed):
                 simpler = [case_problem.of(time_s, trace, rest_known) for trace in traces]
@@ -154,33 +113,31 @@ def _rows(
                 if judged_in_full(seed):
                     in_full[seed] = likelihoods[index]
             progress.done(len(group))
-        shown = shown_of(list(in_full.values()), chosen.every, settings.confidence)
+        shown = shown_of(list(in_full.values()), chosen.every, case.confidence)
         verdicts = dict(zip(in_full, shown, strict=True))
-        yield from _of_seeds(settings.case, chosen, lines, verdicts)
+        yield from _of_seeds(case.name, chosen, lines, verdicts)
 
 
 def _rest_known(
-    settings: Settings, case_problem: CaseProblem, time_s: Array, rotation: Array
+    case: Case, case_problem: CaseProblem, time_s: Array, rotation: Array
 ) -> tuple[SampleModel, IntArray, Array]:
     """Return the model with uninformed parameters fixed, indices of the others, and the truth."""
-    truth = case_problem.logs(settings.parameters)
+    truth = case_problem.logs(case.parameters)
     _, sensitivity = case_problem.of(time_s, rotation).residuals(truth)
-    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, settings.noise)))
+    spread = np.diag(covariance(sensitivity, standard_deviation(rotation, case.noise)))
     informed = np.flatnonzero(np.isfinite(spread))
     names = case_problem.searched.names
-    given = {name: settings.parameters[name] for i, name in enumerate(names) if i not in informed}
+    given = {name: case.parameters[name] for i, name in enumerate(names) if i not in informed}
     return with_fixed(case_problem.searched, given), informed, truth
 
 
-def _traces(
-    settings: Settings, group: Sequence[int], time_s: Array, rotation: Array
-) -> list[Array]:
-    rngs = [stream(settings.study_seed, settings.case, seed, "noise") for seed in group]
-    return [add_noise(rotation, settings.noise, rng, time_s) for rng in rngs]
+def _traces(case: Case, group: Sequence[int], time_s: Array, rotation: Array) -> list[Array]:
+    rngs = [stream(case.study.study_seed, case.name, seed, "noise") for seed in group]
+    return [add_noise(rotation, case.noise, rng, time_s) for rng in rngs]
 
 
 def _fitted(
-    settings: Settings,
+    case: Case,
     case_problem: CaseProblem,
     group: Sequence[int],
     time_s: Array,
@@ -188,11 +145,11 @@ def _fitted(
     chosen: _Quantities,
 ) -> tuple[list[Likelihood], Array]:
     """Return optima of a group and their limits; refit where a profile has a lower chi^2."""
-    rngs = [stream(settings.study_seed, settings.case, seed, "coverage") for seed in group]
-    confidence = settings.confidence
+    rngs = [stream(case.study.study_seed, case.name, seed, "coverage") for seed in group]
+    confidence = case.confidence
     found = [
         make_likelihood(problem, np.log(each.parameters), each.misfit_rad, confidence=confidence)
-        for problem, each in _optima(settings, case_problem, time_s, traces, rngs)
+        for problem, each in _optima(case, case_problem, time_s, traces, rngs)
     ]
     quantities = [chosen.every[index] for index in chosen.selected]
     limits, missed = find_limits(found, quantities)
@@ -203,7 +160,7 @@ def _fitted(
 
 
 def _optima(
-    settings: Settings,
+    case: Case,
     case_problem: CaseProblem,
     time_s: Array,
     traces: list[Array],
@@ -212,13 +169,13 @@ def _optima(
     """Yield problems and fits of traces, fitted together if their noise is white."""
     if case_problem.plain:
         problems = [case_problem.of(time_s, trace) for trace in traces]
-        identify = identifier("least_squares", settings.least_squares)
+        identify = identifier("least_squares", case.least_squares)
         yield from zip(problems, identify(problems, rngs, silent), strict=True)
         return
     for trace, rng in zip(traces, rngs, strict=True):
 
         def find(problem: Problem, rng: np.random.Generator = rng) -> Identification:
-            return best_fit(problem, settings.least_squares, rng, silent)
+            return best_fit(problem, case.least_squares, rng, silent)
 
         fit = trace_fit(case_problem, time_s, trace, find)
         yield fit.problem, fit.found
@@ -263,10 +220,13 @@ INTERVAL = Product(
     "intervals",
     {"intervals": INTERVALS.batch_path},
     estimate,
-    settings,
+    from_case(
+        "name least_squares parameters noise confidence study.study_seed",
+        problem=searched_for,
+    ),
     lambda plan: plan.batch_jobs("coverage", plan.study.covered),
     message="Estimates and intervals of {case}, {batch}",
-    reads={"target": the(TARGETS), "expected": the(EXPECTED), "calibrated": calibration_of()},
+    reads={"target": the(TARGETS), "expected": the(EXPECTED), "calibrated": CALIBRATED},
     weight=Weight(120, 1000),
     modules=lambda _: (METHODS["least_squares"].module,),
 )

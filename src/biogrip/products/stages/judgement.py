@@ -1,13 +1,11 @@
 """Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, rms, standard_deviation
+from biogrip.experiment.noise import rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
@@ -23,101 +21,44 @@ from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import TraceFit, trace_fit
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
 from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
-from biogrip.products.plan import Wildcards
 from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
-from biogrip.products.stages.calibrated import calibration_of
-from biogrip.study.study import Case, Study
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.uses import from_case, searched_for, to_identify
+from biogrip.study.study import Case
 
 TRACE = 0
 """Seed of the trace that is judged."""
 
-
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the judgement of a trace.
-
-    Parameters
-    ----------
-    study_seed, case
-        Random streams derive from them.
-    problem, least_squares
-        Assumptions of the identification, and settings of its fits.
-    confidence
-        Confidence level of the limits.
-    """
-
-    study_seed: int
-    case: str
-    problem: CaseProblem
-    least_squares: object
-    confidence: float
-
-    def fit(
-        self,
-        case_problem: CaseProblem,
-        time_s: Array,
-        rotation_rad: Array,
-        seed: int,
-        progress: Progress = silent,
-    ) -> TraceFit:
-        """Return the least-squares fit of a trace that its judgement is based on."""
-
-        def find(problem: Problem) -> Identification:
-            rng = stream(self.study_seed, self.case, seed, "identifiability")
-            return best_fit(problem, self.least_squares, rng, progress)
-
-        return trace_fit(case_problem, time_s, rotation_rad, find)
+JUDGED_TRACE = Reads(
+    lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
+)
+"""The measurements with that trace."""
 
 
-@dataclass(frozen=True)
-class ExpectedSettings:
-    """Settings of the judgement of a target, as if it had noise.
+def fit_judged(
+    case: Case,
+    case_problem: CaseProblem,
+    time_s: Array,
+    rotation_rad: Array,
+    seed: int,
+    progress: Progress = silent,
+) -> TraceFit:
+    """Return the least-squares fit of a trace that its judgement is based on."""
 
-    Parameters
-    ----------
-    case, problem
-        Name of the case, and assumptions of its identification.
-    confidence
-        Confidence level of the limits.
-    parameters
-        True values by name, SI units.
-    noise
-        Noise of the measurement.
-    """
+    def find(problem: Problem) -> Identification:
+        rng = stream(case.study.study_seed, case.name, seed, "identifiability")
+        return best_fit(problem, case.least_squares, rng, progress)
 
-    case: str
-    problem: CaseProblem
-    confidence: float
-    parameters: Mapping[str, float]
-    noise: Noise
+    return trace_fit(case_problem, time_s, rotation_rad, find)
 
 
-def settings_of(study: Study, case: Case) -> Settings:
-    """Return the settings that the judgement of a case depends on."""
-    fits = case.method("least_squares")
-    return Settings(study.study_seed, case.name, case.problem, fits, case.confidence)
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that the judgement of a case depends on."""
-    chosen = settings_of(study, study.case(job["case"]))
-    return replace(chosen, problem=chosen.problem.searched_for())
-
-
-def expected_settings(study: Study, job: Wildcards) -> ExpectedSettings:
-    """Return the settings that the judgement of a target depends on."""
-    case = study.case(job["case"])
-    problem = case.problem.to_identify()
-    return ExpectedSettings(case.name, problem, case.confidence, case.parameters, case.noise)
-
-
-def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
+def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     measurements
         Noisy traces, Parquet.
     calibrated
@@ -125,15 +66,15 @@ def judge(settings: Settings, measurements: Path, calibrated: list[Path], verdic
     verdicts
         Verdicts, profiles and valley, JSON.
     """
-    case_problem = settings.problem.calibrated(calibrated)
+    case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
-    fit = settings.fit(case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
-    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, settings.confidence)
+    fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
+    diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     said = diagnosis_data(diagnosis, notes_on_fit(fit))
     data = {
-        "case": settings.case,
+        "case": case.name,
         "model": case_problem.model.name,
-        "confidence": settings.confidence,
+        "confidence": case.confidence,
         **said,
         "noise_model": fit.noise_data(),
         "valley": valley,
@@ -164,9 +105,7 @@ def _diagnosed(
     return diagnosis, valley
 
 
-def expect(
-    settings: ExpectedSettings, target: Path, calibrated: list[Path], verdicts: Path
-) -> None:
+def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Write verdicts on the trace without noise, judged with the noise level of the measurement.
 
     They are what to expect of any trace of the case. Without noise, the rounding of the
@@ -174,8 +113,8 @@ def expect(
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     target
         Target, CSV.
     calibrated
@@ -183,18 +122,18 @@ def expect(
     verdicts
         Verdicts and profiles, JSON.
     """
-    case_problem = settings.problem.calibrated(calibrated)
+    case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
-    noise_rad = rms(standard_deviation(rotation, settings.noise)) or None
+    noise_rad = rms(standard_deviation(rotation, case.noise)) or None
     problem = case_problem.of(time_s, rotation, noise_rad=noise_rad)
-    found = identify_from(problem, case_problem.logs(settings.parameters))
+    found = identify_from(problem, case_problem.logs(case.parameters))
     diagnosis = diagnose(
-        problem, case_problem.searched, found, confidence=settings.confidence, noise_rad=noise_rad
+        problem, case_problem.searched, found, confidence=case.confidence, noise_rad=noise_rad
     )
     data = {
-        "case": settings.case,
+        "case": case.name,
         "model": case_problem.model.name,
-        "confidence": settings.confidence,
+        "confidence": case.confidence,
         **diagnosis_data(diagnosis),
     }
     write_text(verdicts, json.dumps(data, indent=1) + "\n")
@@ -204,14 +143,12 @@ JUDGED = Product(
     "judgement",
     {"verdicts": PATH},
     judge,
-    settings,
+    from_case("name least_squares confidence study.study_seed", problem=searched_for),
     lambda plan: wildcards_of(plan.study.cases),
     message="Computing confidence limits for the first trace of {case}",
     reads={
-        "measurements": Reads(
-            lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
-        ),
-        "calibrated": calibration_of(),
+        "measurements": JUDGED_TRACE,
+        "calibrated": CALIBRATED,
     },
     weight=JUDGEMENT,
     modules=lambda _: (METHODS["least_squares"].module,),
@@ -221,9 +158,9 @@ EXPECTATION = Product(
     "expectation",
     {"verdicts": EXPECTED},
     expect,
-    expected_settings,
+    from_case("name confidence parameters noise", problem=to_identify),
     lambda plan: wildcards_of(plan.study.simulated),
     message="Computing expected confidence limits for {case}",
-    reads={"target": the(TARGETS), "calibrated": calibration_of()},
+    reads={"target": the(TARGETS), "calibrated": CALIBRATED},
     weight=JUDGEMENT,
 )

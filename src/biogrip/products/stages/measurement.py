@@ -1,10 +1,9 @@
 """Stage 2: noisy traces of a target, one per seed."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
-from biogrip.experiment.noise import Noise, add_noise
+from biogrip.experiment.noise import add_noise
 from biogrip.experiment.random_streams import stream
 from biogrip.products.files.traces import (
     MEASUREMENTS,
@@ -15,31 +14,18 @@ from biogrip.products.files.traces import (
 )
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
-from biogrip.study.study import Study
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Noise of a case, and the origin of its random streams."""
-
-    study_seed: int
-    case: str
-    noise: Noise
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that a case's noise depends on."""
-    return Settings(study.study_seed, job["case"], study.case(job["case"]).noise)
-
-
-def measure(settings: Settings, seeds: Iterable[int], target: Path, measurements: Path) -> None:
+def measure(case: Case, seeds: Iterable[int], target: Path, measurements: Path) -> None:
     """Add noise of each seed in a batch to a target, CSV, and write the traces, Parquet."""
     time_s, _, rotation = read_target(target)
     traces = {
         seed: add_noise(
             rotation,
-            settings.noise,
-            stream(settings.study_seed, settings.case, seed, "noise"),
+            case.noise,
+            stream(case.study.study_seed, case.name, seed, "noise"),
             time_s,
         )
         for seed in seeds
@@ -60,7 +46,7 @@ MEASUREMENT = Product(
     "measurement",
     {"measurements": MEASUREMENTS},
     measure,
-    settings,
+    from_case("name noise study.study_seed"),
     _jobs,
     message="Adding noise to {case}, {batch}",
     reads={"target": the(TARGETS)},

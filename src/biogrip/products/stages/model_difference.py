@@ -1,73 +1,38 @@
 """Difference of the linear from the nonlinear model, over angle and torque."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
-from biogrip.experiment.sample import Network, Sample
+from biogrip.experiment.protocol import TorqueHistory, torque_history
+from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import Product, Weight
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 ANGLES_DEG = np.arange(40.0, 91.0, 5.0)
 FACTORS = np.geomspace(0.25, 32.0, 15)
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A case for which the models are compared.
-
-    Parameters
-    ----------
-    sample, parameters
-        Sample model, and true values in SI units by name.
-    gripper, phases
-        Gripper and protocol.
-    """
-
-    sample: Sample
-    parameters: Mapping[str, float]
-    gripper: Gripper
-    phases: tuple[Phase, ...]
-
-    @property
-    def network(self) -> Network:
-        """Network of the sample."""
-        return self.sample.model.sample(self.parameters)
+def network_of(case: Case) -> Network:
+    """Return the network of a case's sample."""
+    return case.sample.model.sample(case.parameters)
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Cases to compare, by name."""
-
-    cases: Mapping[str, Compared]
-
-
-def settings(study: Study) -> Settings:
-    """Return the simulated cases, by name."""
-    cases = {name: study.cases[name] for name in study.simulated}
-    return Settings(
-        {
-            name: Compared(case.sample, case.parameters, case.gripper, case.phases)
-            for name, case in cases.items()
-        }
-    )
-
-
-def compare(settings: Settings, differences: Path) -> None:
+def compare(study: Study, differences: Path) -> None:
     """Compare the models on a grid; write a row per case, angle and torque factor, CSV."""
-    DIFFERENCES.write(differences, _rows(settings))
+    DIFFERENCES.write(differences, _rows(study))
 
 
-def _rows(settings: Settings) -> Iterator[tuple[str, ...]]:
-    for name, case in settings.cases.items():
+def _rows(study: Study) -> Iterator[tuple[str, ...]]:
+    for name, case in study.cases.items():
         torque, model = torque_history(case.phases), case.sample.model
         values = [case.parameters[p] for p in model.names]
         network = model.network(np.tile(values, (len(FACTORS), 1)))
@@ -128,7 +93,7 @@ MODEL_DIFFERENCE = Product(
     "model_difference",
     {"differences": DIFFERENCES.path},
     compare,
-    lambda study, _: settings(study),
+    from_study(cases=each(simulated, "sample parameters gripper phases")),
     lambda plan: [{}] if plan.study.simulated else [],
     message="Comparing the linear and the nonlinear model",
     weight=Weight(30, 1000),

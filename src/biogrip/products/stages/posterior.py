@@ -1,8 +1,7 @@
 """Stage 4: posterior samples of one trace of a case, and evidence of sample models."""
 
 import json
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import rounded
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel
+from biogrip.experiment.sample import SampleModel
 from biogrip.files import write_text
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.answer import Progress, silent
@@ -30,54 +29,21 @@ from biogrip.products.files.posterior import (
     thinned,
     write_samples,
 )
-from biogrip.products.files.traces import MEASUREMENTS, read_measurements
+from biogrip.products.files.traces import read_measurements
 from biogrip.products.files.verdicts import PATH, read_verdicts
-from biogrip.products.plan import Wildcards
-from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
-from biogrip.products.stages import judgement
-from biogrip.products.stages.calibrated import calibration_of
-from biogrip.products.stages.judgement import TRACE
-from biogrip.study.study import Case, Study
+from biogrip.products.product import JUDGEMENT, Product, the, wildcards_of
+from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.stages.judgement import JUDGED_TRACE, TRACE, fit_judged
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 # Imported lazily: the sampler takes a second to import.
 _SAMPLER = "biogrip.identifiability.sampling"
 _EVIDENCE = "biogrip.identifiability.evidence"
 
 
-@dataclass(frozen=True)
-class Settings(judgement.Settings):
-    """Settings of posterior sampling for the judged trace.
-
-    Parameters
-    ----------
-    posterior
-        Prior, walkers and steps.
-    models
-        Those whose evidence is compared, by name, see `CANDIDATES`; none without.
-    """
-
-    posterior: PosteriorSettings
-    models: Mapping[str, Sample]
-
-
-def settings_of(study: Study, case: Case) -> Settings:
-    """Return the settings that the posterior of a case depends on."""
-    assert case.posterior is not None
-    compared = case.posterior.evidence and not case.fixed
-    return Settings(
-        **vars(judgement.settings_of(study, case)),
-        posterior=case.posterior,
-        models={name: CANDIDATES[name] for name in study.models_of(case)} if compared else {},
-    )
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that the posterior of a case depends on."""
-    return settings_of(study, study.case(job["case"]))
-
-
 def sample(
-    settings: Settings,
+    case: Case,
     measurements: Path,
     verdicts: Path,
     calibrated: list[Path],
@@ -88,8 +54,8 @@ def sample(
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     measurements
         Noisy traces, Parquet.
     verdicts
@@ -101,22 +67,22 @@ def sample(
     samples
         Posterior samples, Parquet.
     """
-    case_problem = settings.problem.calibrated(calibrated)
+    case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     time_s, trace = recorded.time_s, recorded.rotation_rad[TRACE]
     limits = limits_in(read_verdicts(verdicts))
     pose = partial(case_problem.of, time_s, trace)
     if not case_problem.plain:
         # Use the noise model that the verdicts are based on.
-        fit = settings.fit(case_problem, time_s, trace, TRACE)
+        fit = fit_judged(case, case_problem, time_s, trace, TRACE)
         pose = partial(case_problem.for_model, fit.problem)
-    data, drawn = posterior_of_trace(settings, case_problem, pose, limits, silent)
+    data, drawn = posterior_of_trace(case, case_problem, pose, limits, silent)
     write_samples(samples, case_problem.searched, drawn)
-    write_text(posterior, json.dumps({"case": settings.case, **data}, indent=1) + "\n")
+    write_text(posterior, json.dumps({"case": case.name, **data}, indent=1) + "\n")
 
 
 def posterior_of_trace(
-    settings: Settings,
+    case: Case,
     case_problem: CaseProblem,
     pose: Callable[[SampleModel], Problem],
     limits: Limits,
@@ -126,8 +92,8 @@ def posterior_of_trace(
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     case_problem
         Assumptions of the identification, with a calibrated gripper if the case uses one.
     pose
@@ -148,58 +114,61 @@ def posterior_of_trace(
     from biogrip.identifiability.quantities import parameters_and_sum
     from biogrip.identifiability.sampling import sampled
 
-    rng = stream(settings.study_seed, settings.case, TRACE, "posterior")
-    problem = pose(case_problem.searched)
-    posterior = _posterior(problem, settings.posterior, case_problem.noise_rad)
-    found = sampled(posterior, settings.posterior, rng, progress)
+    rng = stream(case.study.study_seed, case.name, TRACE, "posterior")
+    problem, asked = pose(case_problem.searched), _asked(case)
+    posterior = _posterior(problem, asked, case_problem.noise_rad)
+    found = sampled(posterior, asked, rng, progress)
     drawn = thinned(found.log_parameters)
     every = found.log_parameters.reshape(-1, drawn.shape[1])
     quantities = parameters_and_sum(case_problem.searched)
-    marginals = compute_marginals(
-        every, quantities, problem.residuals.duration_s, settings.confidence
-    )
+    marginals = compute_marginals(every, quantities, problem.residuals.duration_s, case.confidence)
     data = {
         "model": case_problem.model.name,
-        "confidence": settings.confidence,
-        **posterior_data(found, settings.posterior, marginals, limits),
-        "evidence": _evidence(settings, pose, case_problem.noise_rad, progress),
+        "confidence": case.confidence,
+        **posterior_data(found, asked, marginals, limits),
+        "evidence": _evidence(case, pose, case_problem.noise_rad, progress),
     }
     return data, drawn
 
 
-def _posterior(problem: Problem, settings: PosteriorSettings, noise_rad: float | None) -> Any:
+def _asked(case: Case) -> PosteriorSettings:
+    assert case.posterior is not None
+    return case.posterior
+
+
+def _posterior(problem: Problem, asked: PosteriorSettings, noise_rad: float | None) -> Any:
     from biogrip.identifiability.posterior import Posterior
     from biogrip.identifiability.prior import make_prior
 
-    prior = make_prior(problem.residuals.model, problem.low, problem.high, settings.prior)
+    prior = make_prior(problem.residuals.model, problem.low, problem.high, asked.prior)
     return Posterior(problem, prior, noise_rad)
 
 
 def _evidence(
-    settings: Settings,
+    case: Case,
     of_model: Callable[[SampleModel], Problem],
     noise_rad: float | None,
     progress: Progress,
 ) -> list[dict[str, Any]]:
     """Return one row per model: evidence, AIC and BIC, as differences from the best."""
-    if not settings.models:
+    if not case.compared_models:
         return []
     from biogrip.identifiability.evidence import compute_evidence
     from biogrip.identifiability.sampling import sampled
 
-    rows, misfits, samples = [], [], 0
-    for name, candidate in settings.models.items():
+    rows, misfits, samples, asked = [], [], 0, _asked(case)
+    for name, candidate in case.compared_models.items():
         problem = of_model(candidate.model)
         samples = problem.residuals.samples
-        fits = stream(settings.study_seed, settings.case, TRACE, f"model {name}")
-        misfits.append(best_fit(problem, settings.least_squares, fits, silent).misfit_rad)
-        rng = stream(settings.study_seed, settings.case, TRACE, f"evidence {name}")
-        posterior = _posterior(problem, settings.posterior, noise_rad)
-        found = sampled(posterior, settings.posterior, rng, progress)
+        fits = stream(case.study.study_seed, case.name, TRACE, f"model {name}")
+        misfits.append(best_fit(problem, case.least_squares, fits, silent).misfit_rad)
+        rng = stream(case.study.study_seed, case.name, TRACE, f"evidence {name}")
+        posterior = _posterior(problem, asked, noise_rad)
+        found = sampled(posterior, asked, rng, progress)
         own = compute_evidence(posterior, found, rng)
         rows.append((own, found.convergence.reached))
     highest = max(own.log for own, _ in rows)
-    tried = ranked(list(settings.models), misfits, samples)
+    tried = ranked(list(case.compared_models), misfits, samples)
     return [
         {
             "model": each.candidate,
@@ -220,15 +189,13 @@ SAMPLED = Product(
     "posterior_samples",
     {"posterior": POSTERIOR, "samples": SAMPLES},
     sample,
-    settings,
+    from_case("name problem least_squares confidence posterior compared_models study.study_seed"),
     lambda plan: wildcards_of(plan.study.sampled),
     message="Sampling the posterior of the first trace of {case}",
     reads={
-        "measurements": Reads(
-            lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
-        ),
+        "measurements": JUDGED_TRACE,
         "verdicts": the(PATH),
-        "calibrated": calibration_of(),
+        "calibrated": CALIBRATED,
     },
     weight=JUDGEMENT,
     modules=lambda _: (METHODS["least_squares"].module, _SAMPLER, _EVIDENCE),

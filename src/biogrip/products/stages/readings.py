@@ -1,73 +1,27 @@
 """Stage 3: identifications by the genetic algorithm under alternative readings of the paper."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from biogrip.experiment.noise import Noise, add_noise, rms
+from biogrip.experiment.noise import add_noise, rms
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.identify.answer import Identification
-from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic import identify_many
-from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.products.files.readings import READINGS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.groups import groups
+from biogrip.products.uses import from_case, using
 from biogrip.progress import Progress
 from biogrip.study.study import Case, Study
 
 
-@dataclass(frozen=True)
-class Reading:
-    """Assumptions, genetic algorithm and noise of a case under one reading of the paper.
-
-    Parameters
-    ----------
-    problem
-        Assumptions of the identification.
-    genetic
-        Settings of the genetic algorithm.
-    noise
-        Noise to add to the target.
-    """
-
-    problem: CaseProblem
-    genetic: GeneticSettings
-    noise: Noise
-
-
-@dataclass(frozen=True)
-class Settings:
-    """All readings of a case.
-
-    Parameters
-    ----------
-    study_seed, case, seeds
-        Random streams derive from seed and name; the number of seeds.
-    readings
-        Readings by name.
-    """
-
-    study_seed: int
-    case: str
-    seeds: int
-    readings: Mapping[str, Reading]
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that a case's readings depend on."""
-    name = job["case"]
-    readings = {reading: _reading(cases[name]) for reading, cases in study.readings.items()}
-    return Settings(study.study_seed, name, study.case(name).seeds, readings)
-
-
-def read(settings: Settings, target: Path, rows: Path) -> None:
+def read(case: Case, target: Path, rows: Path) -> None:
     """Identify every noisy trace of a case under every reading by the genetic algorithm.
 
     Random streams are those of the study, so a reading that changes nothing reproduces the
@@ -75,25 +29,24 @@ def read(settings: Settings, target: Path, rows: Path) -> None:
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    case
+        The case.
     target
         Target, CSV.
     rows
         One row per reading and seed, CSV.
     """
-    READINGS.write(rows, _rows(settings, target))
+    READINGS.write(rows, _rows(case, target))
 
 
-def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
+def _rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
     time_s, _, rotation = read_target(target)
-    case = settings.case
-    progress = Progress(f"{case}, readings", len(settings.readings) * settings.seeds)
-    for name, reading in settings.readings.items():
+    progress = Progress(f"{case.name}, readings", len(case.readings) * case.seeds)
+    for name, reading in case.readings.items():
         case_problem = reading.problem
-        for seeds in groups(range(settings.seeds)):
+        for seeds in groups(range(case.seeds)):
             streams = {
-                purpose: [stream(settings.study_seed, case, seed, purpose) for seed in seeds]
+                purpose: [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             }
             traces = [add_noise(rotation, reading.noise, rng, time_s) for rng in streams["noise"]]
@@ -103,7 +56,7 @@ def _rows(settings: Settings, target: Path) -> Iterator[tuple[str | int, ...]]:
                 names = case_problem.searched.names
                 values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
                 yield (
-                    case,
+                    case.name,
                     name,
                     seed,
                     *(f"{values.get(p.name, 0.0):.6g}" for p in SINGLE_BRANCH),
@@ -120,9 +73,9 @@ def _last_improvement(answer: Identification) -> int:
     return int(falls[-1]) + 1 if len(falls) else 0
 
 
-def _reading(case: Case) -> Reading:
-    genetic: Any = case.method("genetic")
-    return Reading(case.problem, genetic, case.noise)
+def _readings(case: Case) -> dict[str, Any]:
+    view = using("problem genetic noise")
+    return {name: view(read) for name, read in case.readings.items()}
 
 
 def read_cases(study: Study) -> list[str]:
@@ -137,10 +90,10 @@ def _jobs(plan: Plan) -> list[Wildcards]:
 
 
 READ = Product(
-    "read",
+    "readings_of_case",
     {"rows": READINGS.path},
     read,
-    settings,
+    from_case("name seeds study.study_seed", readings=_readings),
     _jobs,
     message="Identifying {case} under every reading of the paper",
     reads={"target": the(TARGETS)},

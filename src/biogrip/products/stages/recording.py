@@ -1,6 +1,5 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.digits import counted
@@ -8,8 +7,8 @@ from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
-from biogrip.products.plan import Wildcards
 from biogrip.products.product import Product, Reads
+from biogrip.products.uses import from_case
 from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
@@ -17,36 +16,7 @@ from biogrip.traces.plausibility import check_recording
 from biogrip.traces.recordings import Columns, place, read_recording
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings for reading and checking a recorded trace.
-
-    Parameters
-    ----------
-    gripper
-        Gripper that it was recorded with.
-    problem
-        Protocol and instrument, as assumed by the identification.
-    columns
-        Columns of the file.
-    """
-
-    gripper: Gripper
-    problem: CaseProblem
-    columns: Columns
-
-
-def settings_of(case: Case) -> Settings:
-    """Return the settings for a recorded case."""
-    return Settings(case.gripper, case.problem, case.columns)
-
-
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings for the job's recorded case."""
-    return settings_of(study.case(job["case"]))
-
-
-def record(settings: Settings, recorded: Path, measurements: Path) -> None:
+def record(case: Case, recorded: Path, measurements: Path) -> None:
     """Read, check and convert the user's file, and write it as Parquet.
 
     Raises
@@ -54,15 +24,17 @@ def record(settings: Settings, recorded: Path, measurements: Path) -> None:
     BiogripError
         With file, line and column, if the trace cannot be used.
     """
-    trace = read_checked(settings, recorded)
+    trace = read_checked(recorded, case.gripper, case.problem, case.columns)
     for note in notes_on_gaps(trace):
         warn(f"{place(recorded)}: {note}")
     write_measurements(measurements, trace)
 
 
-def read_checked(settings: Settings, recorded: Path) -> Measurements:
+def read_checked(
+    recorded: Path, gripper: Gripper, problem: CaseProblem, columns: Columns
+) -> Measurements:
     """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
-    trace, problem = read_recording(recorded, settings.columns), settings.problem
+    trace = read_recording(recorded, columns)
     if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
             f"{place(recorded)}: found {len(trace.time_s)} samples, allowed are at most "
@@ -71,10 +43,10 @@ def read_checked(settings: Settings, recorded: Path) -> Measurements:
     nuisance = problem.nuisance(trace.time_s)
     check_recording(
         trace,
-        settings.gripper,
+        gripper,
         problem.torque,
         recorded,
-        settings.columns,
+        columns,
         nuisance,
         problem.noise_rad,
     )
@@ -102,7 +74,7 @@ def check_traces(study: Study) -> None:
     for name in study.recorded:
         case = study.case(name)
         try:
-            read_checked(settings_of(case), Path(case.file))
+            read_checked(Path(case.file), case.gripper, case.problem, case.columns)
         except BiogripError as error:
             problems.append(f"cases.{name}: {error}")
     if problems:
@@ -113,7 +85,7 @@ RECORDING = Product(
     "recording",
     {"measurements": MEASUREMENTS.replace("{batch}", "seeds_0-0")},
     record,
-    settings,
+    from_case("gripper problem columns"),
     lambda plan: [{"case": case} for case in plan.study.recorded],
     message="Reading the recorded trace of {case}",
     reads={"recorded": Reads(lambda plan, job: [plan.study.case(job["case"]).file], one=True)},

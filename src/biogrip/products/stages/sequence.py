@@ -28,6 +28,7 @@ from biogrip.identify.problem import Problem
 from biogrip.products.files.sequences import SEQUENCES
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
+from biogrip.products.uses import using
 from biogrip.progress import Progress
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.design_inputs import make_design_inputs, plausible_ends
@@ -39,51 +40,29 @@ earlier traces; one designed for the ranges, repeated; one designed for the cell
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Settings of the sequences of one case.
+class Sequences:
+    """Sequences of experiments with the cells of one case.
 
     Parameters
     ----------
-    study_seed, case
-        Random streams derive from them.
-    problem
-        Assumptions of the identification, with known noise; its protocol is the first one.
-    sampling
-        Sampling of the first experiment.
+    case
+        The case; its protocol and sampling are the first experiment, with known noise.
     inputs
         Inputs of designs for the ranges.
     low, high
         Log bounds between which cells are drawn.
     within
         Log bounds of the prior.
-    tried, drawn
-        Numbers of torques that a search tries, and of posterior samples it is for.
-    least_squares
-        Settings of the fits.
-    confidence
-        Confidence level of the limits.
     experiments
         Number of experiments in a sequence.
     """
 
-    study_seed: int
-    case: str
-    problem: CaseProblem
-    sampling: Sampling
+    case: Case
     inputs: DesignInputs
     low: Array
     high: Array
     within: tuple[Array, Array]
-    tried: int
-    drawn: int
-    least_squares: object
-    confidence: float
     experiments: int
-
-    @property
-    def noise_rad(self) -> float:
-        """Standard deviation of the sensor's noise."""
-        return self.inputs.noise_rad
 
 
 def sequenced(study: Study) -> list[str]:
@@ -97,46 +76,48 @@ def cells_of(case: Case) -> int:
     return block.sequence.cells if block and block.sequence else 0
 
 
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings that the sequences of a case depend on."""
+def _problem(case: Case) -> CaseProblem:
+    return replace(case.problem, noise_rad=case.design.noise_rad)
+
+
+_CASE = using(
+    "name sampling design.tried design.drawn least_squares confidence study.study_seed",
+    problem=_problem,
+)
+
+
+def sequences(study: Study, job: Wildcards) -> Sequences:
+    """Return the sequences of a job's case."""
     case = study.case(job["case"])
-    block = case.block.design
+    ranges, block = case.design.ranges or {}, case.design.sequence
     assert block is not None
-    assert block.sequence is not None
     low, high = plausible_ends(case)
-    names = case.problem.searched.names
-    spread = np.array([name in (block.ranges or {}) for name in names])
+    names = case.searched.names
+    spread = np.array([name in ranges for name in names])
     as_in_config = np.log([case.parameters[name] for name in names])
-    return Settings(
-        study.study_seed,
-        case.name,
-        replace(case.problem, noise_rad=block.noise_rad),
-        case.sampling,
+    return Sequences(
+        _CASE(case),
         make_design_inputs(case),
         np.where(spread, low, as_in_config),
         np.where(spread, high, as_in_config),
         (low, high),
-        block.tried,
-        block.drawn,
-        case.method("least_squares"),
-        case.confidence,
-        block.sequence.experiments,
+        block.experiments,
     )
 
 
-def sequence(settings: Settings, seed: int, rows: Path) -> None:
+def sequence(planned: Sequences, seed: int, rows: Path) -> None:
     """Simulate sequences of experiments with one cell, in all four ways.
 
     Parameters
     ----------
-    settings
-        Settings of the job.
+    planned
+        The case's sequences.
     seed
         Number of the cell.
     rows
         Estimates and limits after each experiment, CSV.
     """
-    SEQUENCES.write(rows, _Cell(settings, seed).rows())
+    SEQUENCES.write(rows, _Cell(planned, seed).rows())
 
 
 @dataclass(frozen=True)
@@ -152,69 +133,69 @@ class _Known:
 class _Cell:
     """A simulated cell, whose sequences of experiments are simulated in four ways."""
 
-    def __init__(self, settings: Settings, number: int) -> None:
-        self._settings, self._number = settings, number
-        self._truth = self._stream("cell").uniform(settings.low, settings.high)
+    def __init__(self, planned: Sequences, number: int) -> None:
+        self._planned, self._case, self._number = planned, planned.case, number
+        self._truth = self._stream("cell").uniform(planned.low, planned.high)
 
     def rows(self) -> Iterator[tuple[str | int, ...]]:
-        settings = self._settings
-        first = settings.problem.phases, settings.sampling
-        progress = Progress(f"{settings.case}, cell {self._number}", len(WAYS))
+        case, inputs = self._case, self._planned.inputs
+        first = case.problem.phases, case.sampling
+        progress = Progress(f"{case.name}, cell {self._number}", len(WAYS))
         yield from self._rows_of(REPEATED, [first], self._repeated(REPEATED, first))
         progress.done()
         planned: list[Experiment] = [first]
         yield from self._rows_of(AFTER, planned, self._one_after_another(planned))
         progress.done()
         for way, samples in (
-            (BEFOREHAND, settings.inputs.parameters),
+            (BEFOREHAND, inputs.parameters),
             (TRUTH, np.exp(self._truth)[None]),
         ):
-            best = self._designed(way, replace(settings.inputs, parameters=samples))
+            best = self._designed(way, replace(inputs, parameters=samples))
             yield from self._rows_of(way, [best], self._repeated(way, best))
             progress.done()
 
     def _repeated(self, way: str, experiment: Experiment) -> Iterator[_Known]:
         """Yield results of one experiment repeated; the mean trace has all the information."""
-        settings, total = self._settings, np.zeros(())
-        for count in range(1, settings.experiments + 1):
+        total = np.zeros(())
+        for count in range(1, self._planned.experiments + 1):
             problem, time_s, trace = self._trace(way, count, experiment)
             total = total + trace
-            noise_rad = settings.noise_rad / sqrt(count)
+            noise_rad = self._planned.inputs.noise_rad / sqrt(count)
             mean = problem.of(time_s, total / count, noise_rad=noise_rad)
             found = self._identify(way, count, mean)
             yield _Known(mean, noise_rad, np.log(found.parameters), found.misfit_rad)
 
     def _one_after_another(self, done: list[Experiment]) -> Iterator[_Known]:
         """Yield results of experiments each designed from all earlier ones, extending `done`."""
-        settings = self._settings
+        planned, noise_rad = self._planned, self._planned.inputs.noise_rad
         problems: list[Problem] = []
         earlier: Earlier | None = None
-        for count in range(1, settings.experiments + 1):
+        for count in range(1, self._planned.experiments + 1):
             if earlier is not None:
                 inputs = replace(
-                    settings.inputs, parameters=earlier.parameters, before=earlier.information
+                    planned.inputs, parameters=earlier.parameters, before=earlier.information
                 )
                 done.append(self._designed(f"{AFTER} {count}", inputs))
             case_problem, time_s, trace = self._trace(AFTER, count, done[-1])
             problems.append(case_problem.of(time_s, trace))
-            joint = joint_problem(problems, count * [settings.noise_rad])
+            joint = joint_problem(problems, count * [noise_rad])
             earlier = estimate_from_traces(
                 joint,
-                settings.noise_rad,
+                noise_rad,
                 partial(self._identify, AFTER, count),
-                settings.within,
-                settings.drawn,
+                planned.within,
+                planned.case.design.drawn,
                 self._stream(f"{AFTER} {count}, drawn"),
                 earlier,
             )
-            yield _Known(joint, settings.noise_rad, earlier.best, earlier.misfit_rad)
+            yield _Known(joint, noise_rad, earlier.best, earlier.misfit_rad)
 
     def _trace(
         self, way: str, count: int, experiment: Experiment
     ) -> tuple[CaseProblem, Array, Array]:
         """Simulate a trace; return the fit problem's assumptions, times and rotation."""
         phases, sampling = experiment
-        case_problem = replace(self._settings.problem, phases=phases)
+        case_problem = replace(self._case.problem, phases=phases)
         time_s = sampling.over(case_problem.torque.end_s)
         network = case_problem.searched.network(np.exp(self._truth)[None])
         clean = simulated_rotation(
@@ -222,39 +203,36 @@ class _Cell:
         )
         # The first trace is the same in all ways that start with the same experiment.
         rng = self._stream(f"{way if count > 1 else 'first'} {count}, noise")
-        return (
-            case_problem,
-            time_s,
-            clean[0] + self._settings.noise_rad * rng.standard_normal(len(time_s)),
-        )
+        noise_rad = self._planned.inputs.noise_rad
+        return case_problem, time_s, clean[0] + noise_rad * rng.standard_normal(len(time_s))
 
     def _designed(self, purpose: str, inputs: DesignInputs) -> Experiment:
         rng = self._stream(f"{purpose}, design")
-        _, plan = plan_within_reach(inputs, self._settings.tried, rng, silent)
+        _, plan = plan_within_reach(inputs, self._case.design.tried, rng, silent)
         return plan.phases, Sampling(bursts=plan.bursts)
 
     def _identify(self, way: str, count: int, problem: Problem) -> Identification:
         rng = self._stream(f"{way} {count}, starts")
-        return best_fit(problem, self._settings.least_squares, rng, silent)
+        return best_fit(problem, self._case.least_squares, rng, silent)
 
     def _rows_of(
         self, way: str, done: list[Experiment], known: Iterator[_Known]
     ) -> Iterator[tuple[str | int, ...]]:
-        settings = self._settings
-        quantities = parameters_and_sum(settings.problem.searched)[: len(self._truth)]
+        case = self._case
+        quantities = parameters_and_sum(case.problem.searched)[: len(self._truth)]
         for count, each in enumerate(known, 1):
             likelihood = make_likelihood(
                 each.problem,
                 each.best,
                 each.misfit_rad,
-                confidence=settings.confidence,
+                confidence=case.confidence,
                 noise_rad=each.noise_rad,
             )
             limits = find_limits([likelihood], quantities)[0][0]
             better = fit_from([each.problem], self._truth)
             missed = int(likelihood.increase(float(better.misfit_rad[0])) < -MISSED)
             pressed = int(all(self._pressed(experiment) for experiment in done))
-            head = settings.case, self._number, way, count
+            head = case.name, self._number, way, count
             for quantity, ends in zip(quantities, limits, strict=True):
                 logs = (quantity.log(self._truth), quantity.log(each.best), *ends)
                 numbers = ["" if np.isnan(one) else f"{np.exp(one):.6g}" for one in logs]
@@ -262,12 +240,12 @@ class _Cell:
 
     def _pressed(self, experiment: Experiment) -> bool:
         """Return whether the jaws press the cell throughout an experiment."""
-        inputs = replace(self._settings.inputs, parameters=np.exp(self._truth)[None])
+        inputs = replace(self._planned.inputs, parameters=np.exp(self._truth)[None])
         return presses(inputs, experiment[0])
 
     def _stream(self, purpose: str) -> np.random.Generator:
-        settings = self._settings
-        return stream(settings.study_seed, settings.case, self._number, f"sequence, {purpose}")
+        case = self._case
+        return stream(case.study.study_seed, case.name, self._number, f"sequence, {purpose}")
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:
@@ -282,7 +260,7 @@ SEQUENCE = Product(
     "sequence",
     {"rows": SEQUENCES.path},
     sequence,
-    settings,
+    sequences,
     _jobs,
     message="Experiments one after another with cell {seed} of {case}",
     weight=Weight(20, 1000),

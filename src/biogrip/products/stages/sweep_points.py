@@ -10,8 +10,7 @@ import pandas as pd
 
 from biogrip.arrays import Array, BoolArray
 from biogrip.errors import BiogripError
-from biogrip.experiment.noise import Noise, rms
-from biogrip.experiment.sampling import Sampling
+from biogrip.experiment.noise import rms
 from biogrip.identifiability.at_truth import bounds_percent, headlines
 from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.case_problem import CaseProblem
@@ -22,8 +21,9 @@ from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.rows import RowFile
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
+from biogrip.products.uses import each, using
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 POINTS = RowFile(
     "a sweep",
@@ -41,69 +41,40 @@ _FACTOR, _BOUNDS = math.log(2), 4.0
 
 
 @dataclass(frozen=True)
-class PointSettings:
-    """A point of a sweep.
+class Swept:
+    """The sweep of a case.
 
     Parameters
     ----------
-    row, column
-        Values on the axes, as text in files.
-    problem
-        Assumptions of the identification.
-    noise, sampling
-        Noise and sampling of the traces.
-    """
-
-    row: str
-    column: str
-    problem: CaseProblem
-    noise: Noise
-    sampling: Sampling
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Settings for judging the sweep of a case.
-
-    Parameters
-    ----------
-    methods
-        Names of the methods.
-    near_noise_tolerance
-        Share by which a misfit may exceed the noise to count as near it.
+    study
+        The study with the points as cases.
     parameters
         True values by name, SI units.
-    points
-        Points by name.
+    places
+        Values on the axes by point, as text in files.
     """
 
-    methods: tuple[str, ...]
-    near_noise_tolerance: float
+    study: Study
     parameters: Mapping[str, float]
-    points: Mapping[str, PointSettings]
+    places: Mapping[str, tuple[str, str]]
 
 
-def settings(study: Study, job: Wildcards) -> Settings:
-    """Return the settings for judging the sweep of a case."""
-    points = {}
-    for point in study.sweeps[job["sweep"]].points(job["case"]):
-        case = study.points[point.name]
-        points[point.name] = PointSettings(
-            point.row.text, point.column.text, case.problem, case.noise, case.sampling
-        )
-    parameters = study.cases[job["case"]].parameters
-    return Settings(tuple(study.methods), study.near_noise_tolerance, parameters, points)
+def find_zeros(study: Study, job: Wildcards) -> Swept:
+    """Return the sweep of a job's case."""
+    points = study.sweeps[job["sweep"]].points(job["case"])
+    places = {point.name: (point.row.text, point.column.text) for point in points}
+    shown = each(lambda _: places, "problem noise sampling")
+    view = using("methods near_noise_tolerance", points=shown)
+    return Swept(view(study), study.cases[job["case"]].parameters, places)
 
 
-def judge(
-    settings: Settings, identifications: list[Path], calibrated: list[Path], points: Path
-) -> None:
+def judge(sweep: Swept, identifications: list[Path], calibrated: list[Path], points: Path) -> None:
     """Compute errors and shares of successful seeds at every point of a case's sweep.
 
     Parameters
     ----------
-    settings
-        Settings of the sweep.
+    sweep
+        The sweep of the case.
     identifications
         Identifications of every point, CSV, named like the point.
     calibrated
@@ -116,53 +87,51 @@ def judge(
     BiogripError
         If a point has no identifications.
     """
-    POINTS.write(points, _rows(settings, {path.stem: path for path in identifications}, calibrated))
+    POINTS.write(points, _rows(sweep, {path.stem: path for path in identifications}, calibrated))
 
 
 def _rows(
-    settings: Settings, files: Mapping[str, Path], calibrated: list[Path]
+    sweep: Swept, files: Mapping[str, Path], calibrated: list[Path]
 ) -> Iterator[tuple[str | int, ...]]:
     calibrations = {path.stem: path for path in calibrated}
     bounds = {
-        name: _bounds(settings, point, [calibrations[name]] if name in calibrations else [])
-        for name, point in settings.points.items()
+        name: _bounds(sweep, point, [calibrations[name]] if name in calibrations else [])
+        for name, point in sweep.study.points.items()
     }
     heads = headlines([(q.label, percent) for found in bounds.values() for q, percent in found])
-    for name, point in settings.points.items():
+    for name, point in sweep.study.points.items():
         if name not in files:
             raise BiogripError(f"{name}: no file of identifications is given.")
-        for judged in _judged(settings, point, files[name], bounds[name], heads):
-            yield name, point.row, point.column, *judged
+        for judged in _judged(sweep, point, files[name], bounds[name], heads):
+            yield name, *sweep.places[name], *judged
 
 
-def _bounds(
-    settings: Settings, point: PointSettings, calibrated: list[Path]
-) -> list[tuple[Quantity, float]]:
+def _bounds(sweep: Swept, point: Case, calibrated: list[Path]) -> list[tuple[Quantity, float]]:
     problem = point.problem.calibrated(calibrated)
     time_s = point.sampling.over(problem.torque.end_s)
-    return bounds_percent(problem, point.noise, settings.parameters, time_s)
+    return bounds_percent(problem, point.noise, sweep.parameters, time_s)
 
 
 def _judged(
-    settings: Settings,
-    point: PointSettings,
+    sweep: Swept,
+    point: Case,
     path: Path,
     bounds: list[tuple[Quantity, float]],
     heads: list[str],
 ) -> Iterator[tuple[str | int, ...]]:
     """Yield rows for one point, for every method and quantity."""
-    problem, parameters = point.problem, settings.parameters
+    problem, parameters = point.problem, sweep.parameters
     time_s = point.sampling.over(problem.torque.end_s)
     searched = problem.searched.parameters
     members = {q.label: [searched[index] for index in q.members] for q, _ in bounds}
     truths = {label: sum(parameters[p.name] for p in of) for label, of in members.items()}
-    for method in settings.methods:
+    for method in sweep.study.methods:
         found = read_identifications(path, method)
         values = {
             label: found[[p.column for p in of]].sum(axis=1).to_numpy(float)
             for label, of in members.items()
         }
-        near = float(np.mean(_succeeded(settings, point, time_s, found)))
+        near = float(np.mean(_succeeded(sweep, point, time_s, found)))
         inside = np.ones(len(found), dtype=bool)
         for q, percent in bounds:
             if q.label in heads:
@@ -197,18 +166,16 @@ def _median(values: Array) -> float:
     return float(np.median(values)) if len(values) else np.nan
 
 
-def _succeeded(
-    settings: Settings, point: PointSettings, time_s: Array, found: pd.DataFrame
-) -> np.ndarray:
+def _succeeded(sweep: Swept, point: Case, time_s: Array, found: pd.DataFrame) -> np.ndarray:
     """Return whether each seed is near the noise, (n_seeds,).
 
     Without noise, the misfit of the true values rounded to the genes' two digits takes its
     place.
     """
     if point.noise.absent:
-        resolution = _resolution_rad(point.problem, settings.parameters, time_s)
+        resolution = _resolution_rad(point.problem, sweep.parameters, time_s)
         found = found.assign(noise_rms_rad=resolution)
-    return near_noise(found, settings.near_noise_tolerance)
+    return near_noise(found, sweep.study.near_noise_tolerance)
 
 
 def _resolution_rad(problem: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> float:
@@ -252,7 +219,7 @@ SWEEP_POINTS = Product(
     "sweep_points",
     {"points": POINTS.path},
     judge,
-    settings,
+    find_zeros,
     _jobs,
     message="Judging the sweep {sweep} over {case}",
     reads={"identifications": Reads(_identifications), "calibrated": Reads(_calibrations)},

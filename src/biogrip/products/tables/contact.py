@@ -1,17 +1,15 @@
 """Table of rotation, torque and voltage at contact with samples of several sizes."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import Phase, largest_torque, torque_history
+from biogrip.experiment.protocol import largest_torque, torque_history
 from biogrip.instrument import actuator
-from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
-from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import from_study
+from biogrip.study.study import Study
 
 _COLUMNS = (
     Column("size_um", "Sample (um)"),
@@ -24,23 +22,13 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Neutral gripper, jaw gap, comb drive and protocol."""
-
-    gripper: Gripper
-    jaw_gap_m: float
-    actuator: CombDrive
-    phases: tuple[Phase, ...]
-
-
-def contacts(settings: Settings) -> Table:
+def contacts(study: Study) -> Table:
     """Return the state of the gripper closed onto samples from the smallest to the largest."""
-    grip_Nm = largest_torque(torque_history(settings.phases))
+    grip_Nm = largest_torque(torque_history(study.phases))
     rows: list[tuple[Cell, ...]] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):
         try:
-            found = contact(settings.gripper, settings.jaw_gap_m, settings.actuator, 1e-6 * size_um)
+            found = contact(study.gripper, study.jaw_gap_m, study.actuator, 1e-6 * size_um)
         except BiogripError as error:
             rows.append((float(size_um), *5 * (None,), str(error)))
             continue
@@ -49,7 +37,7 @@ def contacts(settings: Settings) -> Table:
             found.reference_angle_deg,
             1e9 * found.torque_Nm,
             found.voltage_V,
-            float(actuator.voltage(settings.actuator, found.torque_Nm + grip_Nm)),
+            float(actuator.voltage(study.actuator, found.torque_Nm + grip_Nm)),
         )
         rows.append((float(size_um), *(float(number) for number in numbers), ""))
     caption = (
@@ -65,6 +53,6 @@ CONTACT = table(
     name="contact",
     item="input: contact",
     caption="Rotation, torque and voltage that close the jaws onto samples of several sizes.",
-    settings=lambda study: Settings(study.gripper, study.jaw_gap_m, study.actuator, study.phases),
+    uses=from_study("gripper jaw_gap_m actuator phases"),
     rule="tables",
 )

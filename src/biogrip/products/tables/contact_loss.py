@@ -1,28 +1,24 @@
 """Errors of identifications that wrongly assume bilateral contact."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.noise import add_noise
+from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import Sample
-from biogrip.experiment.sampling import Sampling
 from biogrip.identify.answer import Identification
-from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.instrument.gripper import Gripper
+from biogrip.identify.least_squares import identify_many
 from biogrip.products.files.traces import as_written
 from biogrip.products.product import Weight
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, to_identify
 from biogrip.response.grip import compute_grip
 from biogrip.response.simulation import simulated_rotation
 from biogrip.response.unilateral import unilateral_response
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 _MOST_SEEDS = 20
 _MEANS_LITTLE = 1000.0
@@ -40,71 +36,23 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class CaseSettings:
-    """A simulated case of the linear model.
-
-    Parameters
-    ----------
-    sample, parameters, gripper, phases, sampling, noise
-        Inputs of its traces; true values by name, SI units.
-    problem, least_squares
-        Assumptions of the identification, and settings of its fits.
-    seeds
-        Number of seeds.
-    """
-
-    sample: Sample
-    parameters: Mapping[str, float]
-    gripper: Gripper
-    phases: tuple[Phase, ...]
-    sampling: Sampling
-    noise: Noise
-    problem: CaseProblem
-    least_squares: object
-    seeds: int
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Seed of the study, and cases by name."""
-
-    study_seed: int
-    cases: Mapping[str, CaseSettings]
-
-
-def settings(study: Study) -> Settings:
+def _linear(study: Study) -> list[str]:
     """Return the simulated cases whose target and identification are linear."""
-    linear = [
-        (name, study.cases[name])
+    return [
+        name
         for name in study.simulated
         if not (study.cases[name].nonlinear_target or study.cases[name].problem.nonlinear)
     ]
-    return Settings(
-        study.study_seed,
-        {
-            name: CaseSettings(
-                case.sample,
-                case.parameters,
-                case.gripper,
-                case.phases,
-                case.sampling,
-                case.noise,
-                case.problem.to_identify(),
-                case.method("least_squares"),
-                min(case.seeds, _MOST_SEEDS),
-            )
-            for name, case in linear
-        },
-    )
 
 
-def contact_loss(settings: Settings) -> Table:
+def _few(case: Case) -> int:
+    return min(case.seeds, _MOST_SEEDS)
+
+
+def contact_loss(study: Study) -> Table:
     """Identify traces simulated with bilateral and with unilateral contact, and compare errors."""
     rows = [
-        row
-        for name, case in settings.cases.items()
-        for row in _rows(settings.study_seed, name, case)
+        row for name, case in study.cases.items() for row in _rows(study.study_seed, name, case)
     ]
     caption = (
         "Cases in which the jaws would have to pull: what least squares identifies, assuming "
@@ -117,7 +65,7 @@ def contact_loss(settings: Settings) -> Table:
     return Table(caption, _COLUMNS, rows)
 
 
-def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
+def _rows(study_seed: int, name: str, case: Case) -> list[tuple[Cell, ...]]:
     torque, model = torque_history(case.phases), case.sample.model
     network = model.sample(case.parameters)
     if compute_grip(case.gripper, network, torque, nonlinear=False).pulls_from_s is None:
@@ -157,14 +105,13 @@ def _rows(study_seed: int, name: str, case: CaseSettings) -> list[tuple[Cell, ..
 
 
 def _medians(
-    study_seed: int, name: str, case: CaseSettings, time_s: Array, traces: Sequence[Array]
+    study_seed: int, name: str, case: Case, time_s: Array, traces: Sequence[Array]
 ) -> list[float] | None:
     """Return the median of every quantity and of the misfit in rad; None for too few samples."""
     searched, model = case.problem.searched, case.problem.model
     nuisance = case.problem.offset + case.problem.drift
     if len(time_s) <= len(searched.names) + nuisance + 1:
         return None
-    assert isinstance(case.least_squares, LeastSquaresSettings)
     problems = [case.problem.of(time_s, trace) for trace in traces]
     rngs = [stream(study_seed, name, seed, "contact_loss") for seed in range(len(traces))]
     found: list[Identification] = identify_many(problems, case.least_squares, rngs)
@@ -190,7 +137,15 @@ CONTACT_LOSS = table(
     item="contact loss",
     caption="Errors of identifications that assume bilateral contact in traces with loss of "
     "contact, and in the readings before the loss.",
-    settings=settings,
-    when=lambda study: bool(settings(study).cases),
+    uses=from_study(
+        "study_seed",
+        cases=each(
+            _linear,
+            "sample parameters gripper phases sampling noise least_squares",
+            problem=to_identify,
+            seeds=_few,
+        ),
+    ),
+    when=_linear,
     weight=Weight(60, 1000),
 )

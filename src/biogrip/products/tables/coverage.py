@@ -1,14 +1,13 @@
 """Coverage of confidence intervals, and spread of estimates over the Cramér-Rao bound."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
-from biogrip.experiment.noise import Noise, standard_deviation
+from biogrip.experiment.noise import standard_deviation
 from biogrip.identifiability.fisher import bound
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import (
@@ -17,7 +16,6 @@ from biogrip.identifiability.verdicts import (
     DETERMINED,
     NOT_DETERMINED,
 )
-from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
@@ -25,6 +23,7 @@ from biogrip.products.product import of_cases
 from biogrip.products.stages.full_judgements import EVERY
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import covered, each, from_study
 from biogrip.study.study import Study
 
 _COLUMNS = (
@@ -48,42 +47,8 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class CaseSettings:
-    """True values, noise and assumptions of a case whose intervals are tested.
-
-    Parameters
-    ----------
-    problem
-        Assumptions of the identification.
-    parameters
-        True values by name, SI units.
-    noise
-        Noise to add to the target.
-    confidence
-        Confidence level of the intervals.
-    calibrated
-        True if a calibration replaces the gripper's arms.
-    """
-
-    problem: CaseProblem
-    parameters: Mapping[str, float]
-    noise: Noise
-    confidence: float
-    calibrated: bool
-
-
-def settings(study: Study) -> dict[str, CaseSettings]:
-    """Return the cases whose intervals are tested, by name."""
-    cases = {name: study.cases[name] for name in study.covered}
-    return {
-        n: CaseSettings(c.problem, c.parameters, c.noise, c.confidence, c.is_calibrated)
-        for n, c in cases.items()
-    }
-
-
 def coverage(
-    settings: Mapping[str, CaseSettings],
+    study: Study,
     targets: list[Path],
     intervals: list[Path],
     calibrated: list[Path],
@@ -92,8 +57,8 @@ def coverage(
 
     Parameters
     ----------
-    settings
-        Settings by case.
+    study
+        The study with these cases.
     targets, intervals
         Files of the cases, CSV, in their order.
     calibrated
@@ -101,8 +66,8 @@ def coverage(
     """
     calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
-    for (name, case), target, file in zip(settings.items(), targets, intervals, strict=True):
-        case_problem = case.problem.calibrated([next(calibrations)] if case.calibrated else [])
+    for (name, case), target, file in zip(study.cases.items(), targets, intervals, strict=True):
+        case_problem = case.problem.calibrated([next(calibrations)] if case.is_calibrated else [])
         log_truth = case_problem.logs(case.parameters)
         found = INTERVALS.read(file)
         time_s, _, rotation = read_target(target)
@@ -182,11 +147,11 @@ COVERAGE = table(
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
     "their intervals, and the verdicts that users are shown, hold the truth.",
     rule="tables",
-    settings=settings,
+    uses=from_study(cases=each(covered, "problem parameters noise confidence is_calibrated")),
     reads={
-        "targets": of_cases(TARGETS, lambda study: study.covered),
-        "intervals": of_cases(INTERVALS.path, lambda study: study.covered),
+        "targets": of_cases(TARGETS, covered),
+        "intervals": of_cases(INTERVALS.path, covered),
         "calibrated": of_cases(CALIBRATIONS, _calibrated),
     },
-    when=lambda study: bool(study.covered),
+    when=covered,
 )

@@ -1,7 +1,5 @@
 """Bounds of designed experiments beside the study's own, and coverage of their intervals."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +7,14 @@ import pandas as pd
 
 from biogrip.design.schedule import forces
 from biogrip.experiment.protocol import torque_history
-from biogrip.products.designed_cases import CaseSettings, bounds, designed_cases
-from biogrip.products.designed_cases import settings as experiments
+from biogrip.products.designed_cases import USED, bounds, designed_cases
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.study.study import Study
+from biogrip.products.uses import each, from_study
+from biogrip.study.study import Case, Study
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -35,31 +33,22 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Experiments by case, and names of cases whose seeds are compared with the bound."""
-
-    cases: Mapping[str, CaseSettings]
-    covered: tuple[str, ...]
-
-
-def settings(study: Study) -> Settings:
-    """Return designed experiments by case, and cases with intervals."""
-    return Settings(experiments(study), tuple(covered_cases(study)))
-
-
 def covered_cases(study: Study) -> list[str]:
     """Return the designed cases that have intervals."""
     return [name for name in designed_cases(study) if study.cases[name].coverage_seeds > 0]
 
 
-def designed(settings: Settings, expected: list[Path], intervals: list[Path]) -> Table:
+def _is_covered(case: Case) -> bool:
+    return case.coverage_seeds > 0
+
+
+def designed(study: Study, expected: list[Path], intervals: list[Path]) -> Table:
     """Compare bounds of both experiments with estimates of many seeds.
 
     Parameters
     ----------
-    settings
-        Experiments by case, and cases with intervals.
+    study
+        The study with its designed cases.
     expected
         Verdicts on traces without noise, JSON, in the order of the cases.
     intervals
@@ -67,17 +56,18 @@ def designed(settings: Settings, expected: list[Path], intervals: list[Path]) ->
     """
     files = iter(intervals)
     rows: list[tuple[Cell, ...]] = []
-    for (name, case), foreseen in zip(settings.cases.items(), expected, strict=True):
-        verdicts = {each["quantity"]: each for each in read_verdicts(foreseen)["quantities"]}
-        found = INTERVALS.read(next(files)) if name in settings.covered else None
-        truths = np.array([[case.parameters[name] for name in case.model.names]])
+    for (name, case), foreseen in zip(study.cases.items(), expected, strict=True):
+        verdicts = {item["quantity"]: item for item in read_verdicts(foreseen)["quantities"]}
+        found = INTERVALS.read(next(files)) if case.coverage_seeds else None
+        truths = np.array([[case.parameters[name] for name in case.searched.names]])
         before, after = (
-            bounds(case, experiment, truths)[0] for experiment in (case.before, case.after)
+            bounds(case, experiment, truths)[0]
+            for experiment in (case.study.experiment, case.experiment)
         )
         least_N = _least_force(case)
-        for index, parameter in enumerate(case.model.parameters):
+        for index, parameter in enumerate(case.searched.parameters):
             truth = case.parameters[parameter.name]
-            head = (name, parameter.name, parameter.unit, truth, 1e6 * case.noise_rad)
+            head = (name, parameter.name, parameter.unit, truth, 1e6 * case.design.noise_rad)
             both = (_percent(before[index]), _percent(after[index]))
             verdict = verdicts[parameter.name]["verdict"]
             observed = _of_seeds(found, parameter.name, truth, float(after[index]))
@@ -93,11 +83,11 @@ def designed(settings: Settings, expected: list[Path], intervals: list[Path]) ->
     return Table(caption, _COLUMNS, rows)
 
 
-def _least_force(case: CaseSettings) -> float:
+def _least_force(case: Case) -> float:
     """Return the least jaw force in N from the second step on; before, it starts at zero."""
-    torque = torque_history(case.after[0])
-    values = [[case.parameters[name] for name in case.model.names]]
-    time_s, force = forces(case.gripper, case.model.network(values), case.after[0])
+    torque = torque_history(case.experiment[0])
+    values = [[case.parameters[name] for name in case.searched.names]]
+    time_s, force = forces(case.gripper, case.searched.network(values), case.experiment[0])
     second_s = float(torque.time_s[min(1, len(torque.time_s) - 1)])
     return float(force[0, time_s > second_s].min())
 
@@ -125,10 +115,10 @@ DESIGNED = table(
     item="designed experiments",
     caption="Bounds of designed experiments beside those of the study's own, with spread and "
     "coverage over seeds identified in them.",
-    settings=settings,
+    uses=from_study(cases=each(designed_cases, USED, coverage_seeds=_is_covered)),
     reads={
         "expected": of_cases(EXPECTED, designed_cases),
         "intervals": of_cases(INTERVALS.path, covered_cases),
     },
-    when=lambda study: bool(designed_cases(study)),
+    when=designed_cases,
 )

@@ -1,8 +1,6 @@
 """Evidence for the reconstructed values, and contradictions within the paper."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +8,7 @@ import numpy as np
 from biogrip.digits import counted
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
-from biogrip.identify.genome import GeneRange
 from biogrip.instrument import actuator
-from biogrip.instrument.actuator import CombDrive
-from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.files.traces import (
     MEASUREMENTS,
@@ -24,6 +19,7 @@ from biogrip.products.files.traces import (
 from biogrip.products.product import Reads, Weight, of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, published
 from biogrip.study.study import Study
 
 _COLUMNS = (
@@ -39,35 +35,8 @@ _PRINTED_VOLTAGES = ((1.6e-9, "about 17"), (0.32e-9, "about 7"))
 _PRINTED_GENE_VALUES = "9 or 12"
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Values that the paper's statements are compared with.
-
-    Parameters
-    ----------
-    cases
-        True values of samples that the paper reports on, by name.
-    method
-        Method of identification.
-    gripper, actuator, ranges
-        Gripper, comb drive and search ranges of the study.
-    """
-
-    cases: Mapping[str, Truth]
-    method: str
-    gripper: Gripper
-    actuator: CombDrive
-    ranges: Mapping[str, GeneRange]
-
-
-def settings(study: Study) -> Settings:
-    """Return the values that the paper's statements are compared with."""
-    cases = {name: study.cases[name].truth for name in study.published}
-    return Settings(cases, study.shown, study.gripper, study.actuator, study.ranges)
-
-
 def evidence(
-    settings: Settings,
+    study: Study,
     identifications: list[Path],
     measurements: list[Path],
     targets: list[Path],
@@ -76,24 +45,25 @@ def evidence(
 
     Parameters
     ----------
-    settings
+    study
         Values that statements are compared with.
     identifications, measurements, targets
         Files of the cases: CSV, Parquet and CSV.
     """
-    rows = [*_actuator_rows(settings), *_gripper_rows(settings), *_gene_rows(settings)]
-    for name, case in settings.cases.items():
-        rows += [row for path in targets if path.stem == name for row in _grip_rows(case, path)]
+    rows = [*_actuator_rows(study), *_gripper_rows(study), *_gene_rows(study)]
+    for name, case in study.cases.items():
+        truth = case.truth
+        rows += [row for path in targets if path.stem == name for row in _grip_rows(truth, path)]
         traces = [path for path in measurements if path.parent.name == name]
         identified = [path for path in identifications if path.stem == name]
-        rows += _axis_rows(case, traces)
-        if settings.method == "genetic":
-            rows += _generation_rows(case, identified)
+        rows += _axis_rows(truth, traces)
+        if study.shown == "genetic":
+            rows += _generation_rows(truth, identified)
     return Table("Statements of the paper beside what the study computes.", _COLUMNS, rows)
 
 
-def _actuator_rows(settings: Settings) -> list[tuple[Cell, ...]]:
-    comb = settings.actuator
+def _actuator_rows(study: Study) -> list[tuple[Cell, ...]]:
+    comb = study.actuator
     rows: list[tuple[Cell, ...]] = []
     for torque, printed in _PRINTED_VOLTAGES:
         volts = float(actuator.voltage(comb, torque))
@@ -106,9 +76,9 @@ def _actuator_rows(settings: Settings) -> list[tuple[Cell, ...]]:
     return rows
 
 
-def _gripper_rows(settings: Settings) -> list[tuple[Cell, ...]]:
-    gripper = settings.gripper
-    comb = settings.actuator
+def _gripper_rows(study: Study) -> list[tuple[Cell, ...]]:
+    gripper = study.gripper
+    comb = study.actuator
     stroke = gripper.left.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
     volts = float(actuator.voltage(comb, stroke))
     return [
@@ -137,8 +107,8 @@ def _gripper_rows(settings: Settings) -> list[tuple[Cell, ...]]:
     ]
 
 
-def _gene_rows(settings: Settings) -> list[tuple[Cell, ...]]:
-    ranges = settings.ranges
+def _gene_rows(study: Study) -> list[tuple[Cell, ...]]:
+    ranges = study.ranges
     rows: list[tuple[Cell, ...]] = []
     for parameter in SINGLE_BRANCH:
         low, high = ranges[parameter.name].exponent
@@ -212,9 +182,9 @@ EVIDENCE = table(
     caption="Statements of the paper beside what the study computes, and what speaks for the "
     "reconstructed values.",
     rule="tables",
-    settings=settings,
+    uses=from_study("shown gripper actuator ranges", cases=each(published, "truth")),
     reads={
-        "identifications": of_cases(PATH, lambda study: study.published),
+        "identifications": of_cases(PATH, published),
         "targets": of_cases(
             TARGETS, lambda study: [name for name in study.published if name in study.simulated]
         ),
@@ -226,6 +196,6 @@ EVIDENCE = table(
             ]
         ),
     },
-    when=lambda study: bool(study.published),
+    when=published,
     weight=Weight(60, 1000),
 )

@@ -1,14 +1,10 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 from biogrip.experiment.sample import SINGLE_BRANCH
-from biogrip.identify.genome import GeneRange
-from biogrip.instrument.actuator import CombDrive
-from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
+from biogrip.products.uses import from_study, marked
+from biogrip.study.study import Study
 
 _SOURCE = Column("source", "Source")
 _LEGEND = (
@@ -17,36 +13,12 @@ _LEGEND = (
 )
 
 
-@dataclass(frozen=True)
-class GripperSettings:
-    """The neutral gripper, and reconstructed keys among its own."""
-
-    gripper: Gripper
-    reconstructed: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class ActuatorSettings:
-    """The comb drive, and reconstructed keys among its own."""
-
-    actuator: CombDrive
-    reconstructed: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class RangeSettings:
-    """The search ranges, and reconstructed keys among their own."""
-
-    ranges: Mapping[str, GeneRange]
-    reconstructed: tuple[str, ...] = ()
-
-
-def gripper(settings: GripperSettings) -> Table:
+def gripper(study: Study) -> Table:
     """Table 1: parameters of the gripper."""
-    block, marked = settings.gripper, settings.reconstructed
+    block, keys = study.gripper, study.reconstructed
     rows = [
         _row(
-            marked,
+            keys,
             "gripper.arm_length_m",
             "l",
             "arm length",
@@ -54,7 +26,7 @@ def gripper(settings: GripperSettings) -> Table:
             "m",
         ),
         _row(
-            marked,
+            keys,
             "gripper.reference_angle_deg",
             "hat-theta_2",
             "reference angle, left",
@@ -62,7 +34,7 @@ def gripper(settings: GripperSettings) -> Table:
             "deg",
         ),
         _row(
-            marked,
+            keys,
             "gripper.reference_angle_deg",
             "hat-theta_4",
             "reference angle, right",
@@ -79,7 +51,7 @@ def gripper(settings: GripperSettings) -> Table:
             path, value = f"gripper.{arm}.{key}", getattr(getattr(block, arm), key)
             rows.append(
                 _row(
-                    marked,
+                    keys,
                     path,
                     f"{symbol}_{index}",
                     f"{meaning}, {arm}",
@@ -90,11 +62,11 @@ def gripper(settings: GripperSettings) -> Table:
     return _quantities("Table 1. Parameters of the gripper.", rows)
 
 
-def actuator(settings: ActuatorSettings) -> Table:
+def actuator(study: Study) -> Table:
     """Table 2: geometry of the comb drive."""
-    block, marked = settings.actuator, settings.reconstructed
+    block, keys = study.actuator, study.reconstructed
     rows = [
-        _row(marked, f"actuator.{key}", symbol, meaning, getattr(block, key), unit)
+        _row(keys, f"actuator.{key}", symbol, meaning, getattr(block, key), unit)
         for key, symbol, meaning, unit in (
             ("thickness_m", "h", "thickness of the device layer", "m"),
             ("finger_width_m", "d", "finger width", "m"),
@@ -109,14 +81,14 @@ def actuator(settings: ActuatorSettings) -> Table:
     return _quantities("Table 2. Geometric parameters of the comb-drive actuator.", rows)
 
 
-def gene_ranges(settings: RangeSettings) -> Table:
+def gene_ranges(study: Study) -> Table:
     """Table 3: values that the genes may take."""
     rows = []
     for parameter in SINGLE_BRANCH:
-        genes = settings.ranges[parameter.name]
+        genes = study.ranges[parameter.name]
         for index, gene in enumerate(("exponent", "digit", "digit"), start=1):
             low, high = getattr(genes, gene)
-            source = _source(settings.reconstructed, f"search_range.{parameter.name}.{gene}")
+            source = _source(study.reconstructed, f"search_range.{parameter.name}.{gene}")
             name = f"g_{parameter.name}{index}"
             rows.append((name, parameter.name, gene, low, high, high - low + 1, source))
     columns = (
@@ -132,9 +104,9 @@ def gene_ranges(settings: RangeSettings) -> Table:
     return Table(caption + _LEGEND, columns, rows)
 
 
-def parameter_ranges(settings: RangeSettings) -> Table:
+def parameter_ranges(study: Study) -> Table:
     """Table 4: ranges of the parameters, as they follow from the genes."""
-    ranges = settings.ranges
+    ranges = study.ranges
     rows = [
         (p.name, p.meaning, p.unit, ranges[p.name].low, ranges[p.name].high) for p in SINGLE_BRANCH
     ]
@@ -150,18 +122,18 @@ def parameter_ranges(settings: RangeSettings) -> Table:
 
 
 def _row(
-    marked: tuple[str, ...],
+    keys: tuple[str, ...],
     key: str,
     symbol: str,
     meaning: str,
     value: float,
     unit: str,
 ) -> tuple[str, str, float, str, str]:
-    return symbol, meaning, value, unit, _source(marked, key)
+    return symbol, meaning, value, unit, _source(keys, key)
 
 
-def _source(marked: tuple[str, ...], key: str) -> str:
-    found = any(key == name or key.startswith(f"{name}.") for name in marked)
+def _source(keys: tuple[str, ...], key: str) -> str:
+    found = any(key == name or key.startswith(f"{name}.") for name in keys)
     return "reconstructed" if found else "stated"
 
 
@@ -187,7 +159,7 @@ INPUTS = (
         name="gripper",
         item="input: gripper",
         caption=f"Table 1 of the paper. {_CAPTION}",
-        settings=lambda study: GripperSettings(study.gripper, study.reconstructed("gripper")),
+        uses=from_study("gripper", reconstructed=marked("gripper")),
         rule="tables",
     ),
     table(
@@ -195,7 +167,7 @@ INPUTS = (
         name="actuator",
         item="input: actuator",
         caption=f"Table 2 of the paper. {_CAPTION}",
-        settings=lambda study: ActuatorSettings(study.actuator, study.reconstructed("actuator")),
+        uses=from_study("actuator", reconstructed=marked("actuator")),
         rule="tables",
     ),
     table(
@@ -203,7 +175,7 @@ INPUTS = (
         name="gene_ranges",
         item="input: gene ranges",
         caption=f"Table 3 of the paper. {_CAPTION}",
-        settings=lambda study: RangeSettings(study.ranges, study.reconstructed("search_range")),
+        uses=from_study("ranges", reconstructed=marked("search_range")),
         rule="tables",
     ),
     table(
@@ -211,7 +183,7 @@ INPUTS = (
         name="parameter_ranges",
         item="input: parameter ranges",
         caption=f"Table 4 of the paper. {_CAPTION}",
-        settings=lambda study: RangeSettings(study.ranges),
+        uses=from_study("ranges"),
         rule="tables",
     ),
 )

@@ -1,11 +1,7 @@
 """Size of the physical effects that the model leaves out."""
 
-from dataclasses import dataclass
-
-from biogrip.experiment.protocol import Phase, largest_torque, torque_history
-from biogrip.instrument.actuator import CombDrive
+from biogrip.experiment.protocol import largest_torque, torque_history
 from biogrip.instrument.contact import LARGEST_M
-from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.left_out import (
     drag_of_arm,
     drag_of_sample,
@@ -15,6 +11,7 @@ from biogrip.instrument.left_out import (
 )
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.study.study import Case, Study
 
 _COLUMNS = (
@@ -28,31 +25,6 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Inputs of the estimates.
-
-    Parameters
-    ----------
-    gripper, actuator, phases
-        Gripper, comb drive and protocol of the study.
-    least_damping_Ns_per_m
-        Sum of dampers of the sample that has least; None if only springpots or none are there.
-    """
-
-    gripper: Gripper
-    actuator: CombDrive
-    phases: tuple[Phase, ...]
-    least_damping_Ns_per_m: float | None
-
-
-def settings(study: Study) -> Settings:
-    """Return the inputs of the estimates."""
-    dampings = [_damping(study.cases[name]) for name in study.simulated]
-    least = min((damping for damping in dampings if damping > 0), default=None)
-    return Settings(study.gripper, study.actuator, study.phases, least)
-
-
 def _damping(case: Case) -> float:
     model = case.sample.model
     if model.power_law:
@@ -61,11 +33,13 @@ def _damping(case: Case) -> float:
     return float(network.c_p[0] + network.c[0].sum())
 
 
-def left_out(settings: Settings) -> Table:
+def left_out(study: Study) -> Table:
     """Estimate effects that the model leaves out, for the largest sample."""
-    gripper, comb, least = settings.gripper, settings.actuator, settings.least_damping_Ns_per_m
+    gripper, comb = study.gripper, study.actuator
+    dampings = [damping for case in study.cases.values() if (damping := _damping(case)) > 0]
+    least = min(dampings, default=None)
     b, arm = gripper.lever_m, gripper.left
-    turn = largest_torque(torque_history(settings.phases)) / arm.stiffness_Nm_per_rad
+    turn = largest_torque(torque_history(study.phases)) / arm.stiffness_Nm_per_rad
     rows: list[tuple[Cell, ...]] = []
     if least is not None:
         drag = drag_of_sample(LARGEST_M)
@@ -111,6 +85,6 @@ LEFT_OUT = table(
     item="left out",
     caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
     "inertia.",
-    settings=settings,
+    uses=from_study("gripper actuator phases", cases=each(simulated, "sample parameters")),
     rule="tables",
 )

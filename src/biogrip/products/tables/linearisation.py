@@ -8,6 +8,8 @@ from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import simulated
+from biogrip.study.study import Study
 
 LIMIT_PERCENT = 1.0
 """Difference up to which it counts as accurate, as a share of the peak."""
@@ -20,13 +22,11 @@ _COLUMNS = (
 )
 
 
-def linearisation(settings: None, differences: Path) -> Table:
+def linearisation(_: Study, differences: Path) -> Table:
     """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`.
 
     Parameters
     ----------
-    settings
-        None.
     differences
         The comparison of the models, CSV.
     """
@@ -69,7 +69,6 @@ LINEARISATION = table(
     item="linearisation",
     caption=CAPTION,
     rule="tables",
-    settings=lambda study: None,
     reads={"differences": the(DIFFERENCES.path)},
-    when=lambda study: bool(study.simulated),
+    when=simulated,
 )

@@ -1,17 +1,13 @@
 """Strain, force, stiffness and apparent modulus of every sample."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
 from biogrip.experiment.apparent_modulus import apparent_modulus
-from biogrip.experiment.protocol import Phase, torque_history
-from biogrip.experiment.sample import Sample
+from biogrip.experiment.protocol import torque_history
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
-from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_shortening
@@ -33,48 +29,7 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class CaseSettings:
-    """Inputs of a simulated case, from which its mechanics are computed.
-
-    Parameters
-    ----------
-    title
-        Title of the case.
-    gripper, phases, sample, parameters, nonlinear
-        Inputs of the target.
-    size_m
-        Diameter of the sample, if it is given.
-    """
-
-    title: str
-    gripper: Gripper
-    phases: tuple[Phase, ...]
-    sample: Sample
-    parameters: Mapping[str, float]
-    nonlinear: bool
-    size_m: float | None
-
-
-def settings_of(case: Case) -> CaseSettings:
-    """Return the settings that a case's mechanics depend on."""
-    return CaseSettings(
-        case.title,
-        case.gripper,
-        case.phases,
-        case.sample,
-        case.parameters,
-        case.nonlinear_target,
-        case.size_m,
-    )
-
-
-def settings(study: Study) -> list[CaseSettings]:
-    """Return the settings of all simulated cases."""
-    return [settings_of(study.cases[name]) for name in study.simulated]
-
-
-def mechanics(settings: list[CaseSettings]) -> Table:
+def mechanics(study: Study) -> Table:
     """Compute strain, force, stiffness and modulus of every sample."""
     caption = (
         "Each sample while jaws hold it: shortening and strain at the end of the first phase; the "
@@ -86,18 +41,18 @@ def mechanics(settings: list[CaseSettings]) -> Table:
         "method of measurement. A case that gives no size has a row for the smallest and the "
         "largest sample that the gripper takes."
     )
-    return Table(caption, _COLUMNS, [row for case in settings for row in _rows(case)])
+    return Table(caption, _COLUMNS, [row for case in study.cases.values() for row in _rows(case)])
 
 
-def _rows(case: CaseSettings) -> list[tuple[Cell, ...]]:
+def _rows(case: Case) -> list[tuple[Cell, ...]]:
     torque = torque_history(case.phases)
     network = case.sample.model.sample(case.parameters)
     # Immediately before the first change of torque.
     end = np.array([np.nextafter(case.phases[0].duration_s, 0)])
     given = case.gripper, network, torque
-    shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear)[0, 0])
-    force = float(jaw_force(*given, end, nonlinear=case.nonlinear)[0, 0])
-    grip = compute_grip(*given, nonlinear=case.nonlinear)
+    shortening = float(simulated_shortening(*given, end, nonlinear=case.nonlinear_target)[0, 0])
+    force = float(jaw_force(*given, end, nonlinear=case.nonlinear_target)[0, 0])
+    grip = compute_grip(*given, nonlinear=case.nonlinear_target)
     # A springpot has neither instantaneous nor long-term stiffness.
     power_law = case.sample.model.power_law
     in_the_end = None if power_law else float(network.k_p[0])
@@ -131,7 +86,9 @@ MECHANICS = table(
     item="mechanics",
     caption="Strain, force, stiffness and apparent modulus of every simulated sample, beside the "
     "gripper's own stiffness.",
-    settings=settings,
+    uses=from_study(
+        cases=each(simulated, "title gripper phases sample parameters nonlinear_target size_m")
+    ),
     rule="tables",
-    when=lambda study: bool(study.simulated),
+    when=simulated,
 )

@@ -1,7 +1,6 @@
 """Comparison of identification methods on the same traces."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,13 +8,13 @@ import pandas as pd
 
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
-from biogrip.identify.methods import Method
 from biogrip.identify.success import chi_square_increase, near_noise, near_noise_words
 from biogrip.products.files.identifications import PATH, read_identifications
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
-from biogrip.products.tables.errors import error_percent
+from biogrip.products.tables.errors_of_case import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, simulated
 from biogrip.study.study import Study
 
 _LEADING = (
@@ -29,79 +28,48 @@ _LEADING = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the comparison of identification methods.
-
-    Parameters
-    ----------
-    cases
-        The samples, and how many samples their traces have, by name.
-    methods
-        By what their traces were identified, by name.
-    optimum_tolerance, near_noise_tolerance
-        Tolerances of the global optimum and of the noise.
-    """
-
-    cases: Mapping[str, tuple[Truth, int]]
-    methods: Mapping[str, Method]
-    optimum_tolerance: float
-    near_noise_tolerance: float
-
-
-def settings(study: Study) -> Settings:
-    """Return the settings of the comparison."""
-    cases = {name: study.cases[name] for name in study.simulated}
-    return Settings(
-        {name: (case.truth, case.samples) for name, case in cases.items()},
-        study.identifiers,
-        study.optimum_tolerance,
-        study.near_noise_tolerance,
-    )
-
-
-def methods(settings: Settings, identifications: list[Path]) -> Table:
+def methods(study: Study, identifications: list[Path]) -> Table:
     """Compare success rate, errors and cost of each method.
 
     Parameters
     ----------
-    settings
-        Settings of the comparison.
+    study
+        The study with these cases.
     identifications
         Identifications of the cases, CSV, in their order.
     """
     labels = dict.fromkeys(
         _label(quantity)
-        for truth, _ in settings.cases.values()
-        for quantity in truth.model.quantities
+        for case in study.cases.values()
+        for quantity in case.truth.model.quantities
     )
     rows: list[tuple[Cell, ...]] = []
-    for (name, (truth, samples)), path in zip(settings.cases.items(), identifications, strict=True):
+    for (name, case), path in zip(study.cases.items(), identifications, strict=True):
         found = read_identifications(path)
-        increase = chi_square_increase(found, samples)
+        increase = chi_square_increase(found, case.samples)
         for method in found["method"].unique():
             mine = found["method"] == method
-            reached = near_noise(found[mine], settings.near_noise_tolerance)
+            reached = near_noise(found[mine], study.near_noise_tolerance)
             rows.append(
                 (
                     name,
-                    settings.methods[method].title,
+                    study.identifiers[method].title,
                     int(mine.sum()),
-                    float(np.mean(increase[mine] <= settings.optimum_tolerance)),
+                    float(np.mean(increase[mine] <= study.optimum_tolerance)),
                     float(np.mean(reached)),
                     float(np.median(increase[mine])),
                     float(found.loc[mine, "evaluations"].median()),
-                    *_errors(found[mine], truth, list(labels)),
+                    *_errors(found[mine], case.truth, list(labels)),
                 )
             )
-    words = near_noise_words(settings.near_noise_tolerance)
+    words = near_noise_words(study.near_noise_tolerance)
     columns = (
         *(replace(c, heading=c.heading.format(near_noise=words)) for c in _LEADING),
         *(Column(f"error_percent {label}", f"Error {label} %", 2) for label in labels),
     )
     caption = (
         "Methods on the same traces. At the global optimum: chi-squared at most "
-        f"{settings.optimum_tolerance:g} above the lowest that any method, or the truth, has on "
+        f"{study.optimum_tolerance:g} above the lowest that any method, or the truth, has on "
         f"that trace. A misfit {words} in the trace may be far above that in chi-squared. Errors "
         "are medians of the absolute error."
     )
@@ -128,7 +96,10 @@ METHODS_COMPARED = table(
     caption="The identifiers on the same traces: share of seeds at the global optimum and within "
     "the study's tolerance of the noise, responses simulated, errors.",
     rule="tables",
-    settings=settings,
-    reads={"identifications": of_cases(PATH, lambda study: study.simulated)},
-    when=lambda study: bool(study.simulated),
+    uses=from_study(
+        "identifiers optimum_tolerance near_noise_tolerance",
+        cases=each(simulated, "truth samples"),
+    ),
+    reads={"identifications": of_cases(PATH, simulated)},
+    when=simulated,
 )

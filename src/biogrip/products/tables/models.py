@@ -1,17 +1,15 @@
 """Model selection by AIC and BIC, counted over seeds."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import pandas as pd
 
-from biogrip.experiment.sample import CANDIDATES, Sample
 from biogrip.identify.model_choice import aic_and_bic
 from biogrip.products.files.model_fits import MODEL_FITS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, every, from_study
 from biogrip.study.study import Study
 
 _COLUMNS = (
@@ -26,39 +24,13 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Sample models that are compared.
-
-    Parameters
-    ----------
-    made_by
-        Those that made the traces, by case; None of a recorded one.
-    tried
-        All that traces were fitted with, by name.
-    """
-
-    made_by: Mapping[str, str | None]
-    tried: Mapping[str, Sample]
-
-
-def settings(study: Study) -> Settings:
-    """Choose which sample models are compared."""
-    cases = study.cases
-    made_by = {
-        name: None if case.recorded else case.sample.candidate for name, case in cases.items()
-    }
-    tried = {name: CANDIDATES[name] for case in cases.values() for name in study.models_of(case)}
-    return Settings(made_by, tried)
-
-
-def models(settings: Settings, fits: list[Path]) -> Table:
+def models(study: Study, fits: list[Path]) -> Table:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`.
 
     Parameters
     ----------
-    settings
-        Which.
+    study
+        The study with its cases.
     fits
         Fits of all models, CSV.
     """
@@ -67,7 +39,8 @@ def models(settings: Settings, fits: list[Path]) -> Table:
         found["misfit_rad"], found["samples"], found["parameters"]
     )
     rows: list[tuple[Cell, ...]] = []
-    for case, maker in settings.made_by.items():
+    for case, made in study.cases.items():
+        maker = None if made.recorded else made.sample.candidate
         of_case = found[found["case"] == case]
         delta = {}
         for criterion in ("aic", "bic"):
@@ -78,7 +51,7 @@ def models(settings: Settings, fits: list[Path]) -> Table:
         for name in of_case["model"].unique():
             medians = [float(table[name].median()) for table in delta.values()]
             chosen = [int((table.idxmin(axis=1) == name).sum()) for table in delta.values()]
-            model = settings.tried[name].model
+            model = made.models[name].model
             title = model.title + (" (made the traces)" if name == maker else "")
             rows.append((case, title, len(model.names), *medians, *chosen, len(delta["aic"])))
     caption = (
@@ -94,7 +67,7 @@ MODELS_COMPARED = table(
     item="sample models",
     caption="Number of seeds in which each sample model has the lowest AIC and BIC.",
     rule="tables",
-    settings=settings,
-    reads={"fits": of_cases(MODEL_FITS.path, lambda study: study.cases)},
+    uses=from_study(cases=each(every, "recorded sample models")),
+    reads={"fits": of_cases(MODEL_FITS.path, every)},
     when=lambda study: study.selects_models,
 )

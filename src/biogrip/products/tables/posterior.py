@@ -1,7 +1,6 @@
 """Posterior intervals of all quantities, beside those of profile likelihoods."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,7 @@ from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.tables.verdicts import target_of
+from biogrip.products.uses import each, from_study, sampled
 from biogrip.study.study import Study
 
 _IN_WORDS = {AGREES: "the same", DIFFERS: "another interval", PRIOR: "an end is the prior's"}
@@ -35,25 +35,13 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """True parameters of the cases by name; empty if unknown."""
-
-    parameters: Mapping[str, Mapping[str, float]]
-
-
-def settings(study: Study) -> Settings:
-    """Return the settings that the table depends on."""
-    return Settings({name: study.case(name).parameters for name in study.sampled})
-
-
-def posteriors(settings: Settings, files: list[Path]) -> Table:
+def posteriors(study: Study, files: list[Path]) -> Table:
     """List posteriors from the summary of each case, JSON."""
     found = [read_posterior(path) for path in files]
     rows = [
         row
-        for each, (case, parameters) in zip(found, settings.parameters.items(), strict=True)
-        for row in _rows(case, parameters, each)
+        for each, (name, case) in zip(found, study.cases.items(), strict=True)
+        for row in _rows(name, case.parameters, each)
     ]
     confidences = {f"{100 * each['confidence']:g}" for each in found}
     percent = " or ".join(sorted(confidences))
@@ -96,7 +84,7 @@ POSTERIOR_TABLE = table(
     item="posterior",
     caption="Posteriors of one trace of each case, beside its profile likelihoods, and how far "
     "the samples have converged.",
-    settings=settings,
-    reads={"files": of_cases(POSTERIOR, lambda study: study.sampled)},
-    when=lambda study: bool(study.sampled),
+    uses=from_study(cases=each(sampled, "parameters")),
+    reads={"files": of_cases(POSTERIOR, sampled)},
+    when=sampled,
 )

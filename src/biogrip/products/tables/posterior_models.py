@@ -6,6 +6,7 @@ from biogrip.products.files.posterior import POSTERIOR, read_posterior
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study
 from biogrip.study.study import Study
 
 _COLUMNS = (
@@ -21,17 +22,12 @@ _COLUMNS = (
 )
 
 
-def compared(study: Study) -> list[str]:
+def _compared(study: Study) -> list[str]:
     """Return the cases whose models are compared by evidence."""
-    cases = {name: study.case(name) for name in study.sampled}
-    return [
-        name
-        for name, case in cases.items()
-        if case.posterior and case.posterior.evidence and not case.fixed
-    ]
+    return [name for name in study.sampled if study.case(name).compared_models]
 
 
-def posterior_models(cases: list[str], files: list[Path]) -> Table:
+def posterior_models(study: Study, files: list[Path]) -> Table:
     """List models and their evidence from the posterior summary of each case, JSON."""
     rows: list[tuple[Cell, ...]] = [
         (
@@ -45,7 +41,7 @@ def posterior_models(cases: list[str], files: list[Path]) -> Table:
             float(f"{row['error']:.1g}"),
             "yes" if row["reliable"] else "no",
         )
-        for case, path in zip(cases, files, strict=True)
+        for case, path in zip(study.cases, files, strict=True)
         for row in read_posterior(path)["evidence"]
     ]
     caption = (
@@ -61,7 +57,7 @@ POSTERIOR_MODELS = table(
     name="posterior_models",
     item="evidence of models",
     caption="Evidence of sample models for one trace of each case, beside AIC and BIC.",
-    settings=compared,
-    reads={"files": of_cases(POSTERIOR, compared)},
-    when=lambda study: bool(compared(study)),
+    uses=from_study(cases=each(_compared)),
+    reads={"files": of_cases(POSTERIOR, _compared)},
+    when=_compared,
 )

@@ -1,15 +1,12 @@
 """Check of the values in Tables 5 to 7 against the paper's own encoding and error formula."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
-from biogrip.experiment.truth import Truth
-from biogrip.identify.genome import GeneRange, nearest_encodable
+from biogrip.identify.genome import nearest_encodable
 from biogrip.products.tables.declared import table
-from biogrip.products.tables.errors import error_percent
+from biogrip.products.tables.errors_of_case import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study, published
 from biogrip.study.study import Study
 
 _COLUMNS = (
@@ -25,28 +22,16 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Published values by case, and the search ranges."""
-
-    cases: Mapping[str, Truth]
-    ranges: Mapping[str, GeneRange]
-
-
-def settings(study: Study) -> Settings:
-    """Return published values by case, and the search ranges."""
-    return Settings({name: study.cases[name].truth for name in study.published}, study.ranges)
-
-
-def printed_values(settings: Settings) -> Table:
+def printed_values(study: Study) -> Table:
     """Compare published values with encoding, range and error formula."""
-    ranges = settings.ranges
+    ranges = study.ranges
     rows: list[tuple[Cell, ...]] = []
-    for case, truth in settings.cases.items():
-        published = truth.published
+    for case, reported in study.cases.items():
+        truth = reported.truth
+        printed = truth.published
         for name in truth.model.names:
             target = truth.parameters[name]
-            identified = published.identified.get(name)
+            identified = printed.identified.get(name)
             for quantity, value in (("target", target), ("identified", identified)):
                 if value is None or value <= 0:
                     continue
@@ -54,8 +39,8 @@ def printed_values(settings: Settings) -> Table:
                 nearest = nearest_encodable(value, genes)
                 errors: tuple[Cell, Cell] = (None, None)
                 if quantity == "identified" and target:
-                    printed = published.error_percent.get(name)
-                    errors = (printed, float(error_percent(target, np.array([value]))[0]))
+                    printed_percent = printed.error_percent.get(name)
+                    errors = (printed_percent, float(error_percent(target, np.array([value]))[0]))
                 distance = 100 * (value - nearest) / value
                 within = "yes" if genes.low <= value <= genes.high else "no"
                 rows.append(
@@ -75,6 +60,6 @@ PRINTED_VALUES = table(
     caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
     "encoding, ranges and error formula.",
     rule="tables",
-    settings=settings,
-    when=lambda study: bool(study.published),
+    uses=from_study("ranges", cases=each(published, "truth")),
+    when=published,
 )

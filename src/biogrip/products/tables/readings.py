@@ -1,7 +1,5 @@
 """Comparison of readings of section 4: success rate, errors and last improvement."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +14,7 @@ from biogrip.products.product import of_cases
 from biogrip.products.stages.readings import read_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study
 from biogrip.study.study import Study
 
 # Parameters compared jointly with the paper's values; c_p is left out as undetermined.
@@ -24,42 +23,14 @@ _ALL = ("k", "k_p", "c")
 _ROUNDING = 0.005
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Settings of the comparison of readings of the paper.
-
-    Parameters
-    ----------
-    titles
-        Titles of the readings by name.
-    truths
-        True values of each case, by name.
-    near_noise_tolerance
-        Share by which a misfit may exceed the noise to count as near it.
-    """
-
-    titles: Mapping[str, str]
-    truths: Mapping[str, Truth]
-    near_noise_tolerance: float
-
-
-def settings(study: Study) -> Settings:
-    """Return the settings that the table depends on."""
-    return Settings(
-        {name: block.title for name, block in study.config.readings.items()},
-        {name: study.case(name).truth for name in read_cases(study)},
-        study.near_noise_tolerance,
-    )
-
-
-def readings(settings: Settings, found: list[Path]) -> Table:
+def readings(study: Study, found: list[Path]) -> Table:
     """Compare the readings from the rows of each case, CSV."""
     rows = [
         row
-        for path, (case, truth) in zip(found, settings.truths.items(), strict=True)
-        for row in _rows(settings, case, truth, READINGS.read(path))
+        for path, (name, case) in zip(found, study.cases.items(), strict=True)
+        for row in _rows(study, name, case.truth, READINGS.read(path))
     ]
-    words = near_noise_words(settings.near_noise_tolerance)
+    words = near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
         Column("reading", "Reading"),
@@ -78,11 +49,9 @@ def readings(settings: Settings, found: list[Path]) -> Table:
     return Table(caption, columns, rows)
 
 
-def _rows(
-    settings: Settings, case: str, truth: Truth, found: pd.DataFrame
-) -> list[tuple[Cell, ...]]:
+def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
-    for name, title in settings.titles.items():
+    for name, title in study.reading_titles.items():
         mine = found[found["reading"] == name]
         errors = {
             p.name: 100 * np.abs(mine[p.column].to_numpy(float) / truth.parameters[p.name] - 1)
@@ -95,7 +64,7 @@ def _rows(
                 case,
                 title,
                 len(mine),
-                float(near_noise(mine, settings.near_noise_tolerance).mean()),
+                float(near_noise(mine, study.near_noise_tolerance).mean()),
                 None if close is None else float(close.mean()),
                 *(_median(errors.get(p.name)) for p in SINGLE_BRANCH),
                 float(mine["last_improvement"].median()),
@@ -129,7 +98,7 @@ READINGS_TABLE = table(
     item="readings",
     caption="How often the genetic algorithm finds the samples under other readings of the "
     "paper's section 4, and in which generation it improves for the last time.",
-    settings=settings,
+    uses=from_study("reading_titles near_noise_tolerance", cases=each(read_cases, "truth")),
     reads={"found": of_cases(READINGS.path, read_cases)},
-    when=lambda study: bool(study.readings),
+    when=lambda study: study.readings,
 )

@@ -1,20 +1,15 @@
 """Sampling rate at which the paper's errors agree with Cramér-Rao bounds."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-
 import numpy as np
 
-from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import sample_times
-from biogrip.experiment.truth import Truth
 from biogrip.identifiability.at_truth import DETERMINED_PERCENT, bounds_percent
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identify.case_problem import CaseProblem
 from biogrip.products.tables.declared import table
-from biogrip.products.tables.errors import error_percent
+from biogrip.products.tables.errors_of_case import error_percent
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.study.study import Study
+from biogrip.products.uses import each, from_study, published
+from biogrip.study.study import Case, Study
 
 _RATES_HZ = (0.1, 1.0, 10.0, 100.0)
 # Factor of a parameter's bound over that of the sum above which the two count as exchangeable.
@@ -35,25 +30,10 @@ _CAPTION = (
 )
 
 
-@dataclass(frozen=True)
-class CaseSettings:
-    """A sample that the paper reports on, with assumptions and noise for its bounds."""
-
-    truth: Truth
-    problem: CaseProblem
-    noise: Noise
-
-
-def settings(study: Study) -> dict[str, CaseSettings]:
-    """Return the cases that the paper reports on, by name."""
-    cases = {name: study.cases[name] for name in study.published}
-    return {n: CaseSettings(c.truth, c.problem, c.noise) for n, c in cases.items()}
-
-
-def sampling_evidence(settings: Mapping[str, CaseSettings]) -> Table:
+def sampling_evidence(study: Study) -> Table:
     """Compare errors of the paper with bounds at several sampling rates."""
     rows: list[tuple[Cell, ...]] = []
-    for name, case in settings.items():
+    for name, case in study.cases.items():
         rows += _case_rows(name, case)
     if rows:
         table = np.array([row[2:] for row in rows], dtype=float)
@@ -62,7 +42,7 @@ def sampling_evidence(settings: Mapping[str, CaseSettings]) -> Table:
     return Table(_CAPTION, _COLUMNS, rows)
 
 
-def _case_rows(name: str, case: CaseSettings) -> list[tuple[Cell, ...]]:
+def _case_rows(name: str, case: Case) -> list[tuple[Cell, ...]]:
     """Return a row per quantity that is determined at some rate and that the paper reports."""
     truth, identified = case.truth.parameters, case.truth.published.identified
     problem, noise = case.problem, case.noise
@@ -107,6 +87,6 @@ SAMPLING_EVIDENCE = table(
     "alike, on average over the rows, can the paper's traces have been sampled; that rate is "
     "reconstructed.",
     rule="tables",
-    settings=settings,
-    when=lambda study: bool(study.published),
+    uses=from_study(cases=each(published, "truth problem noise")),
+    when=published,
 )

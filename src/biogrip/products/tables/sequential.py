@@ -14,6 +14,7 @@ from biogrip.products.product import Reads
 from biogrip.products.stages.sequence import AFTER, BEFOREHAND, REPEATED, TRUTH, cells_of, sequenced
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import each, from_study
 from biogrip.study.study import Study
 
 IN_WORDS: Mapping[str, str] = {
@@ -41,25 +42,20 @@ _COLUMNS = (
 )
 
 
-def settings(study: Study) -> dict[str, tuple[int, float]]:
-    """Return the number of cells and the confidence level of each case."""
-    cases = {name: study.cases[name] for name in sequenced(study)}
-    return {name: (cells_of(case), case.confidence) for name, case in cases.items()}
-
-
-def sequential(settings: Mapping[str, tuple[int, float]], rows: list[Path]) -> Table:
+def sequential(study: Study, rows: list[Path]) -> Table:
     """Compute how well cells are known after each number of experiments.
 
     Parameters
     ----------
-    settings
-        Number of cells and confidence level of each case.
+    study
+        The study with these cases.
     rows
         Estimates and limits for each cell, CSV, case after case.
     """
     found = pd.concat([SEQUENCES.read(file) for file in rows])
-    lines = [line for case in settings for line in _lines(case, found[found["case"] == case])]
-    confidence = " or ".join(sorted({f"{100 * level:g}" for _, level in settings.values()}))
+    lines = [line for case in study.cases for line in _lines(case, found[found["case"] == case])]
+    levels = [case.confidence for case in study.cases.values()]
+    confidence = " or ".join(sorted({f"{100 * level:g}" for level in levels}))
     caption = (
         "Simulated cells, drawn from the ranges of the design, with one experiment after another; "
         "all traces of a cell are fitted together, with the arms' inertia, all parameters free and "
@@ -128,7 +124,7 @@ SEQUENTIAL = table(
     item="sequential experiments",
     caption="Accuracy of simulated cells' parameters over the number of experiments: the study's "
     "experiment repeated, or each experiment designed from all earlier traces.",
-    settings=settings,
+    uses=from_study(cases=each(sequenced, "confidence", cells=cells_of)),
     reads={"rows": Reads(_every_file)},
-    when=lambda study: bool(sequenced(study)),
+    when=sequenced,
 )

@@ -1,15 +1,15 @@
 """Processor time of the methods on the machine that ran them."""
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import pandas as pd
 
-from biogrip.identify.methods import Method
 from biogrip.products.files.identifications import TIMINGS
 from biogrip.products.product import of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import every, from_study
+from biogrip.study.study import Study
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -20,13 +20,13 @@ _COLUMNS = (
 )
 
 
-def timings(methods: Mapping[str, Method], times: list[Path]) -> Table:
+def timings(study: Study, times: list[Path]) -> Table:
     """Summarise processor time per identification by case and method, from CSV."""
     spent = pd.concat([TIMINGS.read(path) for path in times])
     rows: list[tuple[Cell, ...]] = [
         (
             case,
-            methods[method].title,
+            study.identifiers[method].title,
             len(mine),
             float(mine["cpu_s"].median()),
             float(mine["cpu_s"].sum()),
@@ -44,6 +44,6 @@ TIMES = table(
     item="processor times",
     caption="Processor time of the identifications on the machine that made this report.",
     rule="tables",
-    settings=lambda study: study.identifiers,
-    reads={"times": of_cases(TIMINGS.path, lambda study: study.cases)},
+    uses=from_study("identifiers"),
+    reads={"times": of_cases(TIMINGS.path, every)},
 )

@@ -1,15 +1,16 @@
 """Verdicts on one trace of a case, quantity by quantity."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
-from biogrip.products.stages.expected import verdicts_expected
+from biogrip.products.stages.expected import VERDICTS_EXPECTED
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.study.study import Case, Study
+from biogrip.products.uses import every, from_case
+from biogrip.study.study import Case
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -28,26 +29,12 @@ _COLUMNS = (
 )
 
 
-@dataclass(frozen=True)
-class Settings:
-    """Name, title and true parameters of a case; parameters are empty if unknown."""
-
-    case: str
-    title: str
-    parameters: Mapping[str, float]
-
-
-def settings(study: Study, case: Case) -> Settings:
-    """Return the settings that the table of a case depends on."""
-    return Settings(case.name, case.title, case.parameters)
-
-
-def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
+def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
     """List the verdicts on all quantities of a case.
 
     Parameters
     ----------
-    settings
+    case
         The case.
     measured
         Verdicts on the judged trace, JSON.
@@ -62,10 +49,10 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
         foreseen = foreseen_of.get(name, {})
         rows.append(
             (
-                settings.case,
+                case.name,
                 name,
                 item["unit"],
-                target_of(name, settings.parameters),
+                target_of(name, case.parameters),
                 found["fit"],
                 item["verdict"],
                 item["value"] if item["verdict"] == "determined" else None,
@@ -83,7 +70,7 @@ def verdicts(settings: Settings, measured: Path, expected: list[Path]) -> Table:
         for trade in found["trades"]
     )
     caption = (
-        f"{settings.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
+        f"{case.title}: verdicts on the trace of one seed, from profile likelihoods.{trades} "
         f"One-sided limits hold with {50 * (1 + found['confidence']):g} % confidence."
     )
     if others:
@@ -105,8 +92,8 @@ VERDICTS = table(
     item="verdicts",
     caption="Verdicts on every quantity from profile likelihoods of one seed's trace, with "
     "confidence limits, beside those expected from the trace without noise.",
-    settings=settings,
-    reads={"measured": the(PATH), "expected": verdicts_expected()},
-    cases=lambda study: study.cases,
+    uses=from_case("name title parameters"),
+    reads={"measured": the(PATH), "expected": VERDICTS_EXPECTED},
+    cases=every,
     weight=JUDGEMENT,
 )
