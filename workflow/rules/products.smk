@@ -1,4 +1,4 @@
-"""A rule for each thing that the study makes, or each rule of them, as they declare themselves."""
+"""A rule for each thing that the study makes besides its stages, as they declare themselves."""
 
 
 def reported(rule):
@@ -23,7 +23,7 @@ def reported(rule):
     return found
 
 
-for rule in SHEETS:
+for rule in (rule for rule in SHEETS if rule.name not in STAGES):
 
     rule:
         name:

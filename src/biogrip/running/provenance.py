@@ -112,7 +112,7 @@ class Provenance:
 
 def _outputs(rule: Rule, job: Wildcards) -> list[str]:
     """Return the files of a job, relative to the results folder."""
-    return [name_of(file) for product in rule.products for file in product.outputs(job).values()]
+    return [*map(name_of, rule.files(job))]
 
 
 def is_result(file: str) -> bool:
