@@ -9,6 +9,7 @@ report: "workflow/report/study.rst"
 
 
 include: "workflow/rules/common.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/products.smk"
 include: "workflow/rules/check.smk"
 
@@ -21,36 +22,12 @@ rule all:
         "The whole study; results/report.html shows it"
 
 
-rule all_maps:
-    input:
-        [file for file in ALL_FILES if Path(file).name.startswith("robustness_")],
-    message:
-        "All maps of robustness"
+for group, pattern in GROUPS.items():
 
-
-rule all_designs:
-    input:
-        [file for file in ALL_FILES if Path(file).name.startswith("designed")],
-    message:
-        "All designs"
-
-
-rule all_sequences:
-    input:
-        [file for file in ALL_FILES if Path(file).name.startswith("sequential")],
-    message:
-        "All sequences of experiments"
-
-
-rule all_posteriors:
-    input:
-        [file for file in ALL_FILES if Path(file).name.startswith("posterior")],
-    message:
-        "All posteriors"
-
-
-rule all_tables:
-    input:
-        [file for file in ALL_FILES if file.startswith("results/tables/")],
-    message:
-        "All tables"
+    rule:
+        name:
+            f"all_{group}"
+        input:
+            [file for file in ALL_FILES if Path(file).match(pattern)],
+        message:
+            f"All {group}"

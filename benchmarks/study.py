@@ -18,7 +18,7 @@ from benchmarks.setup import CONFIG
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.running.resolved import write_study
-from biogrip.running.rules import Rule, files_of, make_rules
+from biogrip.running.rules import ProductRule, files_of, make_rules
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
 
@@ -45,7 +45,7 @@ class Job:
         Of what.
     """
 
-    sheet: Rule
+    sheet: ProductRule
     wildcards: Wildcards
 
     @property

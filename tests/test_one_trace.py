@@ -325,7 +325,7 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(
 def test_what_is_no_regular_file_is_neither_read_nor_replaced(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    capfd: pytest.CaptureFixture[str],
     command: str,
 ) -> None:
     """At once: of a pipe that nobody writes to, reading waits without end."""
@@ -336,7 +336,7 @@ def test_what_is_no_regular_file_is_neither_read_nor_replaced(
     Path("table.csv").write_text("file,cell,group\na.csv,a,b\n")
     before = sorted(tmp_path.iterdir())
     assert main(command.split()) == 1
-    error = capsys.readouterr().err
+    error = capfd.readouterr().err
     assert "no regular file; allowed is one." in error
     assert error.count("\n") == 1
     assert sorted(tmp_path.iterdir()) == before

@@ -14,7 +14,7 @@ from biogrip.cli import main
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.running.resolved import write_study
-from biogrip.running.rules import Rule, make_rules
+from biogrip.running.rules import ProductRule, make_rules
 from biogrip.study.study import Study
 
 
@@ -34,7 +34,7 @@ def make_in_process(folder: Path, study: Study, wanted: Iterable[str] | None = N
         results = Path("results")
         write_study(study, results)
         plan = Plan(study, results)
-        alone = [Rule(p.name, (p,), plan, tuple(p.jobs(plan))) for p in products().values()]
+        alone = [ProductRule(p.name, (p,), plan, tuple(p.jobs(plan))) for p in products().values()]
         rules = make_rules(products().values(), plan) if wanted is None else alone
         makers = _makers(rules)
         for file in makers if wanted is None else wanted:
@@ -53,7 +53,7 @@ def inputs_and_outputs(study: Study) -> tuple[set[str], set[str]]:
     return read, set(makers)
 
 
-def _makers(rules: Iterable[Rule]) -> dict[str, tuple[Rule, Wildcards]]:
+def _makers(rules: Iterable[ProductRule]) -> dict[str, tuple[ProductRule, Wildcards]]:
     """Sheet and job that make each file."""
     return {
         pattern.format(**job): (rule, job)
@@ -63,7 +63,7 @@ def _makers(rules: Iterable[Rule]) -> dict[str, tuple[Rule, Wildcards]]:
     }
 
 
-def _make(file: str, makers: dict[str, tuple[Rule, Wildcards]]) -> None:
+def _make(file: str, makers: dict[str, tuple[ProductRule, Wildcards]]) -> None:
     if Path(file).exists():
         return
     rule, job = makers[file]

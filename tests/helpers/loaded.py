@@ -31,10 +31,14 @@ from tests.helpers.pictures import in_coarse_dots
 _SECONDS = 600
 # Set in the environment of calls of which no picture is looked at.
 COARSE = "COARSE_PICTURES"
-PROGRAMS = {"biogrip": "biogrip.__main__", "snakemake": "snakemake.cli"}
+PROGRAMS = {
+    "biogrip": "biogrip.__main__",
+    "snakemake": "snakemake.cli",
+    "run": "biogrip.running.snakemake_process",
+}
 # Python as `biogrip` knows it, which starts Snakemake by it.
 PYTHON = """#!/bin/sh
-case "$2" in biogrip.running.snakemake_process) shift 2; exec {client} snakemake "$@" ;; esac
+case "$2" in biogrip.running.snakemake_process) shift 2; exec {client} run "$@" ;; esac
 exec {python} "$@"
 """
 

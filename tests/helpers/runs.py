@@ -140,6 +140,12 @@ def called(folder: Path, *arguments: str | Path) -> Run:
     return _loaded("biogrip", [*map(str, arguments)], folder, os.environ)
 
 
+def run(folder: Path, *arguments: str, config: str = SMALL) -> Run:
+    """Run a study by `biogrip run` in a folder of its own, over a config laid on the default."""
+    (folder / "overlay.yaml").write_text(config)
+    return called(folder, "run", "overlay.yaml", "-j2", *arguments)
+
+
 def biogrip(folder: Path, *arguments: str | Path) -> "subprocess.CompletedProcess[str]":
     """Run a command of the command line in a folder, and wait for it."""
     command = [sys.executable, "-m", "biogrip", *map(str, arguments)]

@@ -22,7 +22,7 @@ from biogrip.products.digest import digest
 from biogrip.products.product import Product
 from biogrip.products.report import page
 from biogrip.products.uses import Used, using
-from biogrip.running.rules import Rule, files_of, make_rules
+from biogrip.running.rules import ProductRule, files_of, make_rules
 from biogrip.study.source import overlaid, read_config
 from tests.helpers.default import STUDY, plan_of
 from tests.helpers.places import ROOT
@@ -52,7 +52,7 @@ ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 
 @pytest.fixture
-def everything(monkeypatch: pytest.MonkeyPatch) -> list[Rule]:
+def everything(monkeypatch: pytest.MonkeyPatch) -> list[ProductRule]:
     """Sheets of the default study, its sweeps, and a case of every kind."""
     monkeypatch.chdir(ROOT)
     return make_rules(products().values(), plan_of(ROBUSTNESS + EVERYTHING))
@@ -79,7 +79,7 @@ def test_every_product_is_found_by_its_name_alone() -> None:
         chosen(["fit", "fti"])
 
 
-def test_every_file_is_written_by_one_product_only(everything: list[Rule]) -> None:
+def test_every_file_is_written_by_one_product_only(everything: list[ProductRule]) -> None:
     patterns = Counter(p for product in products().values() for p in product.writes.values())
     assert [pattern for pattern, count in patterns.items() if count > 1] == []
     files = Counter(files_of(everything))
@@ -97,7 +97,7 @@ def test_every_file_is_written_by_one_product_only(everything: list[Rule]) -> No
             assert fits <= own, pattern
 
 
-def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[Rule]) -> None:
+def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[ProductRule]) -> None:
     written = set(files_of(everything))
     for rule in everything:
         for product in rule.products:
@@ -106,7 +106,7 @@ def test_what_is_read_is_written_by_another_or_the_user_s(everything: list[Rule]
                     assert set(read) - written <= {"data/example_trace.csv"}, (product.name, job)
 
 
-def test_the_sheets_make_every_job_of_every_product_once(everything: list[Rule]) -> None:
+def test_the_sheets_make_every_job_of_every_product_once(everything: list[ProductRule]) -> None:
     """One command makes them, for one of the sheet's jobs."""
     for product in products().values():
         rules = [rule for rule in everything if product in rule.products]
@@ -123,7 +123,7 @@ def test_a_table_or_figure_is_named_as_its_file() -> None:
             assert product.name in (stem, f"{stem}_of_case", f"{stem}_figure")
 
 
-def test_the_page_names_the_rule_that_makes_each_file(everything: list[Rule]) -> None:
+def test_the_page_names_the_rule_that_makes_each_file(everything: list[ProductRule]) -> None:
     """Cases have not all the same figures, so there are several rules of a sheet."""
     rules = {
         pattern.format(**job): rule.name
@@ -151,7 +151,7 @@ def test_every_overlay_is_planned(
     assert len(set(told_apart)) > 10
 
 
-def test_no_command_nor_parameter_is_long(everything: list[Rule]) -> None:
+def test_no_command_nor_parameter_is_long(everything: list[ProductRule]) -> None:
     """However many cases, seeds and points there are."""
     for rule in everything:
         for job in rule.jobs:
@@ -194,7 +194,7 @@ def changed(value: Any) -> Iterator[Any]:
         raise AssertionError(f"{value!r}")
 
 
-def test_a_digest_changes_with_every_setting(everything: list[Rule]) -> None:
+def test_a_digest_changes_with_every_setting(everything: list[ProductRule]) -> None:
     """Of one job of each product: with each field, item and key."""
     for rule in everything:
         for product in rule.products:

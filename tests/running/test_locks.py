@@ -1,12 +1,15 @@
 import json
-import socket
+import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
-import psutil
+import pytest
 
-from biogrip.running.locks import release_dead_locks, sign_locks
+from biogrip.running.locks import is_locked, is_locked_by_dead, sign_locks
+
+HERE = os.uname().nodename
 
 
 def locked_by(folder: Path, **run: object) -> Path:
@@ -18,54 +21,46 @@ def locked_by(folder: Path, **run: object) -> Path:
     return lock
 
 
-def test_the_lock_of_a_dead_run_is_taken_away(tmp_path: Path) -> None:
+def test_the_lock_of_a_dead_run_is_known(tmp_path: Path) -> None:
     child = subprocess.Popen([sys.executable, "-c", ""])
-    started = psutil.Process(child.pid).create_time()
+    begun_ns = time.time_ns()
     child.wait()
-    lock = locked_by(tmp_path, host=socket.gethostname(), pid=child.pid, started=started)
-    release_dead_locks(tmp_path)
-    assert not lock.exists()
-
-
-def test_the_lock_of_a_living_run_stays(tmp_path: Path) -> None:
-    me = psutil.Process()
-    lock = locked_by(tmp_path, host=socket.gethostname(), pid=me.pid, started=me.create_time())
-    release_dead_locks(tmp_path)
+    lock = locked_by(tmp_path, host=HERE, pid=child.pid, begun_ns=begun_ns)
+    assert is_locked_by_dead(tmp_path)
+    # Whose it is to remove is Snakemake.
     assert lock.exists()
+    lock.unlink()
+    assert not is_locked(tmp_path)
+    assert not is_locked_by_dead(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        {"host": HERE, "pid": os.getpid(), "begun_ns": time.time_ns()},
+        {"host": "elsewhere", "pid": 1, "begun_ns": 0},
+        {},
+        # Another run has locked the folder, but has not signed yet.
+        {"host": HERE, "pid": 2**22 + 1, "begun_ns": 0, "locks": {}},
+    ],
+    ids=["living", "another computer's", "of unknown origin", "made after the dead run"],
+)
+def test_another_lock_is_not_taken_for_it(tmp_path: Path, run: dict[str, object]) -> None:
+    locked_by(tmp_path, **run)
+    assert is_locked(tmp_path)
+    assert not is_locked_by_dead(tmp_path)
 
 
 def test_a_reused_process_number_is_not_taken_for_the_run(tmp_path: Path) -> None:
-    me = psutil.Process()
-    lock = locked_by(tmp_path, host=socket.gethostname(), pid=me.pid, started=me.create_time() - 99)
-    release_dead_locks(tmp_path)
-    assert not lock.exists()
-
-
-def test_the_lock_of_another_machine_stays(tmp_path: Path) -> None:
-    lock = locked_by(tmp_path, host="elsewhere", pid=1, started=0.0)
-    release_dead_locks(tmp_path)
-    assert lock.exists()
-
-
-def test_a_lock_of_unknown_origin_stays(tmp_path: Path) -> None:
-    lock = locked_by(tmp_path)
-    release_dead_locks(tmp_path)
-    assert lock.exists()
-
-
-def test_a_lock_made_after_the_dead_run_stays(tmp_path: Path) -> None:
-    """Another run has locked the folder, but has not signed yet."""
-    lock = locked_by(tmp_path, host=socket.gethostname(), pid=2**22 + 1, started=0.0, locks={})
-    release_dead_locks(tmp_path)
-    assert lock.exists()
+    begun_ns = time.time_ns() - 10**14
+    locked_by(tmp_path, host=HERE, pid=os.getpid(), begun_ns=begun_ns)
+    assert is_locked_by_dead(tmp_path)
 
 
 def test_a_run_signs_its_own_locks(tmp_path: Path) -> None:
-    lock = locked_by(tmp_path)
+    locked_by(tmp_path)
     sign_locks(tmp_path)
-    release_dead_locks(tmp_path)
-    assert lock.exists()
+    assert not is_locked_by_dead(tmp_path)
     run = json.loads((tmp_path / "run.json").read_text())
-    (tmp_path / "run.json").write_text(json.dumps({**run, "started": run["started"] - 99}))
-    release_dead_locks(tmp_path)
-    assert not lock.exists()
+    (tmp_path / "run.json").write_text(json.dumps({**run, "pid": 2**22 + 1}))
+    assert is_locked_by_dead(tmp_path)

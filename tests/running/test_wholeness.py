@@ -54,7 +54,7 @@ def test_a_look_changes_nothing(results: Path, capsys: pytest.CaptureFixture[str
     (results / "tables" / "a.csv").write_text("edited")
     check(results, changing=False)
     assert names(results) == {"a.csv", "b.csv"}
-    assert "a run makes it again" in capsys.readouterr().err
+    assert "`biogrip run` makes it again" in capsys.readouterr().err
 
 
 def test_what_the_study_no_longer_makes_is_left_alone(results: Path) -> None:
@@ -102,6 +102,27 @@ def test_no_link_is_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pl
         with pytest.raises(BiogripError, match="results: is a link"):
             check(Path("results"))
     assert not list((tmp_path / "thesis").iterdir())
+
+
+def test_an_edited_output_is_kept_beside_unless_it_is_only_touched(results: Path) -> None:
+    edited = results / "tables" / "a.csv"
+    edited.write_text("edited")
+    Claim(results).begin([edited], [], touching=True)
+    assert names(results) == {"a.csv", "b.csv"}
+    Claim(results).begin([edited], [])
+    assert names(results) == {"a.csv.edited", "b.csv"}
+
+
+def test_what_is_not_as_it_was_written_is_not_read(results: Path) -> None:
+    first, second = results / "tables" / "a.csv", results / "tables" / "b.csv"
+    Claim(results).begin([], [], [first, second, Path("mine.csv")])
+    with pytest.raises(BiogripError, match=r"b\.csv: was made for other settings, by other code"):
+        Claim(results).begin([], [], [first, second], lambda _: ["tables/b.csv"])
+    first.write_text("edited")
+    with pytest.raises(BiogripError, match=r"a\.csv: is not what was written, and would be read"):
+        Claim(results).begin([], [], [first, second])
+    # A job makes it again before another reads it.
+    Claim(results).begin([first], [], [first, second])
 
 
 def test_logs_are_claimed_once_and_for_all(results: Path) -> None:

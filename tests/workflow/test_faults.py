@@ -18,6 +18,7 @@ from biogrip.study.source import overlaid, read_config
 from tests.helpers import loaded
 from tests.helpers.places import CONFIG, ROOT
 from tests.helpers.runs import TINY, biogrip, results_of, snakemake
+from tests.helpers.runs import run as biogrip_run
 
 BAD = {
     "misspelt key": ("seedz: 3", "overlay.yaml, line 1: seedz: unknown key. Did you mean 'seeds'?"),
@@ -87,7 +88,7 @@ def test_a_damaged_target_is_named_and_made_again(tiny: Path, tiny_copy: Path) -
     assert done.returncode == 1
     assert "liquid_drop_2.csv, line 1: found the columns time, angle" in done.stderr
     assert "Traceback" not in done.stderr
-    run = snakemake(tiny_copy, str(batch.relative_to(tiny_copy)), config=TINY)
+    run = biogrip_run(tiny_copy, str(batch.relative_to(tiny_copy)), config=TINY)
     assert run.status == 0, run.output
     kept = "results/targets/liquid_drop_2.csv.edited"
     assert f"kept as {kept}; making it again" in run.output
@@ -127,7 +128,11 @@ def test_a_killed_run_continues_with_the_same_command(tiny: Path, tmp_path: Path
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     assert list((tmp_path / ".snakemake" / "locks").iterdir())
-    run = snakemake(tmp_path, ERRORS, config=TINY)
+    # Snakemake alone cannot know that nobody else holds the lock.
+    alone = snakemake(tmp_path, ERRORS, config=TINY)
+    assert alone.status == 1
+    assert "--unlock" in alone.output
+    run = biogrip_run(tmp_path, ERRORS, config=TINY)
     assert run.status == 0, run.output
     # Of four, one was there, but may not have been written down.
     assert 0 < run.jobs("identification") <= 4
@@ -183,12 +188,12 @@ def test_a_full_disk_is_named_and_the_run_continues(tiny: Path, tmp_path: Path) 
         page.unlink()
         filler = disk / "filler"
         filler.write_bytes(bytes(shutil.disk_usage(disk).free - half))
-        filling = snakemake(study, config=TINY)
+        filling = biogrip_run(study, config=TINY)
         with filler.open("ab") as stream:
             stream.write(bytes(shutil.disk_usage(disk).free))
-        full = snakemake(study, config=TINY)
+        full = biogrip_run(study, config=TINY)
         filler.unlink()
-        run = snakemake(study, config=TINY)
+        run = biogrip_run(study, config=TINY)
         results = results_of(study)
     finally:
         subprocess.run(["umount", str(disk)], check=True)

@@ -12,6 +12,7 @@ from biogrip.files import write_text
 from biogrip.running.journal import recorded_in
 from biogrip.running.manifest import Manifest
 from tests.helpers.runs import RECORDED, TINY, results_of, snakemake
+from tests.helpers.runs import run as biogrip_run
 
 SEEDED = f"study_seed: 2\n{TINY}"
 
@@ -25,7 +26,7 @@ def copied(tiny: Path, tmp_path: Path) -> Path:
 
 
 def test_results_may_be_copied(copied: Path, tiny: Path) -> None:
-    run = snakemake(copied, config=TINY)
+    run = biogrip_run(copied, config=TINY)
     assert "Nothing to be done" in run.output
     assert results_of(copied) == results_of(tiny)
 
@@ -36,9 +37,23 @@ def test_results_of_other_settings_are_made_again(tiny: Path, tmp_path: Path) ->
     with_notes, without = tmp_path / "with_notes", tmp_path / "without"
     shutil.copytree(tiny, with_notes)
     shutil.copytree(tiny, without, ignore=shutil.ignore_patterns(".snakemake"))
-    known, unknown = (snakemake(folder, "-n", config=config) for folder in (with_notes, without))
+    known, unknown = (biogrip_run(folder, "-n", config=config) for folder in (with_notes, without))
     assert known.all_jobs()["target"] == 1
     assert unknown.all_jobs() == known.all_jobs()
+
+
+def test_snakemake_alone_makes_nothing_of_outdated_results(tiny: Path, tmp_path: Path) -> None:
+    """Without its notes it does not know that they are, but its jobs are not begun."""
+    copied = tmp_path / "copied"
+    shutil.copytree(tiny, copied, ignore=shutil.ignore_patterns(".snakemake"))
+    (copied / "results" / "tables" / "errors.csv").unlink()
+    before = results_of(copied)
+    config = f"{TINY}  liquid_drop_2: {{sample: {{k: 21.0}}}}\n"
+    run = snakemake(copied, "results/tables/errors.csv", config=config)
+    assert run.status == 1
+    assert "biogrip: made for other settings, by other code or of other files: " in run.output
+    assert "results/tables/errors_liquid_drop_2.csv: was made for other settings" in run.output
+    assert results_of(copied) == before
 
 
 def test_a_target_alone_is_made_again(tiny: Path, tmp_path: Path) -> None:
@@ -48,22 +63,22 @@ def test_a_target_alone_is_made_again(tiny: Path, tmp_path: Path) -> None:
     shutil.copytree(tiny, folder, ignore=shutil.ignore_patterns(".snakemake"))
     target = "results/targets/liquid_drop_2.csv"
     before = (folder / target).read_bytes()
-    run = snakemake(folder, target, config=config)
+    run = biogrip_run(folder, target, config=config)
     assert run.all_jobs() == {"target": 1}
     assert (folder / target).read_bytes() != before
-    assert "Nothing to be done" in snakemake(folder, target, config=config).output
+    assert "Nothing to be done" in biogrip_run(folder, target, config=config).output
 
 
 def test_another_trace_is_identified_again(recorded: Path, tmp_path: Path) -> None:
     """Of the same name, and older than the results."""
     folder = tmp_path / "copied"
     shutil.copytree(recorded, folder, ignore=shutil.ignore_patterns(".snakemake"))
-    assert "Nothing to be done" in snakemake(folder, "-n", config=RECORDED).output
+    assert "Nothing to be done" in biogrip_run(folder, "-n", config=RECORDED).output
     trace = folder / "mine.csv"
     lines = trace.read_text().splitlines()
     trace.write_text("\n".join(lines[:-1]) + "\n")
     os.utime(trace, ns=(0, 0))
-    assert snakemake(folder, "-n", config=RECORDED).all_jobs()["recording"] == 1
+    assert biogrip_run(folder, "-n", config=RECORDED).all_jobs()["recording"] == 1
 
 
 @pytest.mark.parametrize("command", ["verify", "crate", "publish results published"])
@@ -84,10 +99,10 @@ def test_tables_of_another_study_are_refused(
 
 
 def test_results_of_other_studies_are_told(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = snakemake(copied, "-n", config=TINY)
+    run = biogrip_run(copied, "-n", config=TINY)
     assert "other studies" not in run.output
     other = "  liquid_drop_2: null\n  mine: {sample: {model: liquid_drop, k: 2, k_p: 0.1, c: 40}}\n"
-    run = snakemake(copied, config=f"{TINY}{other}")
+    run = biogrip_run(copied, config=f"{TINY}{other}")
     assert run.status == 0, run.output
     assert "results also holds results of other studies (" in run.output
     assert "--directory" in run.output
@@ -143,7 +158,7 @@ def test_what_is_made_of_outdated_results_is_outdated(
     copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Its own settings may be the same: a table of errors knows of no noise."""
-    run = snakemake(copied, "results/measurements/liquid_drop_2/seeds_0-0.parquet", config=SEEDED)
+    run = biogrip_run(copied, "results/measurements/liquid_drop_2/seeds_0-0.parquet", config=SEEDED)
     assert run.status == 0, run.output
     monkeypatch.chdir(copied)
     for only in ("errors*", "verdicts*"):

@@ -13,7 +13,6 @@ from pathlib import Path
 import psutil
 import pytest
 
-from biogrip.cli import main
 from tests.helpers.places import EXAMPLE
 from tests.helpers.runs import TINY, called, started
 
@@ -44,21 +43,17 @@ def interruptible() -> Iterator[None]:
 
 @pytest.mark.parametrize("kind", BAD)
 def test_a_config_that_cannot_be_used_is_named_before_anything_starts(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    kind: str,
+    tmp_path: Path, kind: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     content, message = BAD[kind]
     if isinstance(content, str):
         (tmp_path / "my.yaml").write_text(content.replace("{folder}", str(tmp_path)))
     elif content is not None:
         (tmp_path / "my.yaml").write_bytes(content)
-    assert main(["run", "my.yaml", "-n"]) == 1
-    said = "".join(capfd.readouterr())
-    assert re.search(message, said)
-    assert len(said.splitlines()) <= 2
+    run = called(tmp_path, "run", "my.yaml", "-n")
+    assert run.status == 1
+    assert re.search(message, run.output)
+    assert len(run.output.splitlines()) <= 2
     assert {path.name for path in tmp_path.iterdir()} <= {"my.yaml"}
 
 
@@ -68,21 +63,18 @@ def test_a_config_that_cannot_be_used_is_named_before_anything_starts(
         (["-n", "--configfile", "missing.yaml"], "missing.yaml: cannot be read: No such file"),
         (["--configfile", "my.yaml", "-n"], "my.yaml, line 2: seedz: unknown key"),
         (["my.yaml", "-n", "--configfile"], "--configfile: needs a file"),
+        (["-n", "--config", "seedz=3"], "seedz: unknown key"),
     ],
 )
 def test_config_files_may_be_given_as_to_snakemake(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-    given: list[str],
-    message: str,
+    tmp_path: Path, given: list[str], message: str
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "my.yaml").write_text("seeds: 2\nseedz: 3\n")
-    assert main(["run", *given]) == 1
-    said = "".join(capfd.readouterr())
-    assert message in said
-    assert "Traceback" not in said
+    run = called(tmp_path, "run", *given)
+    assert run.status == 1
+    assert message in run.output
+    assert "Traceback" not in run.output
+    assert "Building DAG" not in run.output
 
 
 def test_a_run_ends_by_naming_what_to_open(tiny: Path, tiny_copy: Path) -> None:

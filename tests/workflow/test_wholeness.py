@@ -7,8 +7,9 @@ import pytest
 
 from biogrip.running.resolved import read_study, write_study
 from biogrip.running.wholeness import check_results
+from tests.helpers import runs
 from tests.helpers.in_process import inputs_and_outputs
-from tests.helpers.runs import TINY, results_of, snakemake, waited_for
+from tests.helpers.runs import TINY, Run, results_of, snakemake, waited_for
 
 
 def one_of_each_kind(folder: Path) -> list[Path]:
@@ -94,7 +95,7 @@ def test_every_kind_of_file_is_made_again(tiny: Path, tiny_copy: Path) -> None:
     for turn, damage in enumerate(DAMAGES):
         contents |= damaged_by(damage, files[turn :: len(DAMAGES)])
     assert len(contents) > len(files) / 2
-    run = snakemake(tiny_copy, config=TINY)
+    run = runs.run(tiny_copy, config=TINY)
     assert run.status == 0, run.output
     found = results_of(tiny_copy)
     for file, content in contents.items():
@@ -151,11 +152,14 @@ def test_a_run_leaves_files_of_the_users_alone(
     assert results_of(tiny).items() <= results_of(tiny_copy).items()
 
 
-def test_a_file_in_the_way_stops_the_run_before_it_starts(tmp_path: Path) -> None:
+@pytest.mark.parametrize("door", [snakemake, runs.run], ids=["snakemake", "biogrip"])
+def test_a_file_in_the_way_stops_the_run_before_it_starts(
+    tmp_path: Path, door: Callable[..., Run]
+) -> None:
     mine = tmp_path / "results" / "figures" / "torque.png"
     mine.parent.mkdir(parents=True)
     mine.write_text("drawn by hand")
-    run = snakemake(tmp_path, config=TINY)
+    run = door(tmp_path, config=TINY)
     assert run.status == 1
     assert "results/figures/torque.png: in the way, and not written by this study" in run.output
     assert "Traceback" not in run.output
@@ -173,4 +177,27 @@ def test_looking_changes_nothing(tiny_copy: Path) -> None:
         assert run.status == 0, run.output
         assert results_of(tiny_copy) == before
         outputs[look] = run.output
-    assert "a run makes it again" in outputs["-n"]
+    assert "`biogrip run` makes it again" in outputs["-n"]
+
+
+def test_snakemake_alone_keeps_an_edited_file_that_it_makes_again(
+    tiny: Path, tiny_copy: Path
+) -> None:
+    errors = tiny_copy / "results" / "tables" / "errors.csv"
+    errors.write_text("edited")
+    run = snakemake(tiny_copy, "--forcerun", "results/tables/errors.csv", config=TINY)
+    assert run.status == 0, run.output
+    assert (errors.parent / "errors.csv.edited").read_text() == "edited"
+    assert errors.read_bytes() == (tiny / "results" / "tables" / "errors.csv").read_bytes()
+
+
+def test_snakemake_alone_makes_nothing_of_an_edited_file(tiny_copy: Path) -> None:
+    """It takes what is newer for what is right."""
+    edited = tiny_copy / "results" / "tables" / "errors_liquid_drop_2.csv"
+    edited.write_text("edited")
+    before = results_of(tiny_copy)
+    run = snakemake(tiny_copy, config=TINY)
+    assert run.status == 1
+    assert "errors_liquid_drop_2.csv: is not what was written (edited" in run.output
+    assert "errors_liquid_drop_2.csv: is not what was written, and would be read" in run.output
+    assert results_of(tiny_copy) == before

@@ -6,18 +6,17 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
-from biogrip.errors import BiogripError
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
+from biogrip.running import preparation
 from biogrip.running.locks import sign_locks
 from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
-from biogrip.running.rules import files_of, make_rules
-from biogrip.running.wholeness import Claim, hold_against_record
+from biogrip.running.rules import GROUPS, ProductRule, files_of, make_rules
+from biogrip.running.wholeness import Claim, message_only, say_what_else_is_there
 from biogrip.study.load import load_study
 from biogrip.study.source import read_places
-from biogrip.terminal import visible_lines
 
 DEFAULT_CONFIG = Path(workflow.basedir) / "config" / "config.yaml"
 
@@ -26,17 +25,14 @@ COMMANDS = shlex.quote(str(Path(sys.executable).parent))
 # A shell that is stopped ends after its command, not before.
 shell.prefix(f"trap : TERM; set -euo pipefail; PATH={COMMANDS}:$PATH; ")
 
-# Leaving with the message alone keeps Snakemake's stack out of it.
-try:
+with message_only():
     read_places([DEFAULT_CONFIG])
-except BiogripError as error:
-    sys.exit(f"biogrip: {visible_lines(error)}")
 
 
 configfile: DEFAULT_CONFIG
 
 
-try:
+with message_only():
     STUDY = load_study(
         config,
         files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
@@ -44,50 +40,87 @@ try:
     )
     if workflow.exec_mode == ExecMode.DEFAULT:
         check_traces(STUDY)
-except BiogripError as error:
-    sys.exit(f"biogrip: {visible_lines(error)}")
 
 RESULTS = Path("results")
+PLAN = Plan(STUDY, RESULTS)
+RULES = make_rules(products().values(), PLAN)
+ALL_FILES = files_of(RULES)
+# The report's captions are looked up by rule: among the parameters, they would make things again.
+config["captions"] = {rule.name: rule.caption for rule in RULES}
+# The rules in stages.smk, which stand there one by one.
+STAGES = (
+    "target",
+    "measurement",
+    "identification",
+    "identifications",
+    "judgement",
+    "errors_of_case",
+    "errors",
+)
 
-if workflow.exec_mode == ExecMode.DEFAULT:
-    hold_against_record(
-        workflow,
-        RESULTS,
-        requested=lambda: ALL_FILES,
-        made_otherwise=lambda manifest: Provenance(RESULTS, manifest).made_otherwise(
-            SHEETS
-        ),
-        begin=lambda: write_study(STUDY, RESULTS),
-    )
+
+def cases_of(stage):
+    """The cases that have a stage, as a regular expression; one that nothing matches if none has."""
+    jobs = products()[stage].jobs(PLAN)
+    return "|".join(sorted({job["case"] for job in jobs})) or "(?!)"
+
+
+def made_for(stage):
+    """Digest of the settings and the code of a job: if it changes, the job is done again."""
+    return ProductRule(stage, (products()[stage],), PLAN).digest
+
+
+def batches_of(pattern):
+    """The files of all methods and batches of seeds of a case."""
+    return lambda wildcards: PLAN.batch_files(pattern, wildcards.case)
+
+
+def calibration_of(wildcards):
+    """The calibration of the gripper, for a case that uses one."""
+    case = STUDY.case(wildcards.case)
+    return [f"results/calibrations/{case.name}.yaml"] if case.is_calibrated else []
+
 
 CLAIM = Claim(RESULTS)
 
+# `biogrip run` has checked already, and put right what can be.
+if workflow.exec_mode == ExecMode.DEFAULT and not preparation.done:
+    with message_only():
+        preparation.look(RULES, RESULTS)
 
-onstart:
-    sign_locks(Path(".snakemake"))
-    try:
-        jobs = list(workflow.dag.needrun_jobs())
+
+# A Snakefile that takes this one in as a module calls `begin` and `end` in hooks of its own.
+def begin():
+    """Refuse what is not the study's before jobs replace it, and say what the study is."""
+    jobs = list(workflow.dag.needrun_jobs())
+    with message_only():
         CLAIM.begin(
             [Path(file) for job in jobs for file in job.output],
             [Path(file) for job in jobs for file in job.log],
+            [Path(file) for job in jobs for file in job.input],
+            lambda manifest: Provenance(RESULTS, manifest).made_otherwise(RULES),
+            touching=workflow.touch,
         )
-    except BiogripError as error:
-        sys.exit(f"biogrip: {visible_lines(error)}")
+        write_study(STUDY, RESULTS)
+    sign_locks(Path(".snakemake"))
+
+
+def end():
+    """Record what the jobs have written, and say what else there is."""
+    CLAIM.end()
+    say_what_else_is_there(RESULTS, ALL_FILES)
+
+
+onstart:
+    begin()
 
 
 onsuccess:
-    CLAIM.end()
+    end()
 
 
 onerror:
-    CLAIM.end()
+    end()
     print(
         "biogrip: not finished. Nothing that is done is lost: the same command goes on."
     )
-
-
-PLAN = Plan(STUDY, RESULTS)
-SHEETS = make_rules(products().values(), PLAN)
-ALL_FILES = files_of(SHEETS)
-# The report's captions are looked up by rule: among the parameters, they would make things again.
-config["captions"] = {rule.name: rule.caption for rule in SHEETS}

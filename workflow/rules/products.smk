@@ -1,16 +1,16 @@
-"""A rule for each thing that the study makes, or each rule of them, as they declare themselves."""
+"""A rule for each thing that the study makes besides its stages, as they declare themselves."""
 
 
-def reported(rule):
+def reported(own):
     """The files of a rule; the pages among them are shown in Snakemake's report."""
-    found = rule.outputs
-    for product in rule.products:
+    found = own.outputs
+    for product in own.products:
         if product.category:
             kind = next(
                 kind for kind in ("png", "html", "page") if kind in product.writes
             )
             labels = {
-                "case": "{case}" if "case" in rule.wildcards else "all",
+                "case": "{case}" if "case" in own.wildcards else "all",
                 "item": product.item,
                 "format": {"png": "figure", "html": "table", "page": "page"}[kind],
             }
@@ -23,29 +23,29 @@ def reported(rule):
     return found
 
 
-for rule in SHEETS:
+for own in (own for own in RULES if own.name not in STAGES):
 
     rule:
         name:
-            rule.name
+            own.name
         input:
-            unpack(rule.inputs),
+            unpack(own.inputs),
         output:
-            **reported(rule),
+            **reported(own),
         log:
-            rule.log,
+            own.log,
         wildcard_constraints:
-            **rule.constraints,
+            **own.constraints,
         group:
-            rule.weight.group
-        localrule: rule.weight.local
+            own.weight.group
+        localrule: own.weight.local
         resources:
-            runtime=rule.runtime,
-            mem_mb=rule.megabytes,
+            runtime=own.runtime,
+            mem_mb=own.megabytes,
         params:
-            job=rule.command,
-            made_for=rule.digest,
+            job=own.command,
+            made_for=own.digest,
         message:
-            rule.message
+            own.message
         shell:
             "biogrip make {params.job} --made-for {params.made_for} 2> {log:q}"

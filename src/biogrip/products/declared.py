@@ -44,6 +44,7 @@ def shown(
     when
         Condition for a study to have it.
     """
+    what = name.removesuffix("_of_case").removesuffix("_figure")
     whose = "{case}" if cases else "{sweep}" if sweeps else ""
     path += f"_{whose}" if whose else ""
 
@@ -60,7 +61,7 @@ def shown(
         make,
         uses,
         jobs,
-        message=f"{_DOES[category]} {name}" + (f" of {whose}" if whose else ""),
+        message=f"{_DOES[category]} {what}" + (f" of {whose}" if whose else ""),
         reads=reads or {},
         weight=weight,
         rule=rule,

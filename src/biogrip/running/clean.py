@@ -5,7 +5,7 @@ from pathlib import Path
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.running.journal import JOURNALS
-from biogrip.running.locks import is_locked, release_dead_locks
+from biogrip.running.locks import is_locked, is_locked_by_dead
 from biogrip.running.manifest import Manifest
 
 
@@ -32,8 +32,8 @@ def clean(results: Path) -> str:
     folder = results.absolute()
     manifest = Manifest(results)
     snakemake = folder.parent / ".snakemake"
-    release_dead_locks(snakemake)
-    if is_locked(snakemake) or manifest.is_written_to:
+    locked = is_locked(snakemake) and not is_locked_by_dead(snakemake)
+    if locked or manifest.is_written_to:
         raise BiogripError(
             f"{results}: a run is going on, or was killed on another computer; allowed is to clean "
             "after its end. Its locks are taken away by snakemake --unlock."

@@ -94,14 +94,19 @@ def journals_in(results: Path) -> list[Path]:
 
 def is_running(journal: Path) -> bool:
     """Return whether another process on this host may still write to the journal."""
+    host, process, begun_ns = _writer(journal)
+    return host == os.uname().nodename and process != os.getpid() and lives(process, begun_ns)
+
+
+def lives(process: int, begun_ns: int) -> bool:
+    """Return whether the process that had a number on this host at a time still has it."""
     import psutil
 
-    host, process, begun_ns = _writer(journal)
-    if host != os.uname().nodename or process == os.getpid() or process >= _PROCESSES:
-        return False
     with suppress(psutil.Error):
         # A later process may have got the same number.
-        return psutil.Process(process).create_time() <= begun_ns / 1e9 + _CLOCK_S
+        return process < _PROCESSES and (
+            psutil.Process(process).create_time() <= begun_ns / 1e9 + _CLOCK_S
+        )
     return False
 
 

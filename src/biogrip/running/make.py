@@ -10,7 +10,7 @@ from biogrip.products.product import Product
 from biogrip.running.journal import JOURNALS, digest_of_files, hash_file, recorded_in
 from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.running.resolved import NAME, read_study
-from biogrip.running.rules import Rule, inputs_of, make_rules
+from biogrip.running.rules import ProductRule, inputs_of, make_rules
 
 
 def make(
@@ -37,9 +37,9 @@ def make(
     plan = Plan(read_study(results), results)
     requested = chosen(names)
     for product in requested:
-        _check(Rule(product.name, (product,), plan), job)
+        _check(ProductRule(product.name, (product,), plan), job)
     if made_for is not None:
-        rule = Rule("", tuple(requested), plan)
+        rule = ProductRule("", tuple(requested), plan)
         if rule.digest_of_settings(job) != made_for.split("-")[0]:
             raise BiogripError(
                 f"{results / NAME}: has changed since this run was planned: another run was begun "
@@ -53,7 +53,9 @@ def make(
         _make(rule, [product], job, rule.digest(job))
 
 
-def _make(rule: Rule, requested: Iterable[Product], job: Mapping[str, str], made_for: str) -> None:
+def _make(
+    rule: ProductRule, requested: Iterable[Product], job: Mapping[str, str], made_for: str
+) -> None:
     results = rule.plan.results
     outputs = [Path(file) for product in requested for file in product.outputs(job).values()]
     refuse_links(results, [*outputs, results / JOURNALS])
@@ -67,14 +69,14 @@ def _make(rule: Rule, requested: Iterable[Product], job: Mapping[str, str], made
             product.run(rule.plan, job)
 
 
-def _planned(rules: Iterable[Rule], product: Product, job: Mapping[str, str]) -> Rule:
+def _planned(rules: Iterable[ProductRule], product: Product, job: Mapping[str, str]) -> ProductRule:
     """Return the rule that makes a product, or one of its own if none is planned."""
     found = [rule for rule in rules if product.name in {p.name for p in rule.products}]
     with_job = [rule for rule in found if job in rule.jobs or not rule.jobs]
-    return (with_job or [Rule(product.name, (product,), found[0].plan)])[0]
+    return (with_job or [ProductRule(product.name, (product,), found[0].plan)])[0]
 
 
-def _check(rule: Rule, job: Mapping[str, str]) -> None:
+def _check(rule: ProductRule, job: Mapping[str, str]) -> None:
     """Refuse a job whose wildcards are incomplete, superfluous or not of this study."""
     for name in rule.wildcards:
         if name not in job:
@@ -99,7 +101,7 @@ def _check(rule: Rule, job: Mapping[str, str]) -> None:
         _check_batch(rule, job)
 
 
-def _check_batch(rule: Rule, job: Mapping[str, str]) -> None:
+def _check_batch(rule: ProductRule, job: Mapping[str, str]) -> None:
     """Refuse a batch whose inputs do not exist; it need not be a batch of the present plan."""
     for file in (Path(file) for files in rule.inputs(dict(job)).values() for file in files):
         if file.stem == job["batch"] and not file.exists():

@@ -12,7 +12,7 @@ from biogrip.running.journal import digest_of_files, hash_file
 from biogrip.running.manifest import Manifest
 from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
-from biogrip.running.rules import Rule, inputs_of, make_rules
+from biogrip.running.rules import ProductRule, inputs_of, make_rules
 
 _RESULTS = "results"
 
@@ -33,7 +33,7 @@ class Provenance:
         self._manifest = manifest
         self._hashes: dict[str, str | None] = {}
 
-    def made_otherwise(self, rules: Iterable[Rule]) -> list[str]:
+    def made_otherwise(self, rules: Iterable[ProductRule]) -> list[str]:
         """Return results that were made with other settings, other code, or from other files.
 
         Parameters
@@ -54,7 +54,7 @@ class Provenance:
             if (self._results / name).exists()
         ]
 
-    def outdated(self, rules: Iterable[Rule]) -> set[str]:
+    def outdated(self, rules: Iterable[ProductRule]) -> set[str]:
         """Return recorded results that were made otherwise, or from any that were.
 
         Parameters
@@ -82,7 +82,7 @@ class Provenance:
             waiting += new
         return found
 
-    def _of_job(self, rule: Rule, job: Wildcards) -> list[str]:
+    def _of_job(self, rule: ProductRule, job: Wildcards) -> list[str]:
         recorded = [name for name in _outputs(rule, job) if self._manifest.knows(name)]
         if not recorded:
             return []
@@ -94,7 +94,7 @@ class Provenance:
             or (inputs is not None and last.inputs != inputs)
         ]
 
-    def _digest_of_inputs(self, rule: Rule, job: Wildcards) -> str | None:
+    def _digest_of_inputs(self, rule: ProductRule, job: Wildcards) -> str | None:
         """Return a digest of a job's recorded inputs, or None if an input is unknown."""
         hashes = [self._hash_of(file) for file in inputs_of(rule, job)]
         return None if None in hashes else digest_of_files(hash_ for hash_ in hashes if hash_)
@@ -110,9 +110,9 @@ class Provenance:
         return self._hashes[file]
 
 
-def _outputs(rule: Rule, job: Wildcards) -> list[str]:
+def _outputs(rule: ProductRule, job: Wildcards) -> list[str]:
     """Return the files of a job, relative to the results folder."""
-    return [name_of(file) for product in rule.products for file in product.outputs(job).values()]
+    return [*map(name_of, rule.files(job))]
 
 
 def is_result(file: str) -> bool:

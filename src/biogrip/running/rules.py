@@ -4,12 +4,13 @@ import re
 import shlex
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import PurePath
 
 from biogrip.products.digest import digest
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight
 from biogrip.products.rule_products import group_by_rule
-from biogrip.running.source_files import fingerprint
+from biogrip.products.source_files import fingerprint
 
 _CONSTRAINTS = {
     "case": "[A-Za-z][A-Za-z0-9_-]*",
@@ -19,9 +20,18 @@ _CONSTRAINTS = {
     "seed": r"\d+",
 }
 
+GROUPS = {
+    "tables": "results/tables/*",
+    "maps": "robustness_*",
+    "designs": "designed*",
+    "sequences": "sequential*",
+    "posteriors": "posterior*",
+}
+"""Patterns of results that a rule asks for together, see `pathlib.PurePath.match`."""
+
 
 @dataclass(frozen=True)
-class Rule:
+class ProductRule:
     """A Snakemake rule: products that one job makes.
 
     Parameters
@@ -65,9 +75,19 @@ class Rule:
             for kind, pattern in product.writes.items()
         }
 
+    def makes(self, file: str) -> bool:
+        """Return whether a job of the rule could write a file, planned or not."""
+        values = {name: f"(?:{value})" for name, value in self.constraints.items()}
+        patterns = (pattern.replace(".", r"\.") for pattern in self.outputs.values())
+        return any(re.fullmatch(pattern.format(**values), file) for pattern in patterns)
+
+    def files(self, job: Wildcards) -> list[str]:
+        """Return the output files of a job."""
+        return [pattern.format(**job) for pattern in self.outputs.values()]
+
     def inputs(self, job: Wildcards) -> dict[str, list[str]]:
         """Return the input files of a job that are not made by the rule itself."""
-        made = {file for product in self.products for file in product.outputs(job).values()}
+        made = set(self.files(job))
         needed: dict[str, list[str]] = {}
         for product in self.products:
             for name, files in product.inputs(self.plan, job).items():
@@ -135,19 +155,20 @@ class Rule:
         return "\n\n".join(f"{p.item}: {p.caption}" for p in self.products if p.caption)
 
 
-def inputs_of(rule: Rule, job: Wildcards) -> list[str]:
+def inputs_of(rule: ProductRule, job: Wildcards) -> list[str]:
     """Return all input files of a job, sorted."""
     return sorted({file for files in rule.inputs(job).values() for file in files})
 
 
-def make_rules(products: Iterable[Product], plan: Plan) -> list[Rule]:
+def make_rules(products: Iterable[Product], plan: Plan) -> list[ProductRule]:
     """Return the rules of a plan, grouping products that one job makes."""
     return [
-        Rule(each.rule, each.products, plan, each.jobs) for each in group_by_rule(products, plan)
+        ProductRule(each.rule, each.products, plan, each.jobs)
+        for each in group_by_rule(products, plan)
     ]
 
 
-def files_of(rules: Iterable[Rule]) -> list[str]:
+def files_of(rules: Iterable[ProductRule]) -> list[str]:
     """Return every output file of a study; all are targets, so that lost ones are made again."""
     return [
         file
@@ -156,3 +177,30 @@ def files_of(rules: Iterable[Rule]) -> list[str]:
         for job in rule.jobs
         for file in product.outputs(job).values()
     ]
+
+
+def needed_for(targets: Iterable[str], rules: Iterable[ProductRule]) -> set[str]:
+    """Return the planned files that a run for some targets needs, and all that these are made of.
+
+    Parameters
+    ----------
+    targets
+        Files and names of rules; for none or ``all`` a run needs all files.
+    rules
+        All rules that make files.
+    """
+    makers = {file: (rule, job) for rule in rules for job in rule.jobs for file in rule.files(job)}
+    requested = set(targets) or {"all"}
+    patterns = [pattern for name, pattern in GROUPS.items() if f"all_{name}" in requested]
+    waiting = [
+        file
+        for file, (rule, _) in makers.items()
+        if requested & {"all", file, rule.name} or any(map(PurePath(file).match, patterns))
+    ]
+    needed: set[str] = set()
+    while waiting:
+        file = waiting.pop()
+        if file not in needed and file in makers:
+            needed.add(file)
+            waiting += inputs_of(*makers[file])
+    return needed

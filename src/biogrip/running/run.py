@@ -8,7 +8,7 @@ import stat
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import chdir, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -50,14 +50,13 @@ def run(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str], signals: "_Signals") -> int:
-    from biogrip.study.defaults import default_config, snakefile
+    from biogrip.study.defaults import snakefile
 
     overlays, rest = _split(arguments)
     known = _known(rest)
     folder = Path(known.directory or ".")
     _check_folder(folder)
     configs = [Path(name).absolute() for name in overlays]
-    _check([default_config(), *configs], folder)
     # Targets after "--" must stay behind the options added here.
     cut = rest.index("--") if "--" in rest else len(rest)
     command = [sys.executable, "-m", "biogrip.running.snakemake_process"]
@@ -90,17 +89,6 @@ def _check_folder(folder: Path) -> None:
         raise BiogripError(f"--directory: {shown}: {found}, allowed is a folder.")
     # Snakemake would follow a link, and fail with a traceback on a file.
     refuse_other_than_folder(folder / ".snakemake")
-
-
-def _check(configs: list[Path], folder: Path) -> None:
-    """Check configs and recorded traces from the directory that Snakemake will run in."""
-    from biogrip.products.stages.recording import check_traces
-    from biogrip.study.load import load_study, read_configs
-
-    merged = read_configs(configs)
-    # Paths of traces are relative to it; before the first run it need not exist.
-    with chdir(folder if folder.is_dir() else "."):
-        check_traces(load_study(merged, configs))
 
 
 def _split(arguments: Sequence[str]) -> tuple[list[str], list[str]]:

@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 from types import FrameType
 
-from biogrip.running.locks import is_locked
+from biogrip.running.locks import is_locked, is_locked_by_dead
 
 _AGAIN_S = 0.05
 # Interrupt anyway after this, in case a version of Snakemake waits in another function.
@@ -30,13 +30,18 @@ def main() -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     from snakemake.cli import main as snakemake
 
+    from biogrip.running.preparation import prepared
+    from biogrip.running.wholeness import message_only
+
     sys.argv[0] = "snakemake"
+    with message_only():
+        sys.argv[1:] = prepared(sys.argv[1:])
     snakemake()
 
 
 def _stop(_: int, frame: FrameType | None) -> None:
     """Exit if no job can be running; otherwise interrupt Snakemake while it waits for jobs."""
-    if not is_locked(Path(".snakemake")):
+    if not is_locked(Path(".snakemake")) or is_locked_by_dead(Path(".snakemake")):
         os._exit(128 + signal.SIGINT)
     # Try again later: planning may not have reached the wait, or a job may have just begun.
     signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)

@@ -1,17 +1,14 @@
 """Checks before and after the jobs of a run, so that only the study's own files are touched."""
 
-import functools
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.running.journal import Journal
-from biogrip.running.locks import is_locked, release_dead_locks
 from biogrip.running.manifest import OF_NO_RULE, Manifest, set_aside
 from biogrip.running.places import refuse_files_as_folders, refuse_links
 from biogrip.terminal import visible, visible_lines
@@ -20,67 +17,8 @@ _SHOWN = 6
 _ROOM_BYTES = 256 * 1024
 
 
-def hold_against_record(
-    workflow: Any,
-    results: Path,
-    requested: Callable[[], Iterable[str]],
-    made_otherwise: Callable[[Manifest], Iterable[str]],
-    begin: Callable[[], None],
-) -> None:
-    """Wrap Snakemake's workflow, so that results are checked before jobs are planned.
-
-    Only a run changes anything; a dry run prints what a run would do.
-
-    Parameters
-    ----------
-    workflow
-        Snakemake's workflow object.
-    results
-        The results folder.
-    requested
-        Function that returns the files a run makes by default.
-    made_otherwise
-        Function that returns outdated results, relative to the results folder.
-    begin
-        Function to call at the start of a run, before its jobs are planned.
-    """
-    execute, build = workflow.execute, workflow._build_dag
-
-    def may_make(file: str) -> bool:
-        return any(rule.is_producer(file) for rule in workflow.rules)
-
-    @functools.wraps(execute)
-    def checked(*args: Any, **kwargs: Any) -> Any:
-        kind = kwargs["executor_plugin"].common_settings
-        if not kind.touch_exec:
-            with _said_and_ended():
-                if not kind.dryrun_exec:
-                    release_dead_locks(Path(".snakemake"))
-                # Beside another run nothing is changed: Snakemake says so, and ends.
-                if kind.dryrun_exec or not is_locked(Path(".snakemake")):
-                    check_results(results, requested(), may_make, changing=not kind.dryrun_exec)
-                    if not kind.dryrun_exec:
-                        begin()
-        ended = execute(*args, **kwargs)
-        if not kind.dryrun_exec:
-            _say_what_else_is_there(results, requested())
-        return ended
-
-    def forced() -> Any:
-        """Plan the jobs, forcing those whose results are outdated.
-
-        Snakemake's own record of settings is outside the results, so it may be missing.
-        """
-        with _said_and_ended():
-            stale = made_otherwise(Manifest(results))
-            workflow.dag.forcefiles.update(f"{results}/{name}" for name in stale)
-        return build()
-
-    workflow.execute, workflow._build_dag = checked, forced
-
-
 @contextmanager
-def _said_and_ended() -> Iterator[None]:
+def message_only() -> Iterator[None]:
     """Exit with an error's message only, without a traceback from Snakemake."""
     try:
         yield
@@ -88,7 +26,7 @@ def _said_and_ended() -> Iterator[None]:
         sys.exit(f"biogrip: {visible_lines(error)}")
 
 
-def _say_what_else_is_there(results: Path, requested: Iterable[str]) -> None:
+def say_what_else_is_there(results: Path, requested: Iterable[str]) -> None:
     """Print how many results belong to other studies."""
     own = [_name(results, Path(file)) for file in requested]
     others = Manifest(results).others([*own, *OF_NO_RULE])
@@ -165,28 +103,67 @@ class Claim:
         self._files: list[Path] = []
         self._logs: list[Path] = []
 
-    def begin(self, files: Iterable[Path], logs: Iterable[Path]) -> None:
+    def begin(
+        self,
+        files: Iterable[Path],
+        logs: Iterable[Path],
+        reads: Iterable[Path] = (),
+        made_otherwise: Callable[[Manifest], Iterable[str]] = lambda _: (),
+        *,
+        touching: bool = False,
+    ) -> None:
         """Check, before jobs run, that their outputs are the study's own or do not exist.
+
+        An output or a log with other contents than were written is renamed.
 
         Parameters
         ----------
         files, logs
-            Files the jobs will write. A log with foreign content is renamed.
+            Files the jobs will write.
+        reads
+            Files the jobs will read.
+        made_otherwise
+            Function that returns outdated results, relative to the results folder.
+        touching
+            True if the jobs only touch their outputs, whatever these hold.
 
         Raises
         ------
         BiogripError
-            If a file is in the way that the study did not write, or is a link.
+            If a file is in the way that the study did not write, or is a link; or if a job would
+            read a result that is outdated or was changed, and that no job makes again.
         """
         results, self._files, self._logs = self._results, list(files), list(logs)
         manifest, both = Manifest(results), [*self._files, *self._logs]
         refuse_links(results, both)
         refuse_files_as_folders(results, both)
         refuse_others(manifest, results, both)
-        for log in filter(Path.exists, self._logs):
-            if not manifest.was_written(_name(results, log)):
-                make_room(manifest, results, _name(results, log), changing=True)
+        if touching:
+            return
+        _check_writable(results, self._files)
+        self._refuse_unfit(manifest, set(reads).difference(self._files), made_otherwise)
+        names = [_name(results, file) for file in self._files if file.exists()]
+        changed = [name for name in names if not manifest.is_whole(name)]
+        names = [_name(results, log) for log in self._logs if log.exists()]
+        changed += [name for name in names if not manifest.was_written(name)]
+        for name in changed:
+            make_room(manifest, results, name, changing=True)
         Journal(results).note_begun(self._logs)
+
+    def _refuse_unfit(
+        self,
+        manifest: Manifest,
+        reads: Iterable[Path],
+        made_otherwise: Callable[[Manifest], Iterable[str]],
+    ) -> None:
+        names = {_name(self._results, file): file for file in sorted(reads) if file.exists()}
+        names = {name: file for name, file in names.items() if manifest.knows(name)}
+        outdated = set(made_otherwise(manifest)) if names else set()
+        for name, file in names.items():
+            found = "" if manifest.is_whole(name) else "is not what was written"
+            if found or name in outdated:
+                found = found or "was made for other settings, by other code or of other files"
+                raise BiogripError(f"{file}: {found}, and would be read. `biogrip run` mends that.")
 
     def end(self) -> None:
         """Record what the jobs have written, including logs."""
@@ -256,7 +233,7 @@ def make_room(manifest: Manifest, results: Path, path: str, *, changing: bool) -
     else:
         kept = set_aside(file) if changing else f"{file}.edited"
         how = f"is not what was written (edited, or damaged), kept as {kept}"
-    then = "making it again" if changing else "a run makes it again"
+    then = "making it again" if changing else "`biogrip run` makes it again"
     print(f"biogrip: {visible(file)}: {how}; {then}.", file=sys.stderr)
 
 
