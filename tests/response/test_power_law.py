@@ -31,7 +31,7 @@ from tests.helpers.power_law import (
 TAU = 1.6e-9
 TIMES = np.geomspace(SHORTEST_S, LONGEST_S, 21)
 # A trace's: soon after each step, and late.
-VISIBLE = np.array([0.1, 0.3, 2.0, 30.0, 199.9, 200.1, 201.0, 260.0, 400.0])
+NEAR = np.array([0.1, 0.3, 2.0, 30.0, 199.9, 200.1, 201.0, 260.0, 400.0])
 SAMPLES = [
     ("fractional_kelvin_voigt", [0.3, 10.0, 0.4]),
     ("fractional_kelvin_voigt", [1e-3, 0.05, 0.12]),
@@ -118,9 +118,9 @@ def test_the_paper_s_gripper_and_protocol_against_inversion(
     gripper: Gripper, steps: TorqueHistory, model: str, sample: list[float], inertia: bool
 ) -> None:
     """Of the response 1e-6, at times of a trace; arms of their own damping and inertia."""
-    exact = rotations(gripper, by_hand(model, sample), steps, VISIBLE, inertia=inertia)[0]
+    exact = rotations(gripper, by_hand(model, sample), steps, NEAR, inertia=inertia)[0]
     response = step_response(gripper, MODELS[model].network(sample), inertia=inertia)
-    np.testing.assert_allclose(rotation(response, steps, VISIBLE)[0], exact, rtol=1e-6)
+    np.testing.assert_allclose(rotation(response, steps, NEAR)[0], exact, rtol=1e-6)
 
 
 @pytest.mark.parametrize(("model", "sample"), SAMPLES)
@@ -130,12 +130,12 @@ def test_arms_driven_differently_against_inversion(
 ) -> None:
     given: Gripper = request.getfixturevalue(arms)
     torque = torque_history((hold(200.0, 1.6e-9, 1.0e-9), hold(200.0, 0.3e-9, 0.5e-9)))
-    exact = rotations(given, by_hand(model, sample), torque, VISIBLE[::2], inertia=False)
+    exact = rotations(given, by_hand(model, sample), torque, NEAR[::2], inertia=False)
     response = step_response(
         given, MODELS[model].network(sample), symmetric=False, inertia=False, both_arms=True
     )
     for arm in (LEFT, RIGHT):
-        ours = rotation(response, torque, VISIBLE[::2], arm)[0]
+        ours = rotation(response, torque, NEAR[::2], arm)[0]
         np.testing.assert_allclose(ours, exact[arm], rtol=0, atol=1e-6 * np.abs(exact).max())
 
 
@@ -244,7 +244,7 @@ def test_equal_branches_add_up(gripper: Gripper, steps: TorqueHistory) -> None:
     few = Network(np.array([0.2]), np.array([0.5]), k[None], c[None])
     for inertia in (False, True):
         ours, theirs = (
-            rotation(step_response(gripper, network, inertia=inertia), steps, VISIBLE)[0]
+            rotation(step_response(gripper, network, inertia=inertia), steps, NEAR)[0]
             for network in (many, few)
         )
         np.testing.assert_allclose(ours, theirs, rtol=1e-5)
@@ -285,13 +285,13 @@ def test_the_nonlinear_model_of_a_power_law_sample_against_radau(gripper: Grippe
         phi_rate = rest / (arm.damping_Nms_per_rad + 2 * c_p * b * b)
         return np.concatenate(([phi_rate], rates * (2 * u - dampers)))
 
-    linear = rotation(step_response(gripper, network), torque, VISIBLE[:5])[0]
+    linear = rotation(step_response(gripper, network), torque, NEAR[:5])[0]
     scale = 1e-11 * linear.max()
     atol = np.concatenate(([scale], np.full(len(k), scale * gripper.arm_length_m)))
     solved = solve_ivp(
-        slope, (0, 200), np.zeros(1 + len(k)), "Radau", VISIBLE[:5], rtol=1e-8, atol=atol
+        slope, (0, 200), np.zeros(1 + len(k)), "Radau", NEAR[:5], rtol=1e-8, atol=atol
     )
-    ours = nonlinear_rotation(gripper, network, torque, VISIBLE[:5])[0]
+    ours = nonlinear_rotation(gripper, network, torque, NEAR[:5])[0]
     assert np.max(np.abs(ours - linear)) > 1e-4 * linear.max()
     # Radau's own error, after some thousand steps of 1e-8 at most.
     np.testing.assert_allclose(ours, solved.y[0], rtol=1e-6)
