@@ -44,7 +44,7 @@ a share of the trace's RMS. A share of {_RUNS} runs is good to 8 % or better."""
 
 def by_study(p: Problem, rng: np.random.Generator, *, name: str) -> Array:
     """Identify by a method of the study."""
-    (found,) = identifier(name, p.settings.of(name))([p.case_problem()], [rng], silent)
+    (found,) = identifier(name, p.settings.method(name))([p.case_problem()], [rng], silent)
     return found.parameters
 
 

@@ -23,8 +23,8 @@ from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import Misfit, combine_misfits, make_misfit
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
+from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.load import load_study
-from biogrip.study.method_blocks import MethodBlocks
 
 CONFIG = Path(__file__).parents[1] / "config" / "config.yaml"
 CASE = "endothelial_cell"
@@ -63,7 +63,7 @@ class Problem:
     ranges: dict[str, GeneRange]
     genome: Genome
     genetic: GeneticSettings
-    settings: MethodBlocks
+    settings: CaseBlock
 
     @property
     def interval_s(self) -> float:
@@ -146,7 +146,7 @@ def problem(
         ranges,
         make_genome(model, ranges),
         genetic,
-        chosen.block.of_methods,
+        chosen.block,
     )
 
 

@@ -36,7 +36,7 @@ class Started:
 def started(problems: Sequence[Problem], condensed: Condensed | None = None) -> list[Started]:
     """Choose starting points as the study's least squares does, from the best of random ones."""
     found = []
-    settings: Any = problems[0].settings.of("least_squares")
+    settings: Any = problems[0].settings.method("least_squares")
     for seed, case_problem in enumerate(posed_together(problems, condensed)):
         rng = np.random.default_rng(seed)
         shape = (settings.candidates, len(case_problem.low))

@@ -1,64 +1,118 @@
-"""Definition of config keys, as annotations of dataclass fields.
+"""What pydantic does not have for config blocks: names from a registry, and conflicts of keys.
 
-A field of a frozen dataclass is a key if it is annotated with a `Key`, e.g.
-``fingers: Annotated[int, Key("Number of floating fingers.", low=1)]``. Checks, messages, the JSON
-Schema and the documentation follow from it (`biogrip.study`). Conflicts between keys are found by
-the optional method ``problems`` of the class.
+A block is a frozen dataclass whose fields are its keys, with pydantic's `Field` for bounds, and a
+docstring below each. Checks, messages, the JSON Schema and the documentation follow from them.
 """
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, InitErrorDetails, PydanticCustomError, ValidationError
+from pydantic_core.core_schema import literal_schema, no_info_after_validator_function
 
 Problem = tuple[tuple[Hashable, ...], str]
 """Path of a key, relative to its block, and a message: what was found and what is allowed."""
 
+CONFLICT, TWICE = "conflict", "twice"
+"""Names of our own pydantic errors: keys that do not go together, and a repeated item."""
+
+Printed = Annotated[
+    str,
+    Field(
+        max_length=60,
+        pattern=r"^[\w.,:;()/%'][\w .,:;()+/%'-]*$",
+        json_schema_extra={
+            "form": "text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not "
+            "beginning with a space, + or -"
+        },
+    ),
+]
+"""Text that is safe in tables, figures and file formats."""
+
+
+OPEN = ConfigDict(strict=True, extra="allow", frozen=True, defer_build=True)
+"""Configuration of models that collect the keys that they do not name."""
+
+
+def kind_of(value: Any) -> str | None:
+    """Return the kind of a value in words, by which pydantic chooses among alternatives."""
+    if isinstance(value, Mapping | BaseModel):
+        return "a block of keys"
+    if isinstance(value, list | tuple):
+        return "a list"
+    if isinstance(value, str):
+        return "text"
+    return "a number" if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+BY_KIND = Discriminator(kind_of)
+"""Annotation of alternatives, each with its kind as `Tag`."""
+
+
+class Checked:
+    """Base class of models that find conflicts between their keys, where the context is true."""
+
+    def problems(self) -> Iterator[Problem]:
+        """Find keys that conflict."""
+        return iter(())
+
+    @model_validator(mode="after")
+    def _refuse_conflicts(self, info: ValidationInfo) -> Self:
+        found = list(self.problems()) if info.context else []
+        if found:
+            raise ValidationError.from_exception_data(CONFLICT, [_conflict(*it) for it in found])
+        return self
+
+
+class Block(Checked):
+    """Base class of frozen dataclasses whose fields are the keys of a config block."""
+
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(strict=True, extra="forbid")
+
+
+def _conflict(path: tuple[Hashable, ...], text: str) -> InitErrorDetails:
+    error = PydanticCustomError(CONFLICT, text)
+    return InitErrorDetails(type=error, loc=path, input=None)  # type: ignore[typeddict-item]
+
 
 @dataclass(frozen=True)
-class Key:
-    """Description and constraints of a config key.
+class OneOf:
+    """Annotation of text that is one of the names in a registry, as `Literal` is of given ones."""
 
-    Parameters
-    ----------
-    text
-        Description of the key.
-    unit
-        Unit of its value.
-    low, above, high
-        Lower bound, exclusive lower bound, and upper bound.
-    choices
-        Allowed values.
-    pattern, form
-        Regular expression for the whole text, and the same in words.
-    fewest, most
-        Bounds on the items of a list, characters of a text, or keys of a block.
-    unique
-        True if all items of a list must differ.
-    needed
-        True if a config must give the key although the class has a default.
-    spread
-        True if the field collects all keys of its block that no other field names.
-    """
+    names: Iterable[str]
 
-    text: str = ""
-    unit: str = ""
-    low: float | None = None
-    above: float | None = None
-    high: float | None = None
-    choices: tuple[str, ...] = ()
-    pattern: str = ""
-    form: str = ""
-    fewest: int | None = None
-    most: int | None = None
-    unique: bool = False
-    needed: bool = False
-    spread: bool = False
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema that pydantic validates with."""
+        return literal_schema(list(self.names))
 
 
-def printed(text: str) -> Key:
-    """Return a key for text that is safe in tables, figures and file formats."""
-    return Key(
-        text,
-        pattern=r"(?![ +-])[\w .,:;()+/%'-]{1,60}",
-        form="text of 1 to 60 letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning "
-        "with a space, + or -",
-    )
+class Distinct:
+    """Annotation of a list whose items must differ."""
+
+    def __get_pydantic_core_schema__(self, kind: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """Return the schema that pydantic validates with."""
+        return no_info_after_validator_function(_without_twins, handler(kind))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the JSON Schema."""
+        return handler(schema) | {"uniqueItems": True}
+
+
+def _without_twins(items: tuple[Any, ...]) -> tuple[Any, ...]:
+    if any(item in items[:index] for index, item in enumerate(items)):
+        raise PydanticCustomError(TWICE, "something is there twice")
+    return items

@@ -49,7 +49,7 @@ def _example() -> Problem:
 def example(name: str) -> Likelihood:
     """Likelihood of the example trace in a file of some name: its random starts follow from it."""
     rng = stream(STUDY.study_seed, name, 0, "identifiability")
-    identify = identifier("least_squares", STUDY.config.of_methods.of("least_squares"))
+    identify = identifier("least_squares", STUDY.config.method("least_squares"))
     (found,) = identify([_example()], [rng], silent)
     return make_likelihood(_example(), np.log(found.parameters), found.misfit_rad, confidence=0.95)
 

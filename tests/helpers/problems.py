@@ -45,7 +45,7 @@ def problem(case: str, seed: int, level: float = 0.1, rate_Hz: float = 1.0) -> P
 
 
 def run(method: str, case_problem: Problem, seed: int = 0) -> Identification:
-    identify = identifier(method, STUDY.config.of_methods.of(method))
+    identify = identifier(method, STUDY.config.method(method))
     (answer,) = identify([case_problem], [np.random.default_rng(seed)], silent)
     return answer
 
@@ -87,7 +87,7 @@ def condensed_rows(residuals: Residuals, x: Array) -> tuple[Array, Array]:
     return rows[0] - residuals.condensed_trace, rows[1:]
 
 
-SETTINGS: Any = STUDY.config.of_methods.of("least_squares")
+SETTINGS: Any = STUDY.config.method("least_squares")
 GRIPPER, TORQUE = STUDY.gripper, study_torque()
 RANGES = STUDY.ranges
 

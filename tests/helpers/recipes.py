@@ -57,18 +57,21 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
 from biogrip.identify.problem import Problem
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 
 @dataclass(frozen=True)
-class RandomSearchSettings:
+class RandomSearchSettings(Block):
     """Random search, in the logarithms of the parameters."""
 
-    draws: Annotated[int, Key("Points drawn in a round.", low=1, high=1_000_000)] = 1000
-    rounds: Annotated[int, Key("Rounds.", low=1, high=1000)] = 5
+    draws: Annotated[int, Field(ge=1, le=1_000_000)] = 1000
+    """Points drawn in a round."""
+    rounds: Annotated[int, Field(ge=1, le=1000)] = 5
+    """Rounds."""
 
 
 def identify_many(
@@ -221,10 +224,9 @@ KEY = Recipe(
     "a config key",
     edits={
         "experiment/noise.py": {
-            "    def problems(self)": """    resolution_rad: Annotated[
-        float | None,
-        Key("Smallest step that is recorded. By default any.", "rad", low=1e-12, high=1),
-    ] = None
+            "    def problems(self)": """\
+    resolution_rad: Annotated[float | None, Field(ge=1e-12, le=1)] = None
+    \"\"\"Smallest step that is recorded. By default any.\"\"\"
 
     def problems(self)""",
             "    return noisy\n": """    if noise.resolution_rad is not None:

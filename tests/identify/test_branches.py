@@ -35,7 +35,7 @@ def problems(
 
 def identified(method: str, case_problem: list[Problem]) -> list[Identification]:
     rngs = [np.random.default_rng([seed, 3]) for seed in range(len(case_problem))]
-    settings = STUDY.config.of_methods.of(method)
+    settings = STUDY.config.method(method)
     return identifier(method, settings)(case_problem, rngs, silent)
 
 

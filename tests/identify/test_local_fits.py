@@ -178,7 +178,7 @@ def test_an_answer_tells_how_it_was_found(case: str) -> None:
 
 def test_the_genetic_algorithm_is_polished_alike() -> None:
     problems = of_case("liquid_drop_2", 2)
-    settings: Any = STUDY.config.of_methods.of("genetic_refined")
+    settings: Any = STUDY.config.method("genetic_refined")
     rngs = [np.random.default_rng(seed) for seed in range(2)]
     for seed, answer in enumerate(genetic_refined.identify_many(problems, settings, rngs)):
         own = [np.random.default_rng(seed)]

@@ -39,7 +39,7 @@ SURE = [name for name, method in METHODS.items() if method.sure]
 def test_an_answer_is_what_it_says(method: str) -> None:
     case_problem = problem("liquid_drop_2", 0)
     told: list[tuple[int, float]] = []
-    identify = identifier(method, STUDY.config.of_methods.of(method))
+    identify = identifier(method, STUDY.config.method(method))
     rng = np.random.default_rng(0)
     (answer,) = identify([case_problem], [rng], lambda n, misfit: told.append((n, misfit)))
     history = answer.history

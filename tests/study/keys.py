@@ -1,16 +1,16 @@
-"""The keys that a config may have, as the classes define them."""
+"""The keys that a config may have, as its schema says."""
 
-from biogrip.study.typed import Shape, keys
+from biogrip.study.reference import documented
+from biogrip.study.schema import Schema
+
+STUDY = Schema(documented(), documented()["$defs"])
 
 
-def leaves(block: type, path: str = "") -> dict[str, Shape]:
+def leaves(block: Schema, path: str = "") -> dict[str, Schema]:
     """Every key of a block and below, with what its value may look like."""
-    found: dict[str, Shape] = {}
-    for name, entry in keys(block).items():
-        shape = entry.shape
-        parts = (shape, shape.items, shape.values, *shape.options)
-        inner = next((part.block for part in parts if part and part.block), None)
-        found[f"{path}{name}"] = shape
-        if inner:
-            found |= leaves(inner, f"{path}{name}.")
+    found: dict[str, Schema] = {}
+    for name, schema in block.keys.items():
+        found[f"{path}{name}"] = schema
+        for part in (schema, schema.inside(0), schema.values, *schema.inside(0).options):
+            found |= leaves(part, f"{path}{name}.")
     return found

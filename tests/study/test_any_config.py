@@ -13,13 +13,14 @@ from biogrip.experiment.sample import MODELS
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.rules import make_rules
-from biogrip.study.case_blocks import Shared
+from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.load import load_study
+from biogrip.study.plain import built, plain
+from biogrip.study.schema import Schema
 from biogrip.study.source import overlaid, read_config
 from biogrip.study.study import Study
-from biogrip.study.typed import Shape, built, plain
-from tests.study.keys import leaves
+from tests.study.keys import STUDY, leaves
 
 DEFAULT = Path(__file__).parents[2] / "config" / "config.yaml"
 DEFAULTS = read_config(DEFAULT)
@@ -29,12 +30,12 @@ MOST = {"seeds": 300, "coverage_seeds": 300}
 # Keys with a value of their own, outside of what the user names.
 SINGLE = {
     path: shape
-    for path, shape in leaves(StudyConfig).items()
-    if not shape.block
+    for path, shape in leaves(STUDY).items()
+    if not shape.keys
     and path.partition(".")[0] not in ("cases", "sweeps", "protocol")
     and not path.startswith("measurement.bursts.")
 }
-OF_A_CASE = sorted(path for path in leaves(Shared) if path in SINGLE)
+OF_A_CASE = sorted(path for path in SINGLE if path.partition(".")[0] in OVERRIDABLE)
 
 JUNK = st.one_of(
     st.none(),
@@ -48,27 +49,29 @@ JUNK = st.one_of(
 )
 
 
-def allowed(shape: Shape, name: str = "") -> st.SearchStrategy[Any]:
+def allowed(shape: Schema, name: str = "") -> st.SearchStrategy[Any]:
     """Values that a key may have by itself."""
-    key = shape.key
     if shape.options:
         return st.one_of(*(allowed(option) for option in shape.options))
-    if key.choices:
-        return st.sampled_from(key.choices)
-    if shape.items:
-        few, many = key.fewest or 0, min(key.most or 4, 4)
-        items = allowed(shape.items)
-        return st.lists(items, min_size=few, max_size=many, unique=key.unique)
-    if shape.names and shape.values:
-        return st.dictionaries(allowed(shape.names), allowed(shape.values), max_size=3)
-    if shape.scalar is int:
-        return st.integers(int(key.low or 0), MOST.get(name, int(key.high or 0)))
-    if shape.scalar is float:
-        low = key.above if key.low is None else key.low
-        return st.floats(low, key.high, exclude_min=key.low is None, allow_subnormal=False)
-    if shape.scalar is bool:
-        return st.booleans()
-    return st.from_regex(key.pattern, fullmatch=True) if key.pattern else st.text(max_size=20)
+    if choices := shape.get("enum"):
+        return st.sampled_from(choices)
+    match shape.get("type"):
+        case "array":
+            few, many = shape.get("minItems", 0), min(shape.get("maxItems", 4), 4)
+            unique = shape.get("uniqueItems", False)
+            return st.lists(allowed(shape.inside(0)), min_size=few, max_size=many, unique=unique)
+        case "object":
+            names = shape.within({"type": "string"} | shape.get("propertyNames", {}))
+            return st.dictionaries(allowed(names), allowed(shape.values), max_size=3)
+        case "integer":
+            return st.integers(shape.get("minimum"), MOST.get(name, shape.get("maximum")))
+        case "number":
+            above = shape.get("exclusiveMinimum")
+            low, high = shape.get("minimum", above), shape.get("maximum")
+            return st.floats(low, high, exclude_min=low == above, allow_subnormal=False)
+        case "boolean":
+            return st.booleans()
+    return st.from_regex(shape.get("pattern", ".{0,20}"), fullmatch=True)
 
 
 def block_of(path: str, value: Any) -> dict[str, Any]:
@@ -101,8 +104,7 @@ def overlays(draw: st.DrawFn) -> dict[str, Any]:
     if draw(st.booleans()):
         case = draw(some_keys(OF_A_CASE, junk=wrong == "case"))
         model = draw(st.sampled_from(sorted(MODELS)))
-        values = st.floats(1e-6, 1e6)
-        parameters = {name: draw(values) for name in MODELS[model].names}
+        parameters = {name: draw(st.floats(1e-6, 1e6)) for name in MODELS[model].names}
         name = draw(st.sampled_from(["unit", "title", "label", "my-case_1", "x" * 65]))
         config["cases"] = {name: {**case, "sample": {"model": model, **parameters}}}
         if draw(st.booleans()):
@@ -119,8 +121,7 @@ def planned(study: Study) -> int:
     plan = Plan(study, Path("nowhere"))
     count = 0
     for sheet in make_rules(products().values(), plan):
-        jobs = sheet.jobs
-        count += len(jobs)
+        count += len(jobs := sheet.jobs)
         for job in jobs[:2] + jobs[-2:]:
             assert sheet.digest(job)
             assert sheet.command(job)
@@ -154,12 +155,10 @@ def test_any_config_is_planned_or_ends_in_one_message(overlay: dict[str, Any]) -
 @settings(max_examples=200, deadline=None, derandomize=True)
 @given(st.sampled_from(sorted(SINGLE)), st.data())
 def test_a_value_out_of_bounds_is_refused_with_its_key(path: str, data: st.DataObject) -> None:
-    key, scalar = SINGLE[path].key, SINGLE[path].scalar
-    if scalar not in (int, float) or key.high is None:
+    if (high := SINGLE[path].get("maximum")) is None:
         return
-    beyond: Any = st.floats(key.high, exclude_min=True, allow_infinity=False)
-    if scalar is int:
-        beyond = st.integers(int(key.high) + 1)
+    floats: Any = st.floats(high, exclude_min=True, allow_infinity=False)
+    beyond = st.integers(high + 1) if SINGLE[path].get("type") == "integer" else floats
     overlay = block_of(path, data.draw(beyond))
     with pytest.raises(BiogripError, match=re.escape(f": {path}: found ")):
         load_study(overlaid(DEFAULTS, overlay), [DEFAULT])

@@ -1,6 +1,5 @@
 import copy
 import re
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +60,8 @@ def test_a_case_is_one_block_and_yaml_1_1_numbers_are_numbers(tmp_path: Path) ->
     assert case.title == "my_cell"
     other = study.cases["endothelial_cell"]
     sample = other.block.sample
-    blocks = [replace(c.block, sample=sample, title=None, published=None) for c in (case, other)]
+    changes = {"sample": sample, "title": None, "published": None}
+    blocks = [c.block.model_copy(update=changes) for c in (case, other)]
     assert blocks[0] == blocks[1]
 
 
@@ -171,8 +171,7 @@ BAD = {
     f"cases: {{x: {{{DROP[:-1]}, size_m: 20e-6}}}}}}": r"size_m: found 2e-05, allowed is at least",
     f"cases: {{off: {{{DROP}}}}}": r"cases\[False\]: is no text: YAML reads on, off, yes, no",
     "protocol: {phases: [{duration_s: 5, torque_Nm: 1e-9, to_voltage_V: 3}]}": r"to_voltage_V: does"
-    r" "
-    r"not go with torque_Nm",
+    r" not go with torque_Nm",
     "protocol: {phases: [{duration_s: 5, torque_Nm: 1e-9, amplitude_Nm: 1e-10}]}": r"has one of "
     r"amplitude_Nm and frequency_Hz; allowed are both or neither",
     "protocol: {phases: [{duration_s: 5}]}": r"found neither, allowed is one of torque_Nm and volt",

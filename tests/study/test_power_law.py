@@ -22,7 +22,7 @@ LONG = "protocol: {phases: [{duration_s: 2e5, torque_Nm: 1e-9}]}, measurement: {
         ),
         (
             f"cases: {{cell: {{sample: {{{SOLID}, alpha: 0.0}}}}}}",
-            "cases.cell.sample.alpha: found 0.0, allowed is at least 1e-18.",
+            "cases.cell.sample.alpha: found 0, allowed is at least 1e-18.",
         ),
         (
             f"cases: {{cell: {{sample: {{{SOLID}, alpha: 0.001}}}}}}",

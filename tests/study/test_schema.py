@@ -9,28 +9,27 @@ import yaml
 from jsonschema import Draft202012Validator
 
 from biogrip.identify.methods import METHODS
-from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
-from biogrip.study.config import StudyConfig
+from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.reference import file_schema
 from biogrip.study.source import read_config
-from biogrip.study.typed import keys
-from tests.study.keys import leaves
+from tests.study.keys import STUDY, leaves
 
 CONFIG = Path(__file__).parents[2] / "config"
 SCHEMA: dict[str, Any] = json.loads(file_schema())
 
 
 def test_every_key_says_what_it_means() -> None:
-    known = leaves(StudyConfig)
+    known = leaves(STUDY)
     assert len(known) > 80
-    assert [path for path, shape in known.items() if not shape.text] == []
+    assert [path for path, shape in known.items() if not shape.get("description")] == []
 
 
 def test_every_number_has_bounds() -> None:
-    numbers = {path: s.key for path, s in leaves(StudyConfig).items() if s.scalar in (int, float)}
+    kinds = ("integer", "number")
+    numbers = {path: key.node for path, key in leaves(STUDY).items() if key.get("type") in kinds}
     assert len(numbers) > 40
-    assert [path for path, key in numbers.items() if key.high is None] == []
-    assert [p for p, key in numbers.items() if key.low is None and key.above is None] == []
+    assert [path for path, node in numbers.items() if "maximum" not in node] == []
+    assert [p for p, node in numbers.items() if not {*node} & {"minimum", "exclusiveMinimum"}] == []
 
 
 def test_every_block_refuses_unknown_keys() -> None:
@@ -44,7 +43,7 @@ def test_every_block_refuses_unknown_keys() -> None:
 def test_a_case_may_override_the_blocks_of_the_study_and_of_every_method() -> None:
     methods = {block for method in METHODS.values() for block in method.blocks}
     assert methods < set(OVERRIDABLE)
-    assert set(OVERRIDABLE) == set(keys(CaseBlock)) & set(keys(StudyConfig))
+    assert set(OVERRIDABLE) == set(STUDY.keys["cases"].values.keys) & set(STUDY.keys)
 
 
 def test_the_schema_is_one() -> None:

@@ -65,7 +65,7 @@ def test_points_are_the_base_case_with_two_values_changed(tmp_path: Path) -> Non
     base = study.cases["liquid_drop_2"]
     point = study.points["liquid_drop_2--noise--0_02--uniform-peak"]
     noisier = replace(base.block.measurement, noise=Noise("uniform", 0.02, "peak"))
-    assert point.block == replace(base.block, measurement=noisier)
+    assert point.block == base.block.model_copy(update={"measurement": noisier})
     assert (point.parameters, point.sample) == (base.parameters, base.sample)
     assert base.block.measurement.noise.level == 0.1
     assert not set(study.points) & set(study.cases)

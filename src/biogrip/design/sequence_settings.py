@@ -3,15 +3,16 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from biogrip.keys import Key
+from pydantic import Field
+
+from biogrip.keys import Block
 
 
 @dataclass(frozen=True)
-class SequenceSettings:
+class SequenceSettings(Block):
     """Simulated sequences of experiments on cells, which count those needed, see docs/design.md."""
 
-    cells: Annotated[
-        int,
-        Key("Cells, drawn uniformly in the logarithms within `design.ranges`.", low=2, high=10_000),
-    ]
-    experiments: Annotated[int, Key("Experiments with each, by every strategy.", low=2, high=20)]
+    cells: Annotated[int, Field(ge=2, le=10_000)]
+    """Cells, drawn uniformly in the logarithms within `design.ranges`."""
+    experiments: Annotated[int, Field(ge=2, le=20)]
+    """Experiments with each, by every strategy."""

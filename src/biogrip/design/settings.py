@@ -4,113 +4,64 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.design.criteria import CRITERIA, OVER
 from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Distinct, OneOf, Problem
 
 # Shortest duration of a step by default, readings in it by default, and its fewest readings.
 _SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
 
-_Value = Annotated[float, Key(above=0, high=1e12)]
+_Ends = Annotated[
+    tuple[Annotated[float, Field(gt=0, le=1e12)], ...], Field(min_length=2, max_length=2)
+]
 
 
 @dataclass(frozen=True, kw_only=True)
-class DesignSettings:
+class DesignSettings(Block):
     """Settings of `biogrip design`, which searches for the best torque and sampling times."""
 
-    noise_rad: Annotated[
-        float, Key("Standard deviation of the sensor's noise.", "rad", low=1e-15, high=1.0)
-    ]
-    samples: Annotated[int, Key("Total number of readings.", low=10, high=1_000_000)]
-    fastest_Hz: Annotated[float, Key("Most readings in a second.", "Hz", low=1e-3, high=1e9)]
-    longest_s: Annotated[float, Key("Duration of the experiment.", "s", low=1e-6, high=1e6)]
-    largest_torque_Nm: Annotated[
-        float | None,
-        Key(
-            "Largest torque, as an increment on what closes the jaws onto the sample.",
-            "N m",
-            above=0,
-            high=1.0,
-        ),
-    ] = None
-    largest_voltage_V: Annotated[
-        float | None,
-        Key("Largest voltage, instead; counted like a protocol's.", "V", above=0, high=1e4),
-    ] = None
-    shortest_step_s: Annotated[
-        float | None,
-        Key(
-            "All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s, or "
-            "ten readings at `fastest_Hz` if these take longer.",
-            "s",
-            low=1e-6,
-            high=1e6,
-        ),
-    ] = None
-    most_steps: Annotated[
-        int,
-        Key(
-            "Largest number of steps, ramps and sinusoids. By default 40.",
-            low=2,
-            high=1000,
-        ),
-    ] = 40
+    noise_rad: Annotated[float, Field(ge=1e-15, le=1.0)]
+    """Standard deviation of the sensor's noise."""
+    samples: Annotated[int, Field(ge=10, le=1_000_000)]
+    """Total number of readings."""
+    fastest_Hz: Annotated[float, Field(ge=1e-3, le=1e9)]
+    """Most readings in a second."""
+    longest_s: Annotated[float, Field(ge=1e-6, le=1e6)]
+    """Duration of the experiment."""
+    largest_torque_Nm: Annotated[float | None, Field(gt=0, le=1.0)] = None
+    """Largest torque, as an increment on what closes the jaws onto the sample."""
+    largest_voltage_V: Annotated[float | None, Field(gt=0, le=1e4)] = None
+    """Largest voltage, instead; counted like a protocol's."""
+    shortest_step_s: Annotated[float | None, Field(ge=1e-6, le=1e6)] = None
+    """All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s, or ten
+    readings at `fastest_Hz` if these take longer."""
+    most_steps: Annotated[int, Field(ge=2, le=1000)] = 40
+    """Largest number of steps, ramps and sinusoids. By default 40."""
     shapes: Annotated[
-        tuple[Annotated[str, Key(choices=tuple(SHAPES))], ...],
-        Key(
-            "Torques that the generator can make: trains of `steps`, of `ramps` that never jump, "
-            "`sinusoids` on held torques; the best of them is taken. By default steps.",
-            fewest=1,
-            unique=True,
-        ),
+        tuple[Annotated[str, OneOf(SHAPES)], ...], Field(min_length=1), Distinct()
     ] = ("steps",)
-    criterion: Annotated[
-        str,
-        Key(
-            "Function of the covariance of the logarithms asked for to minimize: `largest`, the "
-            "largest relative bound (the default); `D`, its determinant; `A`, the mean of the "
-            "squared bounds; `E`, its largest eigenvalue.",
-            choices=CRITERIA,
-        ),
-    ] = "largest"
-    over: Annotated[
-        str,
-        Key(
-            "Plausible sample that counts, the `worst` (the default), or `mean` over all samples.",
-            choices=OVER,
-        ),
-    ] = "worst"
-    quantities: Annotated[
-        tuple[str, ...],
-        Key(
-            "Parameters that are asked for; the others are free all the same. By default all that "
-            "are not fixed.",
-            fewest=1,
-            most=40,
-            unique=True,
-        ),
-    ] = ()
-    ranges: Annotated[
-        Mapping[str, tuple[_Value, _Value]] | None,
-        Key(
-            "Lowest and highest plausible value of parameters, in SI units. Those without one are "
-            "as in the case's sample. By default, that sample alone is plausible."
-        ),
-    ] = None
-    drawn: Annotated[
-        int,
-        Key("Plausible samples, spread evenly over these ranges. By default 8.", low=2, high=256),
-    ] = 8
-    tried: Annotated[
-        int,
-        Key(
-            "Torques that the search tries, about, as many of each shape. By default 2000.",
-            low=128,
-            high=1_000_000,
-        ),
-    ] = 2000
-    sequence: Annotated[SequenceSettings | None, Key()] = None
+    """Torques that the generator can make: trains of `steps`, of `ramps` that never jump,
+    `sinusoids` on held torques; the best of them is taken. By default steps."""
+    criterion: Annotated[str, OneOf(CRITERIA)] = "largest"
+    """Function of the covariance of the logarithms asked for to minimize: `largest`, the largest
+    relative bound (the default); `D`, its determinant; `A`, the mean of the squared bounds; `E`,
+    its largest eigenvalue."""
+    over: Annotated[str, OneOf(OVER)] = "worst"
+    """Plausible sample that counts, the `worst` (the default), or `mean` over all samples."""
+    quantities: Annotated[tuple[str, ...], Field(min_length=1, max_length=40), Distinct()] = ()
+    """Parameters that are asked for; the others are free all the same. By default all that are not
+    fixed."""
+    ranges: Mapping[str, _Ends] | None = None
+    """Lowest and highest plausible value of parameters, in SI units. Those without one are as in
+    the case's sample. By default, that sample alone is plausible."""
+    drawn: Annotated[int, Field(ge=2, le=256)] = 8
+    """Plausible samples, spread evenly over these ranges. By default 8."""
+    tried: Annotated[int, Field(ge=128, le=1_000_000)] = 2000
+    """Torques that the search tries, about, as many of each shape. By default 2000."""
+    sequence: SequenceSettings | None = None
 
     @property
     def unit_s(self) -> float:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise_parts import (
@@ -15,7 +16,7 @@ from biogrip.experiment.noise_parts import (
     draw_ornstein_uhlenbeck,
     flicker_rates,
 )
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, OneOf, Problem
 
 _HALF_WIDTH = np.sqrt(3.0)
 
@@ -27,40 +28,27 @@ KINDS: dict[str, Callable[[np.random.Generator, int], Array]] = {
 
 
 @dataclass(frozen=True)
-class Noise:
+class Noise(Block):
     """Noise added to the noise-free rotation; components beside white noise can be combined."""
 
-    kind: Annotated[str, Key("Distribution of what is white of the noise.", choices=tuple(KINDS))]
-    level: Annotated[
-        float,
-        Key("Standard deviation of the noise, as a share of the reference.", low=0, high=10),
-    ]
-    reference: Annotated[
-        str,
-        Key(
-            "Reference of `level`. `peak`: the largest rotation of the noise-free trace, the "
-            "same noise everywhere; `signal`: the noise-free rotation at each instant.",
-            choices=("peak", "signal"),
-        ),
-    ]
-    level_rad: Annotated[
-        float | None,
-        Key(
-            "Standard deviation of the noise as an instrument has it, the same whatever the "
-            "sample, e.g. 3.0e-6. Where it is given, `level` does not count.",
-            "rad",
-            low=0,
-            high=10,
-        ),
-    ] = None
-    relaxing: Annotated[
-        Relaxing | None, Key("Autocorrelated component, AR(1); Gaussian. By default none.")
-    ] = None
-    flicker: Annotated[
-        Flicker | None, Key("Component of spectrum 1/f; Gaussian. By default none.")
-    ] = None
-    drift: Annotated[Drift | None, Key("A drift in addition. By default none.")] = None
-    outliers: Annotated[Outliers | None, Key("Outliers in addition. By default none.")] = None
+    kind: Annotated[str, OneOf(KINDS)]
+    """Distribution of what is white of the noise."""
+    level: Annotated[float, Field(ge=0, le=10)]
+    """Standard deviation of the noise, as a share of the reference."""
+    reference: Annotated[str, OneOf(("peak", "signal"))]
+    """Reference of `level`. `peak`: the largest rotation of the noise-free trace, the same noise
+    everywhere; `signal`: the noise-free rotation at each instant."""
+    level_rad: Annotated[float | None, Field(ge=0, le=10)] = None
+    """Standard deviation of the noise as an instrument has it, the same whatever the sample, e.g.
+    3.0e-6. Where it is given, `level` does not count."""
+    relaxing: Relaxing | None = None
+    """Autocorrelated component, AR(1); Gaussian. By default none."""
+    flicker: Flicker | None = None
+    """Component of spectrum 1/f; Gaussian. By default none."""
+    drift: Drift | None = None
+    """A drift in addition. By default none."""
+    outliers: Outliers | None = None
+    """Outliers in addition. By default none."""
 
     def problems(self) -> Iterator[Problem]:
         """Find components whose shares exceed one together."""

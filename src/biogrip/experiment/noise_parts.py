@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 # Relaxation times of flicker noise are so many e-folds apart, or less: its spectrum is 1/f to
 # within 2 exp(-pi^2 / 1.5) = 0.3 %, as Poisson's summation has it.
@@ -16,56 +17,40 @@ _SLOWEST = 3.0
 
 
 @dataclass(frozen=True)
-class Relaxing:
+class Relaxing(Block):
     """Ornstein-Uhlenbeck noise of one relaxation time, of spectrum 1/(1 + (2 pi f tau)^2)."""
 
-    share: Annotated[float, Key("Share of the noise's variance.", above=0, high=1)]
-    time_s: Annotated[
-        float,
-        Key(
-            "Time after which its correlation has fallen to 1/e. Of samples an interval h apart "
-            "it is an AR(1) process with the coefficient exp(-h / time_s).",
-            "s",
-            above=0,
-            high=1e9,
-        ),
-    ]
+    share: Annotated[float, Field(gt=0, le=1)]
+    """Share of the noise's variance."""
+    time_s: Annotated[float, Field(gt=0, le=1e9)]
+    """Time after which its correlation has fallen to 1/e. Of samples an interval h apart it is an
+    AR(1) process with the coefficient exp(-h / time_s)."""
 
 
 @dataclass(frozen=True)
-class Flicker:
+class Flicker(Block):
     """Noise of spectrum 1/f over all frequencies of the trace."""
 
-    share: Annotated[float, Key("Share of the noise's variance.", above=0, high=1)]
+    share: Annotated[float, Field(gt=0, le=1)]
+    """Share of the noise's variance."""
 
 
 @dataclass(frozen=True)
-class Drift:
+class Drift(Block):
     """A drift linear in time, upwards or downwards at random."""
 
-    rise: Annotated[
-        float,
-        Key(
-            "Change from the first reading to the last, in standard deviations of the noise.",
-            above=0,
-            high=1000,
-        ),
-    ]
+    rise: Annotated[float, Field(gt=0, le=1000)]
+    """Change from the first reading to the last, in standard deviations of the noise."""
 
 
 @dataclass(frozen=True)
-class Outliers:
+class Outliers(Block):
     """Readings with far more noise than others."""
 
-    share: Annotated[float, Key("Share of the samples, at random.", above=0, high=0.5)]
-    size: Annotated[
-        float,
-        Key(
-            "Standard deviation of their additional noise, in standard deviations of the noise.",
-            above=0,
-            high=1000,
-        ),
-    ]
+    share: Annotated[float, Field(gt=0, le=0.5)]
+    """Share of the samples, at random."""
+    size: Annotated[float, Field(gt=0, le=1000)]
+    """Standard deviation of their additional noise, in standard deviations of the noise."""
 
 
 def draw_ornstein_uhlenbeck(

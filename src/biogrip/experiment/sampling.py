@@ -4,19 +4,23 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import sample_times
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 
 @dataclass(frozen=True)
-class Burst:
+class Burst(Block):
     """Successive readings at a rate of their own."""
 
-    from_s: Annotated[float, Key("Time of its first reading.", "s", low=0, high=1e9)]
-    rate_Hz: Annotated[float, Key("Rate within the burst.", "Hz", low=1e-9, high=1e9)]
-    samples: Annotated[int, Key("Number of readings.", low=1, high=10_000_000)]
+    from_s: Annotated[float, Field(ge=0, le=1e9)]
+    """Time of its first reading."""
+    rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
+    """Rate within the burst."""
+    samples: Annotated[int, Field(ge=1, le=10_000_000)]
+    """Number of readings."""
 
     @property
     def times_s(self) -> Array:

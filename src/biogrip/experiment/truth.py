@@ -1,45 +1,49 @@
 """True parameters of simulated samples, and the paper's results for comparison."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.experiment.sample import SINGLE_BRANCH, Parameter, Sample, SampleModel
-from biogrip.keys import Key
+from biogrip.keys import Block, OneOf
 
-_PRINTED = Key(choices=tuple(parameter.name for parameter in SINGLE_BRANCH))
-_SIGNED = Key(
-    pattern=r"[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?",
-    form="a number of at most 12 characters, with < or > before it where the paper has it",
-)
+_Parameter = Annotated[str, OneOf(tuple(parameter.name for parameter in SINGLE_BRANCH))]
+_Signed = Annotated[
+    str,
+    Field(
+        pattern=r"^[<>]?[+-]?[0-9]{1,6}(\.[0-9]{1,3})?$",
+        json_schema_extra={
+            "form": "a number of at most 12 characters, with < or > before it where the paper has "
+            "it"
+        },
+    ),
+]
 
 
-@dataclass(frozen=True)
-class Published:
+@dataclass(frozen=True, kw_only=True)
+class Published(Block):
     """Results of the paper for a sample, to compare with."""
 
-    table: Annotated[
-        int | None, Key("Number of the paper's table.", low=1, high=1000, needed=True)
-    ] = None
-    figure: Annotated[
-        int | None, Key("Number of the paper's figure of the fit.", low=1, high=1000)
-    ] = None
-    generation: Annotated[
-        int | None,
-        Key("Generation at which the paper shows the fit.", low=1, high=1_000_000),
-    ] = None
+    table: Annotated[int | None, Field(ge=1, le=1000)]
+    """Number of the paper's table."""
+    figure: Annotated[int | None, Field(ge=1, le=1000)] = None
+    """Number of the paper's figure of the fit."""
+    generation: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+    """Generation at which the paper shows the fit."""
     axis_rad: Annotated[
-        tuple[Annotated[float, Key(low=-10, high=10)], ...],
-        Key("Ends of the rotation axis of the paper's figure.", "rad", fewest=2, most=2),
+        tuple[Annotated[float, Field(ge=-10, le=10)], ...], Field(min_length=2, max_length=2)
     ] = ()
-    identified: Annotated[
-        Mapping[Annotated[str, _PRINTED], Annotated[float, Key(low=0, high=1e12)]],
-        Key("Identified parameters as printed, SI units.", needed=True),
-    ] = field(default_factory=dict)
-    error_percent: Annotated[
-        Mapping[Annotated[str, _PRINTED], Annotated[str, _SIGNED]],
-        Key("Their errors in percent as printed, in quotes, for some are no numbers.", needed=True),
-    ] = field(default_factory=dict)
+    """Ends of the rotation axis of the paper's figure."""
+    identified: Mapping[_Parameter, Annotated[float, Field(ge=0, le=1e12)]]
+    """Identified parameters as printed, SI units."""
+    error_percent: Mapping[_Parameter, _Signed]
+    """Their errors in percent as printed, in quotes, for some are no numbers."""
+
+
+UNPUBLISHED = Published(table=None, identified={}, error_percent={})
+"""What the paper reports of a sample that it does not have."""
 
 
 @dataclass(frozen=True)

@@ -4,51 +4,40 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.digits import counted
 from biogrip.errors import nearest
 from biogrip.experiment.sample import SampleModel
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Problem
 
 
 @dataclass(frozen=True)
-class LogNormal:
+class LogNormal(Block):
     """Log-normal prior of a parameter, truncated to the search range."""
 
-    median: Annotated[float, Key("Median, SI units.", above=0, high=1e12)]
-    spread: Annotated[float, Key("Standard deviation of the natural logarithm.", above=0, high=100)]
+    median: Annotated[float, Field(gt=0, le=1e12)]
+    """Median, SI units."""
+    spread: Annotated[float, Field(gt=0, le=100)]
+    """Standard deviation of the natural logarithm."""
 
 
 @dataclass(frozen=True)
-class PosteriorSettings:
+class PosteriorSettings(Block):
     """Sampling of the posterior of the first trace; nothing is sampled without this block."""
 
-    prior: Annotated[
-        Mapping[str, LogNormal],
-        Key(
-            "Log-normal priors by parameter: `k: {median: 30.0, spread: 0.5}`, the spread "
-            "being the standard deviation of the natural logarithm. All others are uniform in "
-            "their logarithms over the search range."
-        ),
-    ] = field(default_factory=dict)
-    walkers: Annotated[
-        int, Key("Number of walkers in the ensemble. By default 100.", low=20, high=10_000)
-    ] = 100
-    most_steps: Annotated[
-        int,
-        Key(
-            "Steps of every walker after which sampling stops although it has not converged. By "
-            "default 5000.",
-            low=1000,
-            high=1_000_000,
-        ),
-    ] = 5000
-    evidence: Annotated[
-        bool,
-        Key(
-            "If true, the models of `model_selection` are sampled, too, and their evidence is "
-            "compared. By default false."
-        ),
-    ] = False
+    prior: Mapping[str, LogNormal] = field(default_factory=dict)
+    """Log-normal priors by parameter: `k: {median: 30.0, spread: 0.5}`, the spread being the
+    standard deviation of the natural logarithm. All others are uniform in their logarithms over the
+    search range."""
+    walkers: Annotated[int, Field(ge=20, le=10_000)] = 100
+    """Number of walkers in the ensemble. By default 100."""
+    most_steps: Annotated[int, Field(ge=1000, le=1_000_000)] = 5000
+    """Steps of every walker after which sampling stops although it has not converged. By default
+    5000."""
+    evidence: bool = False
+    """If true, the models of `model_selection` are sampled, too, and their evidence is compared. By
+    default false."""
 
     def problems_of(self, model: SampleModel, known: Sequence[str]) -> Iterator[Problem]:
         """Find too few walkers, and priors of parameters that are not searched or are ordered.

@@ -12,30 +12,27 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
 from biogrip.identify.problem import Problem
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
 
 @dataclass(frozen=True)
-class DifferentialEvolutionSettings:
+class DifferentialEvolutionSettings(Block):
     """SciPy's differential evolution, on the logarithms of the parameters."""
 
-    popsize: Annotated[int, Key("Individuals per parameter.", low=2, high=10_000)]
-    maxiter: Annotated[int, Key("Generations at most.", low=1, high=1_000_000)]
-    tol: Annotated[
-        float,
-        Key(
-            "Stop when the population's misfits scatter by less than this share of their mean.",
-            above=0,
-            high=1,
-        ),
-    ]
+    popsize: Annotated[int, Field(ge=2, le=10_000)]
+    """Individuals per parameter."""
+    maxiter: Annotated[int, Field(ge=1, le=1_000_000)]
+    """Generations at most."""
+    tol: Annotated[float, Field(gt=0, le=1)]
+    """Stop when the population's misfits scatter by less than this share of their mean."""
 
 
 def identify_many(

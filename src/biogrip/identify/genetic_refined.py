@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
@@ -16,22 +17,17 @@ from biogrip.identify.genetic import Evolution, evolve
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.multi_start import best_of_starts
 from biogrip.identify.problem import Problem
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 
 @dataclass(frozen=True)
-class Polishing:
+class Polishing(Block):
     """Local fits from survivors of the genetic algorithm."""
 
-    first: Annotated[
-        int,
-        Key(
-            "Number of the best survivors of the initial population that are polished.",
-            low=0,
-            high=10_000,
-        ),
-    ]
-    last: Annotated[int, Key("The same for the last population.", low=1, high=10_000)]
+    first: Annotated[int, Field(ge=0, le=10_000)]
+    """Number of the best survivors of the initial population that are polished."""
+    last: Annotated[int, Field(ge=1, le=10_000)]
+    """The same for the last population."""
 
 
 @dataclass(frozen=True)

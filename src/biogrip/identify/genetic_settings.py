@@ -2,77 +2,46 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from biogrip.digits import counted
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Problem
 
 _MOST = 1_000_000
 
 
 @dataclass(frozen=True)
-class GeneticSettings:
+class GeneticSettings(Block):
     """Settings of the genetic algorithm (section 4)."""
 
-    population: Annotated[int, Key("Individuals in a generation.", low=4, high=_MOST)]
-    survivors: Annotated[
-        int,
-        Key(
-            "Number of the best, which survive unchanged and are the parents of the others.",
-            low=2,
-            high=_MOST,
-        ),
-    ]
-    mating: Annotated[
-        str,
-        Key(
-            "`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a "
-            "probability proportional to their rank.",
-            choices=("pairs", "rank"),
-        ),
-    ]
-    first_cut: Annotated[
-        int,
-        Key("Smallest number of genes that a child takes from its first parent.", low=1, high=50),
-    ]
-    last_cut: Annotated[
-        int,
-        Key(
-            "Largest number of genes that a child takes from its first parent. Negative numbers "
-            "count from the end; -1 is one less than the chromosome has, 11 with twelve genes.",
-            low=-50,
-            high=50,
-        ),
-    ]
-    mutation_start: Annotated[
-        int, Key("First generation whose children mutate.", low=1, high=_MOST)
-    ]
-    mutation_probability: Annotated[float, Key("Share of the children that mutate.", low=0, high=1)]
-    mutated_genes: Annotated[
-        int,
-        Key(
-            "Number of times that a gene of such a child is chosen and redrawn from its range.",
-            low=1,
-            high=50,
-        ),
-    ]
-    patience: Annotated[
-        int,
-        Key(
-            "Stop after this number of generations without improvement of the best misfit.",
-            low=1,
-            high=_MOST,
-        ),
-    ]
-    min_generations: Annotated[int, Key("Fewest generations.", low=0, high=_MOST)]
-    max_generations: Annotated[int, Key("Most generations.", low=1, high=_MOST)]
-    mutants: Annotated[
-        str,
-        Key(
-            "Individuals that may mutate: `children`; or `all`, survivors except the best, too.",
-            choices=("children", "all"),
-        ),
-    ] = "children"
+    population: Annotated[int, Field(ge=4, le=_MOST)]
+    """Individuals in a generation."""
+    survivors: Annotated[int, Field(ge=2, le=_MOST)]
+    """Number of the best, which survive unchanged and are the parents of the others."""
+    mating: Literal["pairs", "rank"]
+    """`pairs`: survivors form random disjoint pairs; `rank`: parents are drawn with a probability
+    proportional to their rank."""
+    first_cut: Annotated[int, Field(ge=1, le=50)]
+    """Smallest number of genes that a child takes from its first parent."""
+    last_cut: Annotated[int, Field(ge=-50, le=50)]
+    """Largest number of genes that a child takes from its first parent. Negative numbers count from
+    the end; -1 is one less than the chromosome has, 11 with twelve genes."""
+    mutation_start: Annotated[int, Field(ge=1, le=_MOST)]
+    """First generation whose children mutate."""
+    mutation_probability: Annotated[float, Field(ge=0, le=1)]
+    """Share of the children that mutate."""
+    mutated_genes: Annotated[int, Field(ge=1, le=50)]
+    """Number of times that a gene of such a child is chosen and redrawn from its range."""
+    patience: Annotated[int, Field(ge=1, le=_MOST)]
+    """Stop after this number of generations without improvement of the best misfit."""
+    min_generations: Annotated[int, Field(ge=0, le=_MOST)]
+    """Fewest generations."""
+    max_generations: Annotated[int, Field(ge=1, le=_MOST)]
+    """Most generations."""
+    mutants: Literal["children", "all"] = "children"
+    """Individuals that may mutate: `children`; or `all`, survivors except the best, too."""
 
     def problems(self) -> Iterator[Problem]:
         """Find settings that leave no children, or whose limits of generations conflict."""

@@ -8,28 +8,28 @@ from math import prod
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array, IntArray
 from biogrip.experiment.sample import SampleModel
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Problem
 
 
 @dataclass(frozen=True)
-class GeneRange:
+class GeneRange(Block):
     """Values that the genes of one parameter may take (Table 3)."""
 
     exponent: Annotated[
-        tuple[Annotated[int, Key(low=-16, high=18)], Annotated[int, Key(low=-16, high=18)]],
-        Key("Lowest and highest order of magnitude g₁ (eq. 10)."),
+        tuple[Annotated[int, Field(ge=-16, le=18)], ...], Field(min_length=2, max_length=2)
     ]
+    """Lowest and highest order of magnitude g₁ (eq. 10)."""
     digit: Annotated[
-        tuple[Annotated[int, Key(low=0, high=9)], Annotated[int, Key(low=1, high=9)]],
-        Key(
-            "Lowest and highest value of the digits g₂, g₃ and so on (eq. 10). The first is never "
-            "below 1, for numbers with leading zeros would be encoded twice."
-        ),
+        tuple[Annotated[int, Field(ge=0, le=9)], ...], Field(min_length=2, max_length=2)
     ]
-    digits: Annotated[int, Key("How many digits; in eq. (10) two.", low=1, high=6)] = 2
+    """Lowest and highest value of the digits g₂, g₃ and so on (eq. 10). The first is never below 1,
+    for numbers with leading zeros would be encoded twice."""
+    digits: Annotated[int, Field(ge=1, le=6)] = 2
+    """How many digits; in eq. (10) two."""
 
     def problems(self) -> Iterator[Problem]:
         """Find bounds in the wrong order, and a range of a single value."""

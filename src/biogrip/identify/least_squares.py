@@ -5,24 +5,24 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification, Progress, Row, silent
 from biogrip.identify.multi_start import best_of_starts, screened
 from biogrip.identify.problem import Problem
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 
 @dataclass(frozen=True)
-class LeastSquaresSettings:
+class LeastSquaresSettings(Block):
     """Local fits from random points, the method of identifiability analyses, too."""
 
-    candidates: Annotated[
-        int,
-        Key("Points drawn, uniformly in the logarithms of the parameters.", low=1, high=1_000_000),
-    ]
-    starts: Annotated[int, Key("Local fits, from the best of them.", low=1, high=10_000)]
+    candidates: Annotated[int, Field(ge=1, le=1_000_000)]
+    """Points drawn, uniformly in the logarithms of the parameters."""
+    starts: Annotated[int, Field(ge=1, le=10_000)]
+    """Local fits, from the best of them."""
 
 
 def identify_many(

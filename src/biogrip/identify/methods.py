@@ -1,7 +1,7 @@
 """The identifiers that there are: what is said of each, and nothing of how it works.
 
 Each method is a module of this package, named like the method. It has the class of its settings,
-whose fields are the keys of its config block (`biogrip.keys.Key`), and a function
+whose fields are the keys of its config block (`biogrip.keys`), and a function
 ``identify_many(problems, settings, rngs, progress)``, which returns an `Identification` of each
 trace, to the bit as if it were alone. Ranges and traces are the problems', the budget of each is
 in the settings, its generator is its only source of randomness, and progress is told of all.

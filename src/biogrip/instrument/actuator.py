@@ -5,31 +5,34 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from biogrip.arrays import Array
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 VACUUM_PERMITTIVITY_F_PER_M = 8.8541878128e-12
 
 
 @dataclass(frozen=True)
-class CombDrive:
+class CombDrive(Block):
     """Geometry of one rotary comb drive (Table 2)."""
 
-    thickness_m: Annotated[float, Key("Thickness h of the device layer.", "m", low=1e-9, high=1e-2)]
-    finger_width_m: Annotated[float, Key("Width d of a finger.", "m", low=1e-9, high=1e-2)]
-    finger_gap_m: Annotated[
-        float, Key("Gap g between neighbouring fingers.", "m", low=1e-9, high=1e-2)
-    ]
-    fingers: Annotated[int, Key("Number n of floating fingers.", low=1, high=10_000)]
-    first_radius_m: Annotated[float, Key("Radius r₀ of the first finger.", "m", low=1e-9, high=1.0)]
-    finger_angle_deg: Annotated[
-        float, Key("Angle that a finger subtends.", "deg", low=1e-6, high=360)
-    ]
-    stroke_deg: Annotated[float, Key("Largest rotation of the drive.", "deg", low=1e-6, high=360)]
-    initial_overlap_deg: Annotated[
-        float, Key("Overlap of the fingers at rest.", "deg", low=0, high=360)
-    ]
+    thickness_m: Annotated[float, Field(ge=1e-9, le=1e-2)]
+    """Thickness h of the device layer."""
+    finger_width_m: Annotated[float, Field(ge=1e-9, le=1e-2)]
+    """Width d of a finger."""
+    finger_gap_m: Annotated[float, Field(ge=1e-9, le=1e-2)]
+    """Gap g between neighbouring fingers."""
+    fingers: Annotated[int, Field(ge=1, le=10_000)]
+    """Number n of floating fingers."""
+    first_radius_m: Annotated[float, Field(ge=1e-9, le=1.0)]
+    """Radius r₀ of the first finger."""
+    finger_angle_deg: Annotated[float, Field(ge=1e-6, le=360)]
+    """Angle that a finger subtends."""
+    stroke_deg: Annotated[float, Field(ge=1e-6, le=360)]
+    """Largest rotation of the drive."""
+    initial_overlap_deg: Annotated[float, Field(ge=0, le=360)]
+    """Overlap of the fingers at rest."""
 
     @property
     def pitch_m(self) -> float:

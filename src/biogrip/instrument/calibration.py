@@ -11,33 +11,32 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.instrument.calibrated_gripper import ARM_KEYS, CalibratedArm
 from biogrip.instrument.gripper import Arm
-from biogrip.keys import Key
+from biogrip.keys import Block
 
 _FEWEST_SAMPLES = 64
 
 
 @dataclass(frozen=True)
-class CalibrationTest:
+class CalibrationTest(Block):
     """The test of both arms without sample."""
 
-    step_torque_Nm: Annotated[
-        float, Key("Torque step on the free arm.", "N m", low=1e-20, high=1.0)
-    ]
-    impulse_Nms: Annotated[
-        float, Key("Torque impulse on the free arm.", "N m s", low=1e-25, high=1.0)
-    ]
-    duration_s: Annotated[float, Key("Length of each of the two records.", "s", low=1e-6, high=1e9)]
-    rate_Hz: Annotated[float, Key("Sampling rate of the records.", "Hz", low=1e-9, high=1e9)]
-    noise_level: Annotated[
-        float,
-        Key("Standard deviation of the noise as a share of each record's peak.", low=0, high=10),
-    ]
+    step_torque_Nm: Annotated[float, Field(ge=1e-20, le=1.0)]
+    """Torque step on the free arm."""
+    impulse_Nms: Annotated[float, Field(ge=1e-25, le=1.0)]
+    """Torque impulse on the free arm."""
+    duration_s: Annotated[float, Field(ge=1e-6, le=1e9)]
+    """Length of each of the two records."""
+    rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
+    """Sampling rate of the records."""
+    noise_level: Annotated[float, Field(ge=0, le=10)]
+    """Standard deviation of the noise as a share of each record's peak."""
 
 
 @dataclass(frozen=True)

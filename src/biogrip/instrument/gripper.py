@@ -5,32 +5,23 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
-from biogrip.keys import Key, Problem
+from pydantic import Field
+
+from biogrip.keys import Block, Problem
 
 _LARGEST_QUALITY = 1e6
 
 
 @dataclass(frozen=True)
-class Arm:
+class Arm(Block):
     """One arm on its flexure hinge, reduced to a rigid body on a pivot: eqs. (1) and (2)."""
 
-    inertia_kgm2: Annotated[
-        float,
-        Key("Moment of inertia I of the arm about its pivot.", "kg m²", low=1e-20, high=1.0),
-    ]
-    damping_Nms_per_rad: Annotated[
-        float,
-        Key(
-            "Rotational damping c of the arm; at least what makes its quality factor a million.",
-            "N m s/rad",
-            low=1e-20,
-            high=1.0,
-        ),
-    ]
-    stiffness_Nm_per_rad: Annotated[
-        float,
-        Key("Rotational stiffness k of the arm's flexure hinge.", "N m/rad", low=1e-12, high=1e3),
-    ]
+    inertia_kgm2: Annotated[float, Field(ge=1e-20, le=1.0)]
+    """Moment of inertia I of the arm about its pivot."""
+    damping_Nms_per_rad: Annotated[float, Field(ge=1e-20, le=1.0)]
+    """Rotational damping c of the arm; at least what makes its quality factor a million."""
+    stiffness_Nm_per_rad: Annotated[float, Field(ge=1e-12, le=1e3)]
+    """Rotational stiffness k of the arm's flexure hinge."""
 
     @property
     def natural_frequency_Hz(self) -> float:
@@ -50,28 +41,29 @@ class Arm:
 
 
 @dataclass(frozen=True)
-class Gripper:
+class Gripper(Block):
     """The chain A-B-C-D: left arm AB (index 2), right arm DC (index 4), sample BC.
 
     The reference angle is hat-theta_2; the right arm stands at 180 degrees minus it.
     """
 
+    # Pydantic takes no docstrings from the class that a class inherits from.
     arm_length_m: Annotated[
-        float, Key("Length l of both arms, from pivot to tip.", "m", low=1e-6, high=1.0)
+        float,
+        Field(ge=1e-6, le=1.0, description="Length l of both arms, from pivot to tip."),
     ]
     reference_angle_deg: Annotated[
         float,
-        Key(
-            "Angle of the left arm when the jaws just touch the sample; for a case that gives its "
-            "sample's size, the angle in the neutral configuration, from which the other follows. "
-            "Only its sine enters the linear model.",
-            "deg",
-            low=10,
-            high=90,
+        Field(
+            ge=10,
+            le=90,
+            description="Angle of the left arm when the jaws just touch the sample; for a case "
+            "that gives its sample's size, the angle in the neutral configuration, from which the "
+            "other follows. Only its sine enters the linear model.",
         ),
     ]
-    left: Annotated[Arm, Key()]
-    right: Annotated[Arm, Key()]
+    left: Arm
+    right: Arm
 
     @property
     def lever_m(self) -> float:

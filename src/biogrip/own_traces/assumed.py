@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.study.load import read_configs
+from biogrip.study.plain import plain
 from biogrip.study.study import Case
-from biogrip.study.typed import plain
 
 
 def assumed(case: Case) -> dict[str, Any]:
@@ -17,7 +17,7 @@ def assumed(case: Case) -> dict[str, Any]:
 
 def _block(case: Case, name: str) -> Any:
     own = case.block
-    return own.of_methods.block(name) if name == "least_squares" else getattr(own, name)
+    return own.method_block(name) if name == "least_squares" else getattr(own, name)
 
 
 def by_default(config: Path | None) -> list[str]:

@@ -9,7 +9,7 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages import recording
 from biogrip.study.measurement_block import COLOURED
-from biogrip.study.validation import value_problem
+from biogrip.study.validation import measurement_problem
 from biogrip.traces.recordings import Columns
 
 _OPTIONS = {"noise_rad": "noise"}
@@ -83,6 +83,6 @@ class ReadAs:
                 f"--noise: is that of white noise; leave it out with {COLOURED} noise."
             )
         for key, value in self.block.items():
-            if problem := value_problem(("measurement", key), value):
+            if problem := measurement_problem(key, value):
                 option = _OPTIONS.get(key, key).replace("_", "-")
                 raise BiogripError(f"--{option}: {problem}")

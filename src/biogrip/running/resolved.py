@@ -10,8 +10,8 @@ from biogrip.running.journal import recorded_in
 from biogrip.running.manifest import Manifest
 from biogrip.running.wholeness import make_room
 from biogrip.study.config import StudyConfig
+from biogrip.study.plain import plain
 from biogrip.study.study import Study
-from biogrip.study.typed import built, plain
 
 NAME = "study.json"
 
@@ -50,7 +50,7 @@ def read_study(results: Path) -> Study:
     """
     file = results / NAME
     try:
-        study = Study(built(StudyConfig, json.loads(file.read_text(encoding="utf-8"))))
+        study = Study(StudyConfig.model_validate_json(file.read_bytes()))
         # Access all derived properties, so that a damaged file is reported here.
         _ = study.cases, study.points, study.sweeps, study.shown, study.study_seed
         return study
@@ -59,4 +59,5 @@ def read_study(results: Path) -> Study:
             f"{file}: there is none, as no study was run here; allowed is what a run has begun."
         ) from error
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise BiogripError(f"{file}: cannot be read as a study: {error!r}.") from error
+        found = " ".join(repr(error).split())
+        raise BiogripError(f"{file}: cannot be read as a study: {found}.") from error

@@ -2,9 +2,14 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from contextlib import suppress
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, GetJsonSchemaHandler, Tag, TypeAdapter, ValidationError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from biogrip.design.settings import DesignSettings
 from biogrip.digits import counted
@@ -14,32 +19,38 @@ from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.genome import GeneRange
-from biogrip.identify.methods import METHODS
+from biogrip.identify.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
-from biogrip.keys import Key, Problem, printed
+from biogrip.keys import BY_KIND, OPEN, Block, Checked, Printed, Problem
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.method_blocks import MethodBlocks
+from biogrip.study.plain import built
 from biogrip.study.protocol_block import ProtocolBlock
 from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, parameter_problems
 
-EQUATIONS = ("linear", "nonlinear")
+METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))
+"""Config blocks of the methods."""
+
 CALIBRATED = "calibrated"
 
 _MOST_SAMPLES = 10_000_000
 
+_AnyGripper = Annotated[
+    Annotated[dict[str, Any], Tag("a block of keys")] | Annotated[str, Tag("text")], BY_KIND
+]
+
 
 @dataclass(frozen=True)
-class SearchRange:
+class SearchRange(Block):
     """Search range of each parameter as allowed values of its genes (Tables 3 and 4)."""
 
-    k: Annotated[GeneRange, Key()]
-    k_p: Annotated[GeneRange, Key()]
-    c: Annotated[GeneRange, Key()]
-    c_p: Annotated[GeneRange, Key()]
-    alpha: Annotated[GeneRange, Key()]
+    k: GeneRange
+    k_p: GeneRange
+    c: GeneRange
+    c_p: GeneRange
+    alpha: GeneRange
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a range that has exponents of springpots above 1."""
@@ -50,98 +61,123 @@ class SearchRange:
 
 
 @dataclass(frozen=True)
-class Equations:
+class Equations(Block):
     """Equations solved to simulate targets and to identify samples."""
 
-    target: Annotated[
-        str,
-        Key(
-            "`linear`: corrected eqs. (4)-(6); `nonlinear`: corrected eqs. (1)-(3).",
-            choices=EQUATIONS,
-        ),
-    ]
-    identification: Annotated[str, Key("The same for the model to fit.", choices=EQUATIONS)]
+    target: Literal["linear", "nonlinear"]
+    """`linear`: corrected eqs. (4)-(6); `nonlinear`: corrected eqs. (1)-(3)."""
+    identification: Literal["linear", "nonlinear"]
+    """The same for the model to fit."""
 
 
 @dataclass(frozen=True)
-class Identifiability:
+class Identifiability(Block):
     """Settings of the identifiability analysis."""
 
-    confidence: Annotated[float, Key("Confidence level of all intervals.", low=0.5, high=0.99)]
-    coverage_seeds: Annotated[
-        int,
-        Key(
-            "Number of seeds for which intervals are compared with the true values, and the spread "
-            "with the Cramér-Rao bound, if there is noise; 0 leaves that out.",
-            low=0,
-            high=1_000_000,
-        ),
-    ]
+    confidence: Annotated[float, Field(ge=0.5, le=0.99)]
+    """Confidence level of all intervals."""
+    coverage_seeds: Annotated[int, Field(ge=0, le=1_000_000)]
+    """Number of seeds for which intervals are compared with the true values, and the spread with
+    the Cramér-Rao bound, if there is noise; 0 leaves that out."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shared:
-    """Blocks that a study sets for all cases, and that a case may change for itself."""
+class Shared(Checked, BaseModel):
+    """Blocks that a study sets for all cases, and that a case may change for itself.
 
-    gripper: Annotated[GripperBlock, Key()]
-    protocol: Annotated[ProtocolBlock, Key()]
-    measurement: Annotated[MeasurementBlock, Key()]
-    search_range: Annotated[SearchRange, Key()]
-    of_methods: Annotated[MethodBlocks, Key(spread=True)]
-    models: Annotated[Equations, Key()]
+    Those of methods are among the extra keys, so that their modules are imported where they are
+    used.
+    """
+
+    model_config = OPEN
+
+    gripper: GripperBlock
+    protocol: ProtocolBlock
+    measurement: MeasurementBlock
+    search_range: SearchRange
+    models: Equations
     calibration: Annotated[
         CalibrationTest,
-        Key(
-            "The no-load test of each arm (end of section 2), for cases whose assumed_gripper is "
-            "`calibrated`."
+        Field(
+            description="The no-load test of each arm (end of section 2), for cases whose "
+            "assumed_gripper is `calibrated`."
         ),
     ]
-    identifiability: Annotated[Identifiability, Key()]
-    design: Annotated[DesignSettings | None, Key()] = None
+    identifiability: Identifiability
+    design: DesignSettings | None = None
     posterior: Annotated[
         PosteriorSettings | None,
-        Key(
-            "Settings of posterior sampling for the first trace; it is sampled if this block is "
-            "there, even an empty one, `{}`."
+        Field(
+            description="Settings of posterior sampling for the first trace; it is sampled if this "
+            "block is there, even an empty one, `{}`."
         ),
     ] = None
 
+    def method_block(self, name: str) -> object:
+        """Return the settings object of a block of a method."""
+        return built(block_class(name), (self.__pydantic_extra__ or {}).get(name, {}))
 
-@dataclass(frozen=True, kw_only=True)
+    def method(self, name: str) -> object:
+        """Return the settings object of a method."""
+        method = METHODS[name]
+        found = [self.method_block(block) for block in method.blocks]
+        return method.named(method.settings)(*found) if method.settings else found[0]
+
+    @property
+    def method_blocks(self) -> dict[str, Any]:
+        """Settings objects of all blocks of methods that are valid."""
+        found = {}
+        for name in METHOD_BLOCKS:
+            with suppress(ValidationError):
+                found[name] = self.method_block(name)
+        return found
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """Return the JSON Schema, with the blocks of all methods."""
+        ref = handler(schema)
+        found = handler.resolve_ref_schema(ref)
+        found["additionalProperties"] = False
+        for name in METHOD_BLOCKS:
+            found["properties"][name] = handler(TypeAdapter(block_class(name)).core_schema)
+        return ref
+
+
 class CaseBlock(Shared):
     """A sample, with all that its experiment and identification need."""
 
     title: Annotated[
-        str | None,
-        printed(
-            "Name in print, of letters, digits, spaces and . , : ; ( ) + / % ' - _, not beginning "
-            "with a space, + or -; by default the case's name."
+        Printed | None,
+        Field(
+            description="Name in print, of letters, digits, spaces and . , : ; ( ) + / % ' - _, "
+            "not beginning with a space, + or -; by default the case's name."
         ),
     ] = None
-    sample: Annotated[SampleBlock, Key()]
+    sample: SampleBlock
     published: Annotated[
-        Published | None, Key("Results that the paper reports for this sample, to compare with.")
+        Published | None,
+        Field(description="Results that the paper reports for this sample, to compare with."),
     ] = None
     fixed: Annotated[
-        Mapping[str, Annotated[float, Key(low=0, high=LARGEST_PARAMETER)]] | None,
-        Key("Known values of parameters, by name; these are not identified."),
+        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
+        Field(description="Known values of parameters, by name; these are not identified."),
     ] = None
     contact: Annotated[
-        str | None,
-        Key(
-            "`bilateral`: the jaws can pull the sample (adhesion), as in the paper's equations; "
-            "`unilateral`: contact is lost where the force reaches zero, the free sample recovers, "
-            "and contact may return. It holds for the target only, whose model must be linear; "
-            "identification always assumes bilateral contact. By default bilateral.",
-            choices=("bilateral", "unilateral"),
+        Literal["bilateral", "unilateral"] | None,
+        Field(
+            description="`bilateral`: the jaws can pull the sample (adhesion), as in the paper's "
+            "equations; `unilateral`: contact is lost where the force reaches zero, the free "
+            "sample recovers, and contact may return. It holds for the target only, whose model "
+            "must be linear; identification always assumes bilateral contact. By default bilateral."
         ),
     ] = None
     assumed_gripper: Annotated[
-        Mapping[str, Any] | str | None,
-        Key(
-            "Gripper that the identification assumes, if it differs from the true one: keys of a "
-            "gripper block (with the angle at contact), or `calibrated` for the result of a "
-            "no-load test."
+        _AnyGripper | None,
+        Field(
+            description="Gripper that the identification assumes, if it differs from the true one: "
+            "keys of a gripper block (with the angle at contact), or `calibrated` for the result "
+            "of a no-load test."
         ),
     ] = None
 
@@ -176,7 +212,7 @@ class CaseBlock(Shared):
         yield from self._fixed_problems()
         yield from self._contact_problems()
         yield from self._design_problems()
-        yield from self.of_methods.problems_of(self._genes)
+        yield from self._method_problems()
         yield from self._posterior_problems()
         if self.sample.sample.model.power_law:
             yield from self._band_problems()
@@ -223,6 +259,13 @@ class CaseBlock(Shared):
         if missing:
             text = f"has none for {', '.join(sorted(missing))}, of which nothing else is known."
             yield ("design", "ranges"), text
+
+    def _method_problems(self) -> Iterator[Problem]:
+        """Find settings of methods that conflict with the length of a chromosome."""
+        for name, settings in self.method_blocks.items():
+            if hasattr(settings, "problems_of"):
+                for path, text in settings.problems_of(self._genes):
+                    yield (name, *path), text
 
     def _posterior_problems(self) -> Iterator[Problem]:
         if self.posterior is None:
@@ -281,7 +324,7 @@ class CaseBlock(Shared):
             most = MOST_SAMPLES if measured.coloured else _MOST_SAMPLES
             if not needed <= samples <= most:
                 given = counted(f"{samples:.6g}", "sample")
-                text = f"found {measured.rate_Hz}, which gives {given} over the "
+                text = f"found {measured.rate_Hz:g}, which gives {given} over the "
                 how = " with a coloured noise model" if measured.coloured else ""
                 allowed = f"protocol; allowed are {needed} to {most}{how}."
                 yield ("measurement", "rate_Hz"), text + allowed
@@ -291,7 +334,7 @@ class CaseBlock(Shared):
             yield ("measurement", "times_s"), text
         for index, (before, after) in enumerate(pairwise(times), start=1):
             if not before < after <= end:
-                text = f"found {after}, allowed is later than {before} and at most {end} s."
+                text = f"found {after:g}, allowed is later than {before:g} and at most {end:g} s."
                 yield ("measurement", "times_s", index), text
                 break
 
@@ -326,8 +369,5 @@ class CaseBlock(Shared):
             yield ("calibration", "duration_s"), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
 
 
-OVERRIDABLE = (
-    *(field.name for field in fields(Shared) if field.name != "of_methods"),
-    *dict.fromkeys(name for method in METHODS.values() for name in method.blocks),
-)
+OVERRIDABLE = (*Shared.model_fields, *METHOD_BLOCKS)
 """Blocks that a study sets for all cases, and that a case may change for itself."""

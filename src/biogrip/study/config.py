@@ -1,20 +1,20 @@
 """Top-level keys of a study's config."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any
+
+from pydantic import Field
 
 from biogrip.errors import nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Distinct, OneOf, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.readings import ReadingBlock
-from biogrip.study.sweep_checks import MOST_POINTS
-from biogrip.study.sweeps import SweepBlock
-from biogrip.study.typed import parts
+from biogrip.study.sweeps import MOST_POINTS, SweepBlock
 
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
 """Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
@@ -23,143 +23,135 @@ _MOST_BATCHES = 10_000
 _MOST_CASES = 2000
 # Most names listed in a message.
 _SHOWN = 6
-_CASE_NAME = Key(
-    pattern="[A-Za-z][A-Za-z0-9_-]{0,63}",
-    form="a letter, then up to 63 letters, digits, '_' or '-'",
-)
-_SWEEP_NAME = Key(
-    pattern="[A-Za-z][A-Za-z0-9_]{0,31}", form="a letter, then up to 31 letters, digits or '_'"
-)
+_CaseName = Annotated[
+    str,
+    Field(
+        pattern="^[A-Za-z][A-Za-z0-9_-]{0,63}$",
+        json_schema_extra={"form": "a letter, then up to 63 letters, digits, '_' or '-'"},
+    ),
+]
+_Name = Annotated[
+    str,
+    Field(
+        pattern="^[A-Za-z][A-Za-z0-9_]{0,31}$",
+        json_schema_extra={"form": "a letter, then up to 31 letters, digits or '_'"},
+    ),
+]
 
 
 @dataclass(frozen=True)
-class ModelSelection:
+class ModelSelection(Block):
     """Selection of the simplest adequate sample model by AIC and BIC."""
 
     models: Annotated[
-        tuple[Annotated[str, Key(choices=tuple(CANDIDATES))], ...],
-        Key(
-            "Sample models fitted to every trace, beside that of its case; with an empty list "
-            "none are. A number counts Maxwell branches.",
-            most=100,
-            unique=True,
-        ),
+        tuple[Annotated[str, OneOf(CANDIDATES)], ...], Field(max_length=100), Distinct()
     ]
+    """Sample models fitted to every trace, beside that of its case; with an empty list none are. A
+    number counts Maxwell branches."""
 
 
 @dataclass(frozen=True)
-class Evaluation:
+class Evaluation(Block):
     """Criteria by which identifications count as successful."""
 
-    optimum_tolerance: Annotated[
-        float,
-        Key(
-            "A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by "
-            "at most this. A change of one parameter by its standard deviation raises χ² by one.",
-            above=0,
-            high=100,
-        ),
-    ]
-    near_noise_tolerance: Annotated[
-        float,
-        Key(
-            "A seed counts as near the noise if its misfit exceeds the RMS of the noise in its "
-            "trace by at most this share. With thousands of samples that is a large increase of "
-            "χ², so the fit need not be an optimum.",
-            low=0,
-            high=1,
-        ),
-    ]
+    optimum_tolerance: Annotated[float, Field(gt=0, le=100)]
+    """A seed reaches the global optimum if its χ² exceeds the lowest known of its trace by at most
+    this. A change of one parameter by its standard deviation raises χ² by one."""
+    near_noise_tolerance: Annotated[float, Field(ge=0, le=1)]
+    """A seed counts as near the noise if its misfit exceeds the RMS of the noise in its trace by at
+    most this share. With thousands of samples that is a large increase of χ², so the fit need not
+    be an optimum."""
 
 
-@dataclass(frozen=True, kw_only=True)
 class StudyConfig(Shared):
     """All keys of a study's config."""
 
     study_seed: Annotated[
         int,
-        Key(
-            "The one seed of the study. Noise and genetic algorithm draw from streams derived "
-            "from it, the case's name and the seed's number.",
-            low=0,
-            high=2**64 - 1,
+        Field(
+            ge=0,
+            le=2**64 - 1,
+            description="The one seed of the study. Noise and genetic algorithm draw from streams "
+            "derived from it, the case's name and the seed's number.",
         ),
     ]
     seeds: Annotated[
         int,
-        Key(
-            "Number of noisy traces of each case that are made and identified. Raising it keeps "
-            "the results there are.",
-            low=1,
-            high=1_000_000,
+        Field(
+            ge=1,
+            le=1_000_000,
+            description="Number of noisy traces of each case that are made and identified. Raising "
+            "it keeps the results there are.",
         ),
     ]
     batch_size: Annotated[
         int | None,
-        Key(
-            f"Number of seeds per job. By default {SMALLEST_BATCH}; for more than "
+        Field(
+            ge=1,
+            le=100_000,
+            description=f"Number of seeds per job. By default {SMALLEST_BATCH}; for more than "
             f"{USUAL_BATCHES * SMALLEST_BATCH} seeds, 1/{USUAL_BATCHES} of them, for more than "
             f"{USUAL_BATCHES * LARGEST_BATCH}, {LARGEST_BATCH}. Changes no result, only how much "
             "of a job is start-up.",
-            low=1,
-            high=100_000,
         ),
     ] = None
-    actuator: Annotated[CombDrive, Key("The rotary comb drive (Table 2).")]
+    actuator: Annotated[CombDrive, Field(description="The rotary comb drive (Table 2).")]
     methods: Annotated[
-        tuple[Annotated[str, Key(choices=tuple(METHODS))], ...],
-        Key(
-            "Identification methods applied to every trace. Tables 5-7 and figures of single fits "
-            "show the first.",
-            fewest=1,
-            most=100,
-            unique=True,
+        tuple[Annotated[str, OneOf(METHODS)], ...],
+        Field(
+            min_length=1,
+            max_length=100,
+            description="Identification methods applied to every trace. Tables 5-7 and figures of "
+            "single fits show the first.",
         ),
+        Distinct(),
     ]
-    model_selection: Annotated[ModelSelection, Key()]
-    evaluation: Annotated[Evaluation, Key()]
+    model_selection: ModelSelection
+    evaluation: Evaluation
     reconstructed: Annotated[
         tuple[str, ...],
-        Key(
-            "Keys, or whole blocks, whose values the paper does not give. Tables mark them.",
-            most=1000,
+        Field(
+            max_length=1000,
+            description="Keys, or whole blocks, whose values the paper does not give. Tables mark "
+            "them.",
         ),
     ]
     cases: Annotated[
-        Mapping[Annotated[str, _CASE_NAME], CaseBlock],
-        Key(
-            f"The samples of the study, by name, at most {_MOST_CASES}. Any of the blocks "
-            f"{', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for this "
-            "case alone.",
-            fewest=1,
-            most=_MOST_CASES,
+        Mapping[_CaseName, CaseBlock],
+        Field(
+            min_length=1,
+            max_length=_MOST_CASES,
+            description=f"The samples of the study, by name, at most {_MOST_CASES}. Any of the "
+            f"blocks {', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for "
+            "this case alone.",
         ),
     ]
     only: Annotated[
         tuple[str, ...],
-        Key(
-            "Names of the cases to run; the others are left out. By default all under `cases`.",
-            fewest=1,
-            most=_MOST_CASES,
-            unique=True,
+        Field(
+            min_length=1,
+            max_length=_MOST_CASES,
+            description="Names of the cases to run; the others are left out. By default all under "
+            "`cases`.",
         ),
+        Distinct(),
     ] = ()
     sweeps: Annotated[
-        Mapping[Annotated[str, _SWEEP_NAME], SweepBlock],
-        Key(
-            f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points together. "
-            "Every point is a case that differs in two values; it is identified like others, and "
-            "shown in heat maps and their table only."
+        Mapping[_Name, SweepBlock],
+        Field(
+            description=f"Grids of cases for heat maps, by name, of at most {MOST_POINTS} points "
+            "together. Every point is a case that differs in two values; it is identified like "
+            "others, and shown in heat maps and their table only."
         ),
-    ] = field(default_factory=dict)
+    ] = {}
     readings: Annotated[
-        Mapping[Annotated[str, _SWEEP_NAME], ReadingBlock],
-        Key(
-            "Readings of the paper, by name, each tried with the genetic algorithm on the noisy "
-            "traces of every simulated case, for a table.",
-            most=100,
+        Mapping[_Name, ReadingBlock],
+        Field(
+            max_length=100,
+            description="Readings of the paper, by name, each tried with the genetic algorithm on "
+            "the noisy traces of every simulated case, for a table.",
         ),
-    ] = field(default_factory=dict)
+    ] = {}
 
     def problems(self) -> Iterator[Problem]:
         """Find too many jobs, samples that do not fit, and unknown keys marked as reconstructed."""
@@ -173,8 +165,10 @@ class StudyConfig(Shared):
         for name, case in self.cases.items():
             for path, text in case.contact_problems(self.actuator):
                 yield ("cases", name, *path), text
+        methods = {name: asdict(block) for name, block in self.method_blocks.items()}
+        known = self.model_dump() | methods if self.reconstructed else {}
         for index, key in enumerate(self.reconstructed):
-            if not _exists(self, key):
+            if not _exists(known, key):
                 yield ("reconstructed", index), f"found '{key}', allowed is a key of this study."
         for index, name in enumerate(self.only):
             if name not in self.cases:
@@ -194,13 +188,11 @@ class StudyConfig(Shared):
     @property
     def chosen(self) -> "StudyConfig":
         """The study with only the cases that `only` names."""
-        return replace(self, cases={name: self.cases[name] for name in self.only or self.cases})
+        cases = {name: self.cases[name] for name in self.only or self.cases}
+        return self.model_copy(update={"cases": cases})
 
 
 def _exists(block: Any, key: str) -> bool:
     for part in key.split("."):
-        inner = dict(parts(block)) if not isinstance(block, tuple) else {}
-        if inner.get(part) is None:
-            return False
-        block = inner[part]
-    return True
+        block = block.get(part) if isinstance(block, Mapping) else None
+    return block is not None

@@ -4,37 +4,37 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibrated_gripper import ARM_KEYS
 from biogrip.instrument.contact import Contact, contact
 from biogrip.instrument.gripper import Gripper
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, OneOf, Problem
 
 # Share of an arm's property; a larger change of the response would not be linear.
 _MOST_UNCERTAIN = 0.5
 
-_Uncertainties = Annotated[
-    Mapping[Annotated[str, Key(choices=ARM_KEYS)], Annotated[float, Key(low=0, high=1e3)]], Key()
-]
+_Uncertainties = Mapping[Annotated[str, OneOf(ARM_KEYS)], Annotated[float, Field(ge=0, le=1e3)]]
 
 
 @dataclass(frozen=True)
-class Uncertainty:
+class Uncertainty(Block):
     """Standard uncertainties of a calibrated gripper, arm by arm; all intervals include them."""
 
-    left: Annotated[_Uncertainties | None, Key("Uncertainties of the left arm's keys.")] = None
-    right: Annotated[_Uncertainties | None, Key("Uncertainties of the right arm's keys.")] = None
+    left: _Uncertainties | None = None
+    """Uncertainties of the left arm's keys."""
+    right: _Uncertainties | None = None
+    """Uncertainties of the right arm's keys."""
 
 
 @dataclass(frozen=True)
 class GripperBlock(Gripper):
     """The gripper's two arms and jaw gap (Table 1)."""
 
-    jaw_gap_m: Annotated[
-        float,
-        Key("Distance between the jaws in the neutral configuration.", "m", low=1e-9, high=1.0),
-    ]
-    uncertainty: Annotated[Uncertainty | None, Key()] = None
+    jaw_gap_m: Annotated[float, Field(ge=1e-9, le=1.0)]
+    """Distance between the jaws in the neutral configuration."""
+    uncertainty: Uncertainty | None = None
 
     @property
     def uncertainties(self) -> dict[str, Mapping[str, float]]:

@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.numbers import with_numbers
+from biogrip.study.config import StudyConfig
+from biogrip.study.schema import schema_of
 from biogrip.study.source import overlaid, read_config, read_places
 from biogrip.study.study import Study
-from biogrip.study.validation import STUDY, checked
+from biogrip.study.validation import checked_study
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
@@ -51,8 +52,8 @@ def load_study(
         If anything in the config cannot be used.
     """
     places = read_places(files, command_line)
-    complete = _fill_in(with_numbers(STUDY, config))
-    return Study(checked(complete, places, for_workflow=for_workflow))
+    complete = _fill_in(schema_of(StudyConfig).with_numbers(config))
+    return Study(checked_study(complete, places, for_workflow=for_workflow))
 
 
 def _fill_in(config: dict[str, Any]) -> dict[str, Any]:

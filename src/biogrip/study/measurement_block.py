@@ -4,9 +4,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.sampling import Burst, Sampling
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, OneOf, Problem
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
 
@@ -15,95 +17,42 @@ NOISE_MODELS = ("white", COLOURED)
 
 
 @dataclass(frozen=True, kw_only=True)
-class MeasurementBlock:
+class MeasurementBlock(Block):
     """Sampling and noise of the left arm's rotation, or the file of a recorded trace."""
 
-    rate_Hz: Annotated[
-        float, Key("Sampling rate; the first sample is at t = 0.", "Hz", low=1e-9, high=1e9)
-    ]
+    rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
+    """Sampling rate; the first sample is at t = 0."""
     times_s: Annotated[
-        tuple[Annotated[float, Key(low=0, high=1e9)], ...],
-        Key(
-            "Sampling times, ascending, instead of a uniform rate; more of them need rate_Hz "
-            "or bursts.",
-            "s",
-            fewest=2,
-            most=5000,
-        ),
+        tuple[Annotated[float, Field(ge=0, le=1e9)], ...], Field(min_length=2, max_length=5000)
     ] = ()
-    bursts: Annotated[
-        tuple[Burst, ...],
-        Key(
-            "Successive bursts of samples instead of a uniform rate, as of a camera that is fast "
-            "after every step. See docs/design.md.",
-            fewest=1,
-            most=20_000,
-        ),
-    ] = ()
-    file: Annotated[
-        str | None,
-        Key(
-            "A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. "
-            'See "Your own measurement".',
-            fewest=1,
-            most=4000,
-        ),
-    ] = None
-    time: Annotated[
-        str | None,
-        Key(
-            "Name of the file's column of times, counted from the start of the protocol.",
-            fewest=1,
-            most=4000,
-        ),
-    ] = None
-    rotation: Annotated[
-        str | None,
-        Key("Name of the file's column of the left arm's closing rotation.", fewest=1, most=4000),
-    ] = None
-    time_unit: Annotated[
-        str | None,
-        Key(
-            "Unit of the times, where the column's name does not end in it.",
-            choices=tuple(TIME_UNITS),
-        ),
-    ] = None
-    rotation_unit: Annotated[
-        str | None,
-        Key(
-            "Unit of the rotations, where the column's name does not end in it.",
-            choices=tuple(ROTATION_UNITS),
-        ),
-    ] = None
-    noise_rad: Annotated[
-        float | None,
-        Key(
-            "Standard deviation of the recorded noise, if it is known; by default it is estimated "
-            "from the residuals.",
-            "rad",
-            low=1e-15,
-            high=10,
-        ),
-    ] = None
-    offset: Annotated[
-        bool,
-        Key("If true, fit a constant offset of the instrument along. By default false."),
-    ] = False
-    drift: Annotated[
-        bool,
-        Key("If true, fit a linear drift of the instrument along. By default false."),
-    ] = False
-    noise_model: Annotated[
-        str | None,
-        Key(
-            "Model of the noise when a trace is judged. `white`: samples are independent; "
-            "`coloured`: noise may be autocorrelated (AR(1), 1/f), and outliers are left out, so "
-            "that intervals are wider and keep their coverage; every identification, judged or "
-            "not, then fits an offset and a drift along. By default white.",
-            choices=NOISE_MODELS,
-        ),
-    ] = None
-    noise: Annotated[Noise, Key()]
+    """Sampling times, ascending, instead of a uniform rate; more of them need rate_Hz or bursts."""
+    bursts: Annotated[tuple[Burst, ...], Field(min_length=1, max_length=20_000)] = ()
+    """Successive bursts of samples instead of a uniform rate, as of a camera that is fast after
+    every step. See docs/design.md."""
+    file: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
+    "Your own measurement"."""
+    time: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """Name of the file's column of times, counted from the start of the protocol."""
+    rotation: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """Name of the file's column of the left arm's closing rotation."""
+    time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
+    """Unit of the times, where the column's name does not end in it."""
+    rotation_unit: Annotated[str | None, OneOf(ROTATION_UNITS)] = None
+    """Unit of the rotations, where the column's name does not end in it."""
+    noise_rad: Annotated[float | None, Field(ge=1e-15, le=10)] = None
+    """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
+    residuals."""
+    offset: bool = False
+    """If true, fit a constant offset of the instrument along. By default false."""
+    drift: bool = False
+    """If true, fit a linear drift of the instrument along. By default false."""
+    noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
+    """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
+    noise may be autocorrelated (AR(1), 1/f), and outliers are left out, so that intervals are wider
+    and keep their coverage; every identification, judged or not, then fits an offset and a drift
+    along. By default white."""
+    noise: Noise
 
     @property
     def coloured(self) -> bool:

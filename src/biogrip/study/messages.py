@@ -1,17 +1,20 @@
-"""Error messages about plain config values: what was found, and what is allowed."""
+"""Messages about config values, from pydantic's errors: what was found, and what is allowed."""
 
-import math
-from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from biogrip.digits import counted
 from biogrip.errors import nearest
-from biogrip.keys import Key, Problem
-from biogrip.study.models import FORM, TWICE, errors_in, word
-from biogrip.study.typed import Shape, keys, spread
+from biogrip.keys import CONFLICT, TWICE, Problem
+from biogrip.study.plain import built
+from biogrip.study.schema import Schema, schema_of
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, nearest_unit
 
+T = TypeVar("T")
 MOST_EXPLAINED = 1000
 
 # Keys of earlier versions of the config, by their last two names.
@@ -20,43 +23,64 @@ _RETIRED: dict[tuple[int | str, ...], str] = {
     "their inertia. Leave it out.",
 }
 
-_UNITS = (tuple(TIME_UNITS), tuple(ROTATION_UNITS))
+_UNITS = ([*TIME_UNITS], [*ROTATION_UNITS])
+_BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 _LONGEST = 40
-_KEY = "[key]"
 
 
-def value_problems(shape: Shape, value: Any) -> Iterator[Problem]:
-    """Yield an error message for every part of a value that is not allowed.
+def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
+    """Build a config block, or find what is not allowed in it.
 
     Parameters
     ----------
-    shape
-        Schema of the value.
-    value
-        Plain value from a config file.
+    kind
+        Class of the block.
+    block
+        Plain keys and values from a config file.
 
-    Yields
-    ------
-    tuple
-        Path of a key in the value, and a message: what was found and what is allowed.
+    Returns
+    -------
+    block
+        The block; None if it cannot be built.
+    problems
+        Path of a key in the block, and a message: what was found and what is allowed.
     """
-    # A NaN passes every comparison with a bound, so refuse it first.
-    odd = list(_not_finite((), value))
-    if odd:
-        yield from odd
-        return
-    errors = sorted(errors_in(shape, value), key=lambda error: [str(p) for p in error["loc"]])
-    for error in islice(errors, MOST_EXPLAINED):
-        path, leaf, above = _found_at(shape, error["loc"])
-        yield _explained(path, leaf, above, error["type"], error["input"])
+    empty = [(path, _nothing(schema_of(kind), path)) for path in _empty((), block)]
+    found: list[Problem] = [(path, text) for path, text in empty if text]
+    errors: list[ErrorDetails] = []
+    try:
+        value = built(kind, block, check=not found)
+    except ValidationError as error:
+        value, errors = None, error.errors(include_url=False)
+    errors.sort(key=lambda error: [str(part) for part in error["loc"]])
+    explained = (_explained(schema_of(kind), error) for error in islice(errors, MOST_EXPLAINED))
+    return value, [*found, *(problem for problem in explained if problem[1])]
 
 
-def shape_at(shape: Shape, path: Sequence[str]) -> Shape:
-    """Return the schema of a key's value, blocks by name."""
-    for name in path:
-        assert shape.block is not None
-        shape = keys(shape.block)[name].shape
-    return shape
+def _empty(path: tuple[Hashable, ...], value: Any) -> Iterator[tuple[Hashable, ...]]:
+    """Find keys without a value."""
+    if value is None:
+        yield path
+    for key, inner in inside(value):
+        yield from _empty((*path, key), inner)
+
+
+def _nothing(schema: Schema, path: tuple[Hashable, ...]) -> str | None:
+    for part in path:
+        schema = schema.option("a block of keys").inside(part)
+    return f"found nothing, allowed is {schema.word}." if schema.node else None
+
+
+def unknown(name: object, allowed: list[str]) -> str:
+    """Return the message about a key that a block does not have."""
+    return f"unknown key.{nearest(name, allowed)} Allowed here: {', '.join(allowed)}."
+
+
+def inside(value: Any) -> Iterable[tuple[Any, Any]]:
+    """Return what is in a block or a list, by key or index."""
+    if isinstance(value, Mapping):
+        return value.items()
+    return enumerate(value) if isinstance(value, list) else ()
 
 
 def bound(limit: float) -> str:
@@ -64,74 +88,61 @@ def bound(limit: float) -> str:
     return f"{limit:g}" if isinstance(limit, float) else str(limit)
 
 
-def _found_at(
-    shape: Shape, loc: tuple[int | str, ...]
-) -> tuple[tuple[int | str, ...], Shape, Shape]:
-    """Return where pydantic found an error: path, schema there, and schema of the block around."""
-    path: list[int | str] = []
-    above = shape
-    for part in loc:
-        if part == _KEY and above.names:
-            return tuple(path), above.names, above
-        chosen = [option for option in shape.options if word(option) == part]
-        if chosen:
-            (shape,) = chosen
-            continue
-        path.append(part)
-        above, shape = shape, _inside(shape, part)
-    return tuple(path), shape, above
+def _explained(schema: Schema, error: ErrorDetails) -> Problem:
+    path: tuple[int | str, ...] = ()
+    above = leaf = schema
+    for part in error["loc"][1:]:
+        chosen = leaf.option(str(part))
+        if part == "[key]":
+            leaf = above.within(above.get("propertyNames"))
+        elif chosen is not leaf:
+            leaf = chosen
+        else:
+            path, above, leaf = (*path, part), leaf, leaf.inside(part)
+    if error["type"] == "literal_error" and error["loc"][-1] == "[key]":
+        # An unknown key of a mapping is reported for the block that contains it.
+        path = path[:-1]
+    return path, _text(path, leaf, above, error)
 
 
-def _inside(shape: Shape, part: int | str) -> Shape:
-    if shape.block:
-        entry, rest = keys(shape.block).get(str(part)), spread(shape.block)
-        inner = entry.shape if entry else rest.shape.values if rest else None
-    else:
-        inner = shape.items or shape.values
-    return inner or Shape(Key(), scalar=object)
-
-
-def _explained(
-    path: tuple[int | str, ...], leaf: Shape, above: Shape, error: str, found: Any
-) -> Problem:
-    key = leaf.key
-    match error:
-        case "extra_forbidden" if path[-2:] in _RETIRED:
-            return path, f"unknown key, {_RETIRED[path[-2:]]}"
-        case "extra_forbidden" if above.block:
-            allowed = list(keys(above.block))
-            hint = nearest(path[-1], allowed)
-            return path, f"unknown key.{hint} Allowed here: {', '.join(allowed)}."
+def _text(path: tuple[int | str, ...], leaf: Schema, above: Schema, error: ErrorDetails) -> str:
+    found = error["input"]
+    match error["type"]:
+        case "extra_forbidden" | "unexpected_keyword_argument" if path[-2:] in _RETIRED:
+            return f"unknown key, {_RETIRED[path[-2:]]}"
+        case "extra_forbidden" | "unexpected_keyword_argument":
+            return unknown(path[-1], [*above.keys])
         case "missing":
-            return path, "is missing and has no default."
+            return "is missing and has no default."
         case "literal_error":
-            # An unknown key of a mapping is reported for the block that contains it.
-            place = path[:-1] if above.names is leaf else path
-            known = nearest_unit if key.choices in _UNITS else nearest
-            hint = known(found, key.choices)
-            return place, f"found {_shown(found)}.{hint} Allowed: {', '.join(key.choices)}."
-        case _ if error == FORM and above.names is leaf:
+            choices = leaf.get("enum")
+            hint = (nearest_unit if choices in _UNITS else nearest)(found, choices)
+            return f"found {_shown(found)}.{hint} Allowed: {', '.join(choices)}."
+        case "string_pattern_mismatch" if error["loc"][-1] == "[key]":
             kind = str(path[-2]).removesuffix("s")
-            return path, f"not a usable {kind} name: {key.form} (it names files)."
-        case _ if error == FORM:
-            return path, f"found {_shown(found)}, allowed is {key.form}."
-        case _ if error == TWICE:
-            return path, "holds something twice; allowed is every item once."
+            return f"not a usable {kind} name: {leaf.get('form')} (it names files)."
+        case "string_pattern_mismatch":
+            return f"found {_shown(found)}, allowed is {leaf.get('form')}."
+        case _ if error["type"] == TWICE:
+            return "holds something twice; allowed is every item once."
+        case _ if error["type"] == CONFLICT:
+            return error["msg"]
         case "too_short" | "too_long" | "string_too_short" | "string_too_long":
-            return path, _length(key, found)
+            return _length(found, error["ctx"], leaf.get("maxItems"))
         case "greater_than" | "greater_than_equal" | "less_than_equal":
-            return path, f"found {_shown(found)}, allowed is {_range(key)}."
-    return path, f"found {_shown(found)}, allowed is {word(leaf)}."
+            return f"found {_shown(found)}, allowed is {_range(leaf)}."
+    return f"found {_shown(found)}, allowed is {leaf.word}."
 
 
-def _length(key: Key, found: Any) -> str:
-    few = key.fewest is not None and len(found) < key.fewest
-    words, limit = ("at least", key.fewest) if few else ("at most", key.most)
+def _length(found: Any, limits: Mapping[str, Any], most: int | None) -> str:
+    few = "min_length" in limits
+    if few and len(found) >= limits["min_length"]:
+        # Items that are not valid do not count.
+        return "" if most is None or len(found) <= most else _length(found, {"max_length": most}, 0)
+    words, limit = ("at least", limits["min_length"]) if few else ("at most", limits["max_length"])
     if isinstance(found, str):
-        return (
-            f"found {_shown(found)} of {counted(len(found), 'character')}, allowed are "
-            f"{words} {limit}."
-        )
+        count = counted(len(found), "character")
+        return f"found {_shown(found)} of {count}, allowed are {words} {limit}."
     if isinstance(found, Mapping):
         if not found:
             return "is empty; at least one is needed."
@@ -139,10 +150,13 @@ def _length(key: Key, found: Any) -> str:
     return f"found a list of {len(found)}, allowed are {words} {counted(limit, 'item')}."
 
 
-def _range(key: Key) -> str:
-    bounds = {"greater than": key.above, "at least": key.low, "at most": key.high}
-    limits = [f"{words} {bound(limit)}" for words, limit in bounds.items() if limit is not None]
-    return " and ".join(limits) + (f" {key.unit}" if key.unit else "")
+def _range(leaf: Schema) -> str:
+    limits = [
+        f"{words} {bound(leaf.get(name))}"
+        for name, words in _BOUNDS.items()
+        if leaf.get(name) is not None
+    ]
+    return " and ".join(limits) + (f" {leaf.get('unit')}" if leaf.get("unit") else "")
 
 
 def _shown(value: Any) -> str:
@@ -154,17 +168,3 @@ def _shown(value: Any) -> str:
         return "a list"
     text = repr(value)
     return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
-
-
-def _not_finite(path: tuple[Hashable, ...], value: Any) -> Iterator[Problem]:
-    if isinstance(value, float):
-        if not math.isfinite(value):
-            yield path, f"found {value}, allowed is a finite number."
-        return
-    if isinstance(value, Mapping):
-        inside: Iterable[tuple[Hashable, Any]] = value.items()
-    else:
-        inside = enumerate(value) if isinstance(value, list) else ()
-    for key, inner in inside:
-        if not isinstance(inner, str | int):
-            yield from _not_finite((*path, key), inner)

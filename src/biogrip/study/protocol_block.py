@@ -5,85 +5,42 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Annotated
 
+from pydantic import Field
+
 from biogrip.experiment.protocol import Harmonic, Load, Phase, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
-from biogrip.keys import Key, Problem
+from biogrip.keys import Block, Problem
 
 _LONGEST_S = 1e9
 _MOST_PERIODS = 10_000
 
 
 @dataclass(frozen=True)
-class PhaseBlock:
+class PhaseBlock(Block):
     """A phase of the protocol: a hold, a ramp or a sinusoid, in torque or in voltage."""
 
-    duration_s: Annotated[
-        float,
-        Key(
-            "Duration of the phase; of all together at most 1e9 s.", "s", low=1e-6, high=_LONGEST_S
-        ),
-    ]
-    torque_Nm: Annotated[
-        float | None,
-        Key(
-            "Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp.",
-            "N m",
-            low=0,
-            high=1.0,
-        ),
-    ] = None
-    to_torque_Nm: Annotated[
-        float | None, Key("Torque at the end of a ramp.", "N m", low=0, high=1.0)
-    ] = None
-    amplitude_Nm: Annotated[
-        float | None,
-        Key(
-            "Amplitude of a sinusoid on top of a held torque; needs frequency_Hz.",
-            "N m",
-            low=0,
-            high=1.0,
-        ),
-    ] = None
-    torque_right_Nm: Annotated[
-        float | None,
-        Key("Held torque of the right arm, where it differs.", "N m", low=0, high=1.0),
-    ] = None
-    voltage_V: Annotated[
-        float | None,
-        Key(
-            "Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts "
-            "it to grip torque, counted from contact; the voltage that closes the jaws onto a "
-            "sample comes on top.",
-            "V",
-            low=0,
-            high=1e4,
-        ),
-    ] = None
-    to_voltage_V: Annotated[
-        float | None, Key("Voltage at the end of a ramp of the voltage.", "V", low=0, high=1e4)
-    ] = None
-    amplitude_V: Annotated[
-        float | None,
-        Key(
-            "Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz.",
-            "V",
-            low=0,
-            high=1e4,
-        ),
-    ] = None
-    voltage_right_V: Annotated[
-        float | None,
-        Key("Held voltage of the right arm, where it differs.", "V", low=0, high=1e4),
-    ] = None
-    frequency_Hz: Annotated[
-        float | None,
-        Key(
-            "Frequency of the sinusoid, which starts at its mean, rising.",
-            "Hz",
-            low=1e-9,
-            high=1e9,
-        ),
-    ] = None
+    duration_s: Annotated[float, Field(ge=1e-6, le=_LONGEST_S)]
+    """Duration of the phase; of all together at most 1e9 s."""
+    torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Closing torque of both arms, held or, with to_torque_Nm, at the start of a ramp."""
+    to_torque_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Torque at the end of a ramp."""
+    amplitude_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Amplitude of a sinusoid on top of a held torque; needs frequency_Hz."""
+    torque_right_Nm: Annotated[float | None, Field(ge=0, le=1.0)] = None
+    """Held torque of the right arm, where it differs."""
+    voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Voltage on both comb drives, instead of torque_Nm. As in the paper, eq. (9) converts it to
+    grip torque, counted from contact; the voltage that closes the jaws onto a sample comes on
+    top."""
+    to_voltage_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Voltage at the end of a ramp of the voltage."""
+    amplitude_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz."""
+    voltage_right_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
+    """Held voltage of the right arm, where it differs."""
+    frequency_Hz: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
+    """Frequency of the sinusoid, which starts at its mean, rising."""
 
     @property
     def drives(self) -> bool:
@@ -133,17 +90,11 @@ class PhaseBlock:
 
 
 @dataclass(frozen=True)
-class ProtocolBlock:
+class ProtocolBlock(Block):
     """Torques or voltages of the comb drives over time (Figure 3)."""
 
-    phases: Annotated[
-        tuple[PhaseBlock, ...],
-        Key(
-            "Phases that follow one another from t = 0; the experiment ends with the last.",
-            fewest=1,
-            most=1000,
-        ),
-    ]
+    phases: Annotated[tuple[PhaseBlock, ...], Field(min_length=1, max_length=1000)]
+    """Phases that follow one another from t = 0; the experiment ends with the last."""
 
     @property
     def end_s(self) -> float:

@@ -2,25 +2,22 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
-from biogrip.keys import Key, printed
+from biogrip.keys import Block, Printed
 from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.plain import plain
 from biogrip.study.source import overlaid
-from biogrip.study.typed import plain
 
 
 @dataclass(frozen=True)
-class ReadingBlock:
+class ReadingBlock(Block):
     """An alternative interpretation of the paper: changes to every simulated case."""
 
-    title: Annotated[str, printed("Name in print.")]
-    changes: Annotated[
-        Mapping[str, Any],
-        Key(
-            "Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."
-        ),
-    ]
+    title: Printed
+    """Name in print."""
+    changes: Mapping[str, Any]
+    """Merged into each case, with keys of a case, e.g. `genetic_algorithm: {patience: 60}`."""
 
 
 def read_blocks(

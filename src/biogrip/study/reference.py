@@ -2,24 +2,35 @@
 
 import json
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import yaml
 
-from biogrip.study.case_blocks import OVERRIDABLE
+from biogrip.keys import Block
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import bound
-from biogrip.study.models import json_schema
-from biogrip.study.typed import Shape, keys, spread
+from biogrip.study.schema import Schema, tidy
 
 _NO_DEFAULT = "–"
 _MOST_LISTED = 6
-_WORDS = {int: "integer", float: "number", str: "text", bool: "boolean"}
+_SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
+_WORDS = {"string": "text", "object": "block"}
 
 _Row = tuple[str, str, str, str, str]
+
+
+@cache
+def documented() -> dict[str, Any]:
+    """Return the JSON Schema of a config, with the docstrings of keys, which jobs do not read."""
+    Block.__pydantic_config__["use_attribute_docstrings"] = True
+    for model in (CaseBlock, StudyConfig):
+        model.model_rebuild(force=True)
+    found: dict[str, Any] = tidy(StudyConfig.model_json_schema())
+    return found
 
 
 def reference(config: Path) -> str:
@@ -33,28 +44,21 @@ def reference(config: Path) -> str:
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
     general: list[_Row] = []
     sections: list[str] = []
-    for name, entry in keys(StudyConfig).items():
-        shape = entry.shape
-        named = shape.values.block if shape.values else None
-        if named:
-            own = {key: e.shape for key, e in keys(named).items() if key not in OVERRIDABLE}
-            rows = [
-                row
-                for key, inner in own.items()
-                for row in _rows(f"{name}.NAME.{key}", inner, None)
-            ]
-            sections.append(_section(name, shape.text, rows))
-        elif shape.block:
-            rows = list(_rows(name, shape, defaults.get(name)))
-            sections.append(_section(name, shape.text, rows))
+    for name, schema in Schema(documented(), documented()["$defs"]).keys.items():
+        rows = list(_rows(name, schema, defaults.get(name)))
+        if named := schema.values.keys:
+            own = {key: inner for key, inner in named.items() if key not in OVERRIDABLE}
+            rows = [row for key, it in own.items() for row in _rows(f"{name}.NAME.{key}", it, None)]
+        if named or schema.keys:
+            sections.append(_section(name, schema.get("description", ""), rows))
         else:
-            general += _rows(name, shape, defaults.get(name))
+            general += rows
     return "\n\n".join([_section("General", "", general), *sections])
 
 
 def file_schema() -> str:
     """Return the JSON Schema of a config file, with all keys optional, as files are merged."""
-    schema = _partial(json_schema(StudyConfig))
+    schema = _partial(documented())
     cases = schema["properties"]["cases"]
     ((name, case),) = cases["patternProperties"].items()
     # A case set to null is dropped.
@@ -64,10 +68,13 @@ def file_schema() -> str:
 
 def _partial(node: Any, name: str = "") -> Any:
     if isinstance(node, Mapping):
-        left = {"required", "title", "default"} if name != "properties" else set()
+        left = {"required", "title", "default", "form"} if name != "properties" else set()
         return {key: _partial(inner, key) for key, inner in node.items() if key not in left}
     if isinstance(node, list):
         return [_partial(item) for item in node]
+    if name == "pattern":
+        # \w of a JSON Schema matches ASCII letters only.
+        return node.replace(r"\w", r"\w\u00aa-\uffff")
     # Pydantic versions differ in writing integral numbers as int or float.
     return int(node) if isinstance(node, float) and node.is_integer() else node
 
@@ -78,56 +85,55 @@ def _section(title: str, text: str, rows: list[_Row]) -> str:
     return "\n\n".join(part for part in (f"### {title}", text, table) if part)
 
 
-def _rows(path: str, shape: Shape, default: Any) -> Iterator[_Row]:
-    items = shape.items.block if shape.items else None
-    if shape.block:
-        for key, entry in keys(shape.block).items():
-            inner = default.get(key) if isinstance(default, Mapping) else None
-            yield from _rows(f"{path}.{key}", entry.shape, inner)
-        rest = spread(shape.block)
-        if rest and rest.shape.values:
-            values = rest.shape.values
-            said = replace(values, key=replace(values.key, text=rest.shape.text))
-            yield _row(f"{path}.NAME", said, _NO_DEFAULT)
+def _rows(path: str, schema: Schema, default: Any) -> Iterator[_Row]:
+    items = schema.inside(0).keys
+    if schema.keys:
+        for key, inner in schema.keys.items():
+            given = default.get(key) if isinstance(default, Mapping) else None
+            yield from _rows(f"{path}.{key}", inner, given)
+        if schema.values.node:
+            yield _row(f"{path}.NAME", schema.values, _NO_DEFAULT)
     elif items:
-        shown = _NO_DEFAULT if default is None else "see Figure 3 in `config.yaml`"
-        yield _row(path, shape, shown)
-        for key, entry in keys(items).items():
-            yield from _rows(f"{path}[].{key}", entry.shape, None)
+        yield _row(
+            path, schema, _NO_DEFAULT if default is None else "see Figure 3 in `config.yaml`"
+        )
+        for key, inner in items.items():
+            yield from _rows(f"{path}[].{key}", inner, None)
     else:
-        yield _row(path, shape, _NO_DEFAULT if default is None else _shown(default))
+        yield _row(path, schema, _NO_DEFAULT if default is None else _shown(default))
 
 
-def _row(path: str, shape: Shape, default: str) -> _Row:
-    return f"`{path}`", shape.text, shape.key.unit, default, _allowed(shape)
+def _row(path: str, schema: Schema, default: str) -> _Row:
+    text, unit = schema.get("description", ""), schema.get("unit", "")
+    return f"`{path}`", text, unit, default, _allowed(schema)
 
 
-def _allowed(shape: Shape) -> str:
-    key = shape.key
-    if shape.options:
-        return " or ".join(_allowed(option) for option in shape.options)
-    if key.choices:
-        return _listed(key.choices)
-    if shape.items:
-        if shape.items.key.choices:
-            return f"list of {_allowed(shape.items)}"
-        most = " or more" if key.most is None else f" to {key.most}"
-        count = "" if key.fewest is None else f"{key.fewest}{most} "
-        if key.fewest is not None and key.fewest == key.most:
-            count = f"{key.fewest} "
-        return f"list of {count}{_allowed(shape.items)}"
-    if shape.names and shape.values:
-        if shape.values.scalar is object:
-            return "block"
-        names = f" of {_listed(shape.names.key.choices)}" if shape.names.key.choices else ""
-        return f"block{names}: {_allowed(shape.values)}"
-    limits = {"> ": key.above, "≥ ": key.low, "≤ ": key.high}
-    bounds = [f"{sign}{bound(limit)}" for sign, limit in limits.items() if limit is not None]
-    kind = _WORDS.get(shape.scalar, "block") if shape.scalar else "block"
-    return f"{kind} {', '.join(bounds)}".strip()
+def _allowed(schema: Schema) -> str:
+    if schema.options:
+        return " or ".join(_allowed(option) for option in schema.options)
+    if "enum" in schema.node:
+        return _listed(schema.get("enum"))
+    if schema.get("type") == "array":
+        return _list_allowed(schema)
+    if schema.get("type") == "object" and not schema.keys:
+        names = schema.get("propertyNames", {}).get("enum")
+        which = f" of {_listed(names)}" if names else ""
+        return f"block{which}: {_allowed(schema.values)}" if schema.values.node else "block"
+    limits = {sign: schema.get(name) for name, sign in _SIGNS.items()}
+    bounds = [f"{sign} {bound(limit)}" for sign, limit in limits.items() if limit is not None]
+    kind = schema.get("type", "block")
+    return f"{_WORDS.get(kind, kind)} {', '.join(bounds)}".strip()
 
 
-def _listed(choices: tuple[str, ...]) -> str:
+def _list_allowed(schema: Schema) -> str:
+    fewest, most, item = schema.get("minItems"), schema.get("maxItems"), schema.inside(0)
+    if fewest is None or "enum" in item.node:
+        return f"list of {_allowed(item)}"
+    count = fewest if fewest == most else f"{fewest} {f'to {most}' if most else 'or more'}"
+    return f"list of {count} {_allowed(item)}"
+
+
+def _listed(choices: list[str]) -> str:
     return ", ".join(f"`{choice}`" for choice in choices)
 
 

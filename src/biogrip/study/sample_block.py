@@ -1,51 +1,65 @@
 """Config block of the sample: constitutive model and true parameters."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated
+
+from pydantic import BaseModel, Field
 
 from biogrip.errors import nearest
 from biogrip.experiment.sample import MODELS, MOST_BRANCHES, Parameter, Sample, SampleModel
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
-from biogrip.keys import Key, Problem
+from biogrip.keys import OPEN, Checked, OneOf, Problem
 
 LARGEST_PARAMETER = 1e12
 _LEAST_PARAMETER = 1e-18
 
 
-@dataclass(frozen=True)
-class SampleBlock:
+class SampleBlock(Checked, BaseModel):
     """Constitutive model of the sample and its true parameters."""
+
+    model_config = OPEN
+    __pydantic_extra__: dict[
+        str,
+        Annotated[
+            float,
+            Field(
+                le=LARGEST_PARAMETER,
+                description="True values of the model's parameters, by name, SI units.",
+            ),
+        ],
+    ] = Field(init=False)
 
     model: Annotated[
         str,
-        Key(
-            'Constitutive model; which parameters it has is listed under "Sample models".',
-            choices=tuple(MODELS),
+        OneOf(MODELS),
+        Field(
+            description='Constitutive model; which parameters it has is listed under "Sample '
+            'models".'
         ),
-    ]
-    parameters: Annotated[
-        Mapping[str, Annotated[float, Key(high=LARGEST_PARAMETER)]],
-        Key("True values of the model's parameters, by name, SI units.", spread=True),
     ]
     branches: Annotated[
         int,
-        Key(
-            "Number of Maxwell branches of `generalized_maxwell`; with more than one, its "
-            "parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
-            low=1,
-            high=MOST_BRANCHES,
+        Field(
+            ge=1,
+            le=MOST_BRANCHES,
+            description="Number of Maxwell branches of `generalized_maxwell`; with more than one, "
+            "its parameters are k_1, k_2, ..., k_p, c_1, c_2, ..., c_p. By default 1.",
         ),
     ] = 1
     size_m: Annotated[
         float | None,
-        Key(
-            "Diameter of the sample. It decides at which angle the jaws touch the sample.",
-            "m",
-            low=SMALLEST_M,
-            high=LARGEST_M,
+        Field(
+            ge=SMALLEST_M,
+            le=LARGEST_M,
+            description="Diameter of the sample. It decides at which angle the jaws touch the "
+            "sample.",
         ),
     ] = None
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """True values of the model's parameters, by name."""
+        return self.__pydantic_extra__
 
     @property
     def sample(self) -> Sample:
@@ -79,7 +93,7 @@ def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Itera
         value = values[parameter.name]
         if value < _LEAST_PARAMETER and not (value == 0 and parameter.may_vanish):
             zero = "0 or " if parameter.may_vanish else ""
-            text = f"found {value}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
+            text = f"found {value:g}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
             yield (parameter.name,), f"{text} {parameter.unit}".rstrip() + "."
         elif not value < parameter.below:
             text = f"found {value:g}, allowed is above 0 and below {parameter.below:g}."

@@ -11,7 +11,7 @@ from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
 from biogrip.experiment.sampling import Sampling
-from biogrip.experiment.truth import Published, Truth
+from biogrip.experiment.truth import UNPUBLISHED, Published, Truth
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -22,10 +22,10 @@ from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
+from biogrip.study.plain import built, plain
 from biogrip.study.readings import read_blocks
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, make_sweeps, point_blocks
-from biogrip.study.typed import built, plain
 from biogrip.traces.recordings import Columns
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ class Case:
     @property
     def published(self) -> Published:
         """Results that the paper reports for the sample."""
-        return self.block.published or Published()
+        return self.block.published or UNPUBLISHED
 
     @property
     def truth(self) -> Truth:
@@ -218,7 +218,7 @@ class Case:
 
     def method(self, name: str) -> object:
         """Return the settings of an identification method."""
-        return self.block.of_methods.of(name)
+        return self.block.method(name)
 
     @cached_property
     def methods(self) -> dict[str, object]:
@@ -233,7 +233,7 @@ class Case:
     @property
     def genetic(self) -> GeneticSettings:
         """Settings of the genetic algorithm."""
-        settings = self.block.of_methods.block("genetic_algorithm")
+        settings = self.block.method_block("genetic_algorithm")
         assert isinstance(settings, GeneticSettings)
         return settings
 

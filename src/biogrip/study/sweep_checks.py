@@ -5,7 +5,9 @@ from collections.abc import Iterator, Mapping
 from biogrip.errors import nearest
 from biogrip.keys import Problem
 from biogrip.study.case_blocks import CaseBlock, Shared
+from biogrip.study.schema import Schema, schema_of
 from biogrip.study.sweeps import (
+    MOST_POINTS,
     AxisBlock,
     Point,
     Sweep,
@@ -15,10 +17,8 @@ from biogrip.study.sweeps import (
     make_axis,
     make_sweeps,
 )
-from biogrip.study.typed import keys
 
 _AXES = ("rows", "columns")
-MOST_POINTS = 2000
 _LONGEST_NAME = 200
 
 
@@ -106,7 +106,7 @@ def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
         yield ("values",), "holds blocks and single values; allowed is one kind of them."
         return
     (with_blocks,) = kinds
-    allowed = [key for key, is_block in _dotted(Shared) if is_block == with_blocks]
+    allowed = [key for key, is_block in _dotted(schema_of(Shared)) if is_block == with_blocks]
     for key in axis.keys:
         if key not in allowed:
             expected = "a block" if with_blocks else "a single value"
@@ -114,14 +114,13 @@ def _key_problems(axis: AxisBlock) -> Iterator[Problem]:
             yield ("key",), text + nearest(key, allowed)
 
 
-def _dotted(block: type, path: str = "") -> Iterator[tuple[str, bool]]:
+def _dotted(block: Schema, path: str = "") -> Iterator[tuple[str, bool]]:
     """Yield dotted keys in a block and below, each with True if it is a block itself."""
-    for name, entry in keys(block).items():
-        inner = entry.shape.block
-        if inner:
+    for name, inner in block.keys.items():
+        if inner.keys:
             yield f"{path}{name}", True
             yield from _dotted(inner, f"{path}{name}.")
-        elif entry.shape.scalar:
+        elif inner.is_single:
             yield f"{path}{name}", False
 
 

@@ -5,51 +5,62 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from biogrip.keys import Key, printed
-from biogrip.study.case_blocks import CaseBlock
-from biogrip.study.typed import plain
+from pydantic import BaseModel, Field, Tag
 
+from biogrip.keys import BY_KIND, OPEN, Block, Distinct, Printed
+from biogrip.study.case_blocks import CaseBlock
+from biogrip.study.plain import plain
+
+MOST_POINTS = 2000
 _LARGEST = 1e12
 _LONGEST_TEXT = 60
 
-_Number = Annotated[float, Key(low=-_LARGEST, high=_LARGEST)]
-_Text = Annotated[str, Key(most=_LONGEST_TEXT)]
+_Number = Annotated[float, Field(ge=-_LARGEST, le=_LARGEST), Tag("a number")]
+_Text = Annotated[str, Field(max_length=_LONGEST_TEXT), Tag("text")]
 
 
-@dataclass(frozen=True)
-class ValueBlock:
+class ValueBlock(BaseModel):
     """Keys to merge into the block that the axis' key names."""
 
-    label: Annotated[str, printed("Name of the value in print.")]
-    changes: Annotated[Mapping[str, _Number | _Text], Key(spread=True)]
+    model_config = OPEN
+    __pydantic_extra__: dict[str, Annotated[_Number | _Text, BY_KIND]] = Field(init=False)
+
+    label: Annotated[Printed, Field(description="Name of the value in print.")]
+
+    @property
+    def changes(self) -> dict[str, float | str]:
+        """Values by their keys."""
+        return self.__pydantic_extra__
 
 
 @dataclass(frozen=True)
-class AxisBlock:
+class AxisBlock(Block):
     """One axis of a sweep's grid: a key, or several, and its values."""
 
-    label: Annotated[str, printed("Name in print.")]
+    label: Printed
+    """Name in print."""
     key: Annotated[
-        str | Annotated[tuple[str, ...], Key(fewest=1, most=100, unique=True)],
-        Key(
-            "Dotted key, or list of keys that change together, in any block that a case may "
-            "change, e.g. `measurement.noise.level`."
-        ),
+        Annotated[str, Tag("text")]
+        | Annotated[
+            tuple[str, ...], Field(min_length=1, max_length=100), Distinct(), Tag("a list")
+        ],
+        BY_KIND,
     ]
+    """Dotted key, or list of keys that change together, in any block that a case may change, e.g.
+    `measurement.noise.level`."""
     values: Annotated[
-        tuple[_Number | _Text | ValueBlock, ...],
-        Key(
-            "Values of the key; or blocks to merge into the block of the key, each with a "
-            "`label` of its own.",
-            fewest=1,
-            most=16,
-            unique=True,
-        ),
+        tuple[
+            Annotated[_Number | _Text | Annotated[ValueBlock, Tag("a block of keys")], BY_KIND], ...
+        ],
+        Field(min_length=1, max_length=16),
+        Distinct(),
     ]
-    unit: Annotated[str | None, printed("Unit in print.")] = None
-    unit_in_si: Annotated[
-        float, Key("Size of this unit in the unit of the key, by default 1.", low=1e-24, high=1e24)
-    ] = 1.0
+    """Values of the key; or blocks to merge into the block of the key, each with a `label` of its
+    own."""
+    unit: Printed | None = None
+    """Unit in print."""
+    unit_in_si: Annotated[float, Field(ge=1e-24, le=1e24)] = 1.0
+    """Size of this unit in the unit of the key, by default 1."""
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -58,19 +69,15 @@ class AxisBlock:
 
 
 @dataclass(frozen=True)
-class SweepBlock:
+class SweepBlock(Block):
     """A grid of cases that differ from given cases in two values."""
 
-    cases: Annotated[
-        tuple[str, ...],
-        Key("Cases of the study that the grid is laid over.", fewest=1, most=16, unique=True),
-    ]
-    rows: Annotated[AxisBlock, Key()]
-    columns: Annotated[AxisBlock, Key()]
-    title: Annotated[
-        str | None,
-        printed("Name in print; by default the sweep's name."),
-    ] = None
+    cases: Annotated[tuple[str, ...], Field(min_length=1, max_length=16), Distinct()]
+    """Cases of the study that the grid is laid over."""
+    rows: AxisBlock
+    columns: AxisBlock
+    title: Printed | None = None
+    """Name in print; by default the sweep's name."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +211,9 @@ def point_blocks(
     for _, point in list_points(sweeps):
         block = blocks[point.case]
         for key, value in point.overrides.items():
-            block = _changed(block, key, value)
+            # A key that counts takes no 8.0.
+            whole = isinstance(value, float) and value.is_integer()
+            block = _changed(block, key, int(value) if whole else value)
         found[point.name] = block
     return found
 

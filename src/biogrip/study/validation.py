@@ -1,34 +1,34 @@
 """Validation of a study's config, with messages that name file, line and key."""
 
-from collections.abc import Iterator, Mapping
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
-from typing import Any
+from typing import Any, TypeVar
 
 from biogrip.errors import BiogripError
+from biogrip.identify.methods import block_class
 from biogrip.instrument.gripper import Gripper
-from biogrip.keys import Key, Problem
-from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
+from biogrip.keys import Problem
+from biogrip.study.case_blocks import METHOD_BLOCKS, OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.config import StudyConfig
-from biogrip.study.messages import MOST_EXPLAINED, shape_at, value_problems
+from biogrip.study.measurement_block import MeasurementBlock
+from biogrip.study.messages import MOST_EXPLAINED, checked, inside, unknown
+from biogrip.study.plain import plain
 from biogrip.study.readings import read_blocks
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
 from biogrip.study.sweeps import list_points, make_sweeps, point_blocks
-from biogrip.study.typed import Shape, built, parts, plain
 
-STUDY = Shape(Key(), block=StudyConfig)
-"""Schema of a whole config."""
-
-_CASE = Shape(Key(), block=CaseBlock)
-_GRIPPER = Shape(Key(), block=Gripper)
-_SCALARS = (float, int, str, type(None))
+T = TypeVar("T", bound=Shared)
 _SHOWN = 6
+_SURROGATE = re.compile("[\ud800-\udfff]")
 
 
-def checked(
+def checked_study(
     config: Mapping[str, Any], files: ConfigFiles, *, for_workflow: bool = True
 ) -> StudyConfig:
-    """Validate a complete config and convert it to dataclasses; cases must have all blocks.
+    """Validate a complete config and build its blocks; cases must have all blocks.
 
     Parameters
     ----------
@@ -42,10 +42,10 @@ def checked(
     BiogripError
         Names file, line and key of the first few problems, with what was found and what is allowed.
     """
-    _refuse(_odd_keys((), config), files)
-    _refuse(_plain_problems(config), files)
-    study = built(StudyConfig, config)
-    _refuse(block_problems((), study), files)
+    _refuse(_unwritable((), config), files)
+    study, problems = _with_methods(StudyConfig, config)
+    _refuse(_own_problems(config, problems), files)
+    assert study is not None
     study = study.chosen
     _refuse(_assumed_problems(study.cases), files)
     _refuse(sweep_problems(study.sweeps, study.cases), files)
@@ -56,31 +56,34 @@ def checked(
     return study
 
 
-def value_problem(key: tuple[str, ...], value: Any) -> str | None:
-    """Return what is wrong with a single key's value, or None.
-
-    Parameters
-    ----------
-    key
-        Path of the key, blocks by name, e.g. ``("measurement", "noise_rad")``.
-    value
-        Plain value.
-    """
-    return next((text for _, text in value_problems(shape_at(STUDY, key), value)), None)
+def measurement_problem(key: str, value: Any) -> str | None:
+    """Return what is wrong with the value of a single key of a measurement, or None."""
+    found = [*_unwritable((key,), value)] or checked(MeasurementBlock, {key: value})[1]
+    return next((text for path, text in found if path == (key,)), None)
 
 
-def block_problems(path: KeyPath, value: Any) -> Iterator[Problem]:
-    """Find conflicts between keys, in blocks whose single values are valid."""
-    inside = [
-        problem
-        for part, inner in parts(value)
-        if not isinstance(inner, _SCALARS)
-        for problem in block_problems((*path, part), inner)
+def _with_methods(kind: type[T], block: Any) -> tuple[T | None, list[Problem]]:
+    """Build a config block, or find what is not allowed in it and in the blocks of methods."""
+    built, problems = checked(kind, block)
+    problems += _method_problems((), kind, block)
+    cases = block.get("cases")
+    for name, case in cases.items() if isinstance(cases, Mapping) else ():
+        if isinstance(case, Mapping):
+            problems += _method_problems(("cases", name), CaseBlock, case)
+    return built, problems
+
+
+def _method_problems(path: KeyPath, kind: type[Shared], block: Mapping[str, Any]) -> list[Problem]:
+    allowed = [*kind.model_fields, *METHOD_BLOCKS]
+    found: list[Problem] = [
+        ((*path, name), unknown(name, allowed)) for name in block if name not in allowed
     ]
-    yield from inside
-    if not inside and hasattr(value, "problems"):
-        for place, text in value.problems():
-            yield (*path, *place), text
+    for name in METHOD_BLOCKS:
+        problems = checked(block_class(name), block.get(name, {}))[1]
+        if problems and name not in block:
+            problems = [((), "is missing and has no default.")]
+        found += [((*path, name, *place), text) for place, text in problems]
+    return found
 
 
 def _refuse(problems: Iterator[Problem], files: ConfigFiles) -> None:
@@ -109,18 +112,22 @@ def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
     return path[2:]
 
 
-def _odd_keys(path: KeyPath, value: Any) -> Iterator[Problem]:
-    if isinstance(value, Mapping):
-        for key, inner in value.items():
-            if not isinstance(key, str):
-                text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
-                yield (*path, key), f"{text} quotes."
-            yield from _odd_keys((*path, key), inner)
+def _unwritable(path: KeyPath, value: Any) -> Iterator[Problem]:
+    """Find what JSON does not have: keys that are no text, numbers that are not finite."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield path, f"found {value}, allowed is a finite number."
+    if isinstance(value, str) and _SURROGATE.search(value):
+        yield path, "holds half a character, allowed is text."
+    for key, inner in inside(value):
+        if isinstance(value, Mapping) and not isinstance(key, str):
+            text = "is no text: YAML reads on, off, yes, no and numbers otherwise; put it in"
+            yield (*path, key), f"{text} quotes."
+        yield from _unwritable((*path, key), inner)
 
 
-def _plain_problems(config: Mapping[str, Any]) -> Iterator[Problem]:
-    for path, text in value_problems(STUDY, config):
-        # Skip inherited blocks that are invalid: the problem is reported for the study's block.
+def _own_problems(config: Mapping[str, Any], problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Leave out blocks that a case inherits and that are none: the study's has the problem."""
+    for path, text in problems:
         inherited = len(path) == 3 and path[0] == "cases" and path[2] in OVERRIDABLE
         if not (inherited and path[2] not in config["cases"][path[1]]):
             yield path, text
@@ -130,12 +137,9 @@ def _assumed_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
     """Check the grippers assumed by identifications like true grippers."""
     for name, case in cases.items():
         if isinstance(case.assumed_gripper, Mapping):
-            path = ("cases", name, "assumed_gripper")
             believed = overlaid(plain(case.gripper.neutral), case.assumed_gripper)
-            odd = list(value_problems(_GRIPPER, believed))
-            yield from (((*path, *place), text) for place, text in odd)
-            if not odd:
-                yield from block_problems(path, built(Gripper, believed))
+            for path, text in checked(Gripper, believed)[1]:
+                yield ("cases", name, "assumed_gripper", *path), text
 
 
 def _point_problems(study: StudyConfig) -> Iterator[Problem]:
@@ -143,23 +147,18 @@ def _point_problems(study: StudyConfig) -> Iterator[Problem]:
     sweeps = make_sweeps(study.sweeps)
     by_name = {point.name: (sweep, point) for sweep, point in list_points(sweeps)}
     for name, block in point_blocks(sweeps, study.cases).items():
-        path = ("cases", name)
-        found = [((*path, *place), text) for place, text in value_problems(_CASE, block)]
-        if not found:
-            case = built(CaseBlock, block)
-            found = list(block_problems(path, case))
-            found = found or list(_assumed_problems({name: case}))
-            contact = case.contact_problems(study.actuator)
-            found = found or [((*path, *place), text) for place, text in contact]
-        yield from (placed(by_name, problem) for problem in found)
+        case, found = _with_methods(CaseBlock, block)
+        if case and not found:
+            found = list(case.contact_problems(study.actuator))
+            found += [(path[2:], text) for path, text in _assumed_problems({name: case})]
+        yield from (placed(by_name, (("cases", name, *path), text)) for path, text in found)
 
 
 def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
     """Check every case under every reading as if it were a case of the config."""
     for reading, _, block in read_blocks(study.readings, study.cases):
-        path = ("readings", reading, "changes")
-        found = [((*path, *place), text) for place, text in value_problems(_CASE, block)]
-        yield from found or block_problems(path, built(CaseBlock, block))
+        for path, text in _with_methods(CaseBlock, block)[1]:
+            yield ("readings", reading, "changes", *path), text
 
 
 def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:

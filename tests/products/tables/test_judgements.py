@@ -10,7 +10,7 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import MODELS, Sample
-from biogrip.experiment.truth import Published, Truth
+from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.identify.methods import METHODS
 from biogrip.products.files.identifications import columns
 from biogrip.products.tables.layout import Table
@@ -28,7 +28,7 @@ def rows(table: Table) -> list[dict[str, Any]]:
 
 def study(parameters: dict[str, float], samples: int) -> Any:
     """Of one case, a drop."""
-    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, Published())
+    truth = Truth("A drop", Sample("generalized_maxwell"), parameters, UNPUBLISHED)
     cases = {"drop": seen(truth=truth, samples=samples)}
     return seen(cases=cases, identifiers=METHODS, optimum_tolerance=1.0, near_noise_tolerance=0.02)
 

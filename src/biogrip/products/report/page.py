@@ -28,8 +28,8 @@ from biogrip.products.report.explorer_data import CaseFiles, explorer_data
 from biogrip.products.rule_products import group_by_rule
 from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.uses import each, every, using
+from biogrip.study.plain import plain
 from biogrip.study.study import Study
-from biogrip.study.typed import plain
 
 PAGE = "results/report.html"
 
