@@ -39,13 +39,13 @@ class Job:
 
     Parameters
     ----------
-    sheet
+    rule
         What it makes.
     wildcards
         Of what.
     """
 
-    sheet: ProductRule
+    rule: ProductRule
     wildcards: Wildcards
 
     @property
@@ -56,7 +56,7 @@ class Job:
             "-m",
             "biogrip",
             "make",
-            *shlex.split(self.sheet.command(self.wildcards)),
+            *shlex.split(self.rule.command(self.wildcards)),
         ]
 
     @property
@@ -64,7 +64,7 @@ class Job:
         """A command that loads what the job is made with, and ends."""
         modules = {
             module
-            for product in self.sheet.products
+            for product in self.rule.products
             for module in (product.module, *product.modules(self.wildcards))
         }
         names = ", ".join(("biogrip.cli", "biogrip.running.make", *sorted(modules)))
@@ -73,7 +73,7 @@ class Job:
     @property
     def outputs(self) -> list[str]:
         """Files that it writes."""
-        made = (product.outputs(self.wildcards) for product in self.sheet.products)
+        made = (product.outputs(self.wildcards) for product in self.rule.products)
         return [file for files in made for file in files.values()]
 
 
@@ -95,13 +95,13 @@ def study_section() -> Section:
 def in_order(study: Study) -> list[Job]:
     """Jobs of a study, each after those that make what it reads."""
     sheets = make_rules(products().values(), Plan(study, Path("results")))
-    jobs = [Job(sheet, wildcards) for sheet in sheets for wildcards in sheet.jobs]
+    jobs = [Job(rule, wildcards) for rule in sheets for wildcards in rule.jobs]
     maker = {file: index for index, job in enumerate(jobs) for file in job.outputs}
     assert set(maker) == set(files_of(sheets))
     graph = {
         index: {
             maker[file]
-            for files in job.sheet.inputs(job.wildcards).values()
+            for files in job.rule.inputs(job.wildcards).values()
             for file in files
             if file in maker
         }
@@ -118,11 +118,11 @@ def by_rule(jobs: Sequence[Job], study: Study, folder: Path) -> list[Row]:
     # By command, for jobs of a rule may load different modules: those of a method.
     starts: dict[str, float] = {}
     for job, seconds in _run(jobs, folder):
-        spent[job.sheet.name].append(seconds)
+        spent[job.rule.name].append(seconds)
         what = job.imports[-1]
         if what not in starts:
             starts[what] = min(processor_s(job.imports, folder) for _ in range(_STARTS))
-        starting[job.sheet.name] += starts[what]
+        starting[job.rule.name] += starts[what]
     total_s = sum(map(sum, spent.values()))
     rows: list[Row] = [
         {

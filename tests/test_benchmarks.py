@@ -114,7 +114,7 @@ def test_jobs_come_after_what_they_read(study: Study) -> None:
     jobs = in_order(study)
     for job in jobs:
         needed = {
-            file for files in job.sheet.inputs(job.wildcards).values() for file in map(str, files)
+            file for files in job.rule.inputs(job.wildcards).values() for file in map(str, files)
         }
         assert needed <= made
         made |= set(job.outputs)
@@ -122,7 +122,7 @@ def test_jobs_come_after_what_they_read(study: Study) -> None:
 
 
 def test_processor_time_of_jobs_is_added_up_by_rule(study: Study, tmp_path: Path) -> None:
-    targets = [job for job in in_order(study) if job.sheet.name == "target"][:2]
+    targets = [job for job in in_order(study) if job.rule.name == "target"][:2]
     target, total = by_rule(targets, study, tmp_path)
     assert (target["rule"], target["jobs"]) == ("target", 2)
     assert target["starting_s"] > 0

@@ -1,7 +1,7 @@
 """A study made job by job in this process, in the order in which jobs read one another's files.
 
-What is made is what Snakemake's jobs make, by the same commands; of a sheet of products only
-those that are wanted, if not all are. Neither Snakemake nor a
+What is made is what Snakemake's jobs make, by the same commands; of a rule with several
+products only those that are wanted, if not all are. Neither Snakemake nor a
 process for each job has to be started, which takes most of the time of a small study.
 """
 

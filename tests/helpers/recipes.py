@@ -184,7 +184,7 @@ HEIGHTS = drawing(
     name="heights",
     caption="How high every case rises, side by side.",
     reads={"targets": of_cases(TARGETS, simulated)},
-    sheet="study_figures",
+    rule="study_figures",
 )
 '''
     },
@@ -215,7 +215,7 @@ NOISE_LEVELS = table(
     item="noise",
     caption="Kind and level of the noise of every case.",
     uses=from_study(cases=each(simulated, "noise")),
-    sheet="tables",
+    rule="tables",
 )
 '''
     },

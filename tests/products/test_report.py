@@ -87,7 +87,7 @@ def test_the_page_says_how_everything_in_it_was_made(report: Path) -> None:
     made = re.findall(r'<details class="made">(.*?)</details>', report.read_text("utf-8"), re.S)
     assert len(made) > 30
     said = (
-        r"<summary>How it was made</summary>\s*ProductRule <code>\w+</code>, file "
+        r"<summary>How it was made</summary>\s*Rule <code>\w+</code>, file "
         r"<code>results/[\w./-]+</code>; again by <code>biogrip make [\w -]+</code>\.\s*"
     )
     assert [text for text in made if not re.fullmatch(said, text)] == []

@@ -55,8 +55,8 @@ def maps(study: Study) -> HeatMaps:
     return heat_maps(study, {"sweep": "both"})
 
 
-def find_zeros(study: Study) -> stage.Swept:
-    return stage.find_zeros(study, {"sweep": "both", "case": CASE})
+def describe_sweep(study: Study) -> stage.SweepContent:
+    return stage.describe_sweep(study, {"sweep": "both", "case": CASE})
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def identifications(study: Study, tmp_path: Path) -> list[Path]:
 @pytest.fixture
 def judged(study: Study, identifications: list[Path], tmp_path: Path) -> Path:
     output = tmp_path / "judged" / f"{CASE}.csv"
-    stage.judge(find_zeros(study), identifications, [], output)
+    stage.judge(describe_sweep(study), identifications, [], output)
     return output
 
 
@@ -157,7 +157,7 @@ def test_bounds_are_those_of_least_squares(judged: Path, column: str) -> None:
 def test_a_grid_may_be_a_single_point(identifications: list[Path], tmp_path: Path) -> None:
     text = replaced(SWEEPS, "values: [0, 0.2]", "values: [0.2]")
     text = "\n".join(line for line in text.splitlines() if "proportional" not in line)
-    stage.judge(find_zeros(study_of(text)), identifications, [], tmp_path / "x.csv")
+    stage.judge(describe_sweep(study_of(text)), identifications, [], tmp_path / "x.csv")
     assert set(pd.read_csv(tmp_path / "x.csv")["point"]) == {f"{CASE}--both--0_2--gaussian-peak"}
 
 
@@ -165,7 +165,7 @@ def test_a_missing_point_is_named(
     study: Study, identifications: list[Path], tmp_path: Path
 ) -> None:
     with pytest.raises(BiogripError, match=r"cell--both--0--gaussian-peak: no file of identific"):
-        stage.judge(find_zeros(study), identifications[1:], [], tmp_path / "x.csv")
+        stage.judge(describe_sweep(study), identifications[1:], [], tmp_path / "x.csv")
 
 
 def test_the_table_has_the_best_and_the_worst_determined(maps: HeatMaps, judged: Path) -> None:

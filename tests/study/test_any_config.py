@@ -120,12 +120,12 @@ def planned(study: Study) -> int:
     """Plan what a study makes; return how many jobs that is."""
     plan = Plan(study, Path("nowhere"))
     count = 0
-    for sheet in make_rules(products().values(), plan):
-        count += len(jobs := sheet.jobs)
+    for rule in make_rules(products().values(), plan):
+        count += len(jobs := rule.jobs)
         for job in jobs[:2] + jobs[-2:]:
-            assert sheet.digest(job)
-            assert sheet.command(job)
-            sheet.inputs(job)
+            assert rule.digest(job)
+            assert rule.command(job)
+            rule.inputs(job)
     return count
 
 

@@ -325,10 +325,10 @@ def test_two_thousand_cases_are_planned(tmp_path: Path) -> None:
     file = written(tmp_path, f"cases:\n{cases}\n")
     start = time.process_time()
     plan = Plan(load(file), tmp_path)
-    sheets = {sheet.name: sheet for sheet in make_rules(products().values(), plan)}
-    jobs = [{**job, "method": "genetic"} for job in sheets["target"].jobs]
+    rules = {rule.name: rule for rule in make_rules(products().values(), plan)}
+    jobs = [{**job, "method": "genetic"} for job in rules["target"].jobs]
     names = ("target", "identification")
-    digests = [tuple(sheets[name].digest(job) for name in names) for job in jobs]
+    digests = [tuple(rules[name].digest(job) for name in names) for job in jobs]
     assert len(digests) == 2000
     assert time.process_time() - start < 30
 

@@ -70,12 +70,12 @@ from pathlib import Path
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.resolved import read_study
-from biogrip.running.rules import sheets_of
+from biogrip.running.rules import make_rules
 plan = Plan(read_study(Path("results")), Path("results"))
 found = {
-    product.name: [sheet.runtime({}, attempt=2), sheet.megabytes({}, attempt=2), sheet.weight.local]
-    for sheet in sheets_of(products().values(), plan)
-    for product in sheet.products
+    product.name: [rule.runtime({}, attempt=2), rule.megabytes({}, attempt=2), rule.weight.local]
+    for rule in make_rules(products().values(), plan)
+    for product in rule.products
 }
 print(json.dumps(found))
 """

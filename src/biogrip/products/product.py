@@ -97,7 +97,7 @@ class Product:
     weight
         Resources of a job.
     rule
-        Products of a sheet are made by one job, as start-up takes longer than most of them.
+        Products of a rule are made by one job, as start-up takes longer than most of them.
     category, item, caption
         Place and caption in the report; a product without category is not in it.
     modules

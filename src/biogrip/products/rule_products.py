@@ -28,10 +28,10 @@ class RuleProducts:
 
 
 def group_by_rule(products: Iterable[Product], plan: Plan) -> list[RuleProducts]:
-    """Group products by sheet into rules.
+    """Group products by rule.
 
-    A rule always makes all its outputs, but not every case has every figure. So a sheet has
-    one rule for each set of products that cases have in common.
+    A rule always makes all its outputs, but not every case has every figure. So there
+    is one rule for each set of products that cases have in common.
     """
     rules: dict[str, list[Product]] = defaultdict(list)
     for product in products:

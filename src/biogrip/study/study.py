@@ -267,8 +267,8 @@ class Case:
     @property
     def compared_models(self) -> dict[str, Sample]:
         """Sample models whose evidence is compared, by name; none if it is not asked for."""
-        asked = self.posterior and self.posterior.evidence and not self.fixed
-        return self.models if asked else {}
+        compared = self.posterior and self.posterior.evidence and not self.fixed
+        return self.models if compared else {}
 
     @property
     def coverage_seeds(self) -> int:

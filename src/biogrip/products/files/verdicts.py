@@ -71,9 +71,7 @@ def read_verdicts(path: Path) -> dict[str, Any]:
     BiogripError
         If the file is missing or invalid.
     """
-    return read_object(
-        path, "verdicts", {"fit", "quantities", "trades", "notes"}, "holds no verdicts"
-    )
+    return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 
 def bounded_on_a_side(verdicts: dict[str, Any]) -> set[str]:

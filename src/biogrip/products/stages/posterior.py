@@ -115,9 +115,9 @@ def posterior_of_trace(
     from biogrip.identifiability.sampling import sampled
 
     rng = stream(case.study.study_seed, case.name, TRACE, "posterior")
-    problem, asked = pose(case_problem.searched), _asked(case)
-    posterior = _posterior(problem, asked, case_problem.noise_rad)
-    found = sampled(posterior, asked, rng, progress)
+    problem, block = pose(case_problem.searched), _posterior_block(case)
+    posterior = _posterior(problem, block, case_problem.noise_rad)
+    found = sampled(posterior, block, rng, progress)
     drawn = thinned(found.log_parameters)
     every = found.log_parameters.reshape(-1, drawn.shape[1])
     quantities = parameters_and_sum(case_problem.searched)
@@ -125,22 +125,22 @@ def posterior_of_trace(
     data = {
         "model": case_problem.model.name,
         "confidence": case.confidence,
-        **posterior_data(found, asked, marginals, limits),
+        **posterior_data(found, block, marginals, limits),
         "evidence": _evidence(case, pose, case_problem.noise_rad, progress),
     }
     return data, drawn
 
 
-def _asked(case: Case) -> PosteriorSettings:
+def _posterior_block(case: Case) -> PosteriorSettings:
     assert case.posterior is not None
     return case.posterior
 
 
-def _posterior(problem: Problem, asked: PosteriorSettings, noise_rad: float | None) -> Any:
+def _posterior(problem: Problem, block: PosteriorSettings, noise_rad: float | None) -> Any:
     from biogrip.identifiability.posterior import Posterior
     from biogrip.identifiability.prior import make_prior
 
-    prior = make_prior(problem.residuals.model, problem.low, problem.high, asked.prior)
+    prior = make_prior(problem.residuals.model, problem.low, problem.high, block.prior)
     return Posterior(problem, prior, noise_rad)
 
 
@@ -156,15 +156,15 @@ def _evidence(
     from biogrip.identifiability.evidence import compute_evidence
     from biogrip.identifiability.sampling import sampled
 
-    rows, misfits, samples, asked = [], [], 0, _asked(case)
+    rows, misfits, samples, block = [], [], 0, _posterior_block(case)
     for name, candidate in case.compared_models.items():
         problem = of_model(candidate.model)
         samples = problem.residuals.samples
         fits = stream(case.study.study_seed, case.name, TRACE, f"model {name}")
         misfits.append(best_fit(problem, case.least_squares, fits, silent).misfit_rad)
         rng = stream(case.study.study_seed, case.name, TRACE, f"evidence {name}")
-        posterior = _posterior(problem, asked, noise_rad)
-        found = sampled(posterior, asked, rng, progress)
+        posterior = _posterior(problem, block, noise_rad)
+        found = sampled(posterior, block, rng, progress)
         own = compute_evidence(posterior, found, rng)
         rows.append((own, found.convergence.reached))
     highest = max(own.log for own, _ in rows)

@@ -41,7 +41,7 @@ _FACTOR, _BOUNDS = math.log(2), 4.0
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepContent:
     """The sweep of a case.
 
     Parameters
@@ -59,16 +59,18 @@ class Swept:
     places: Mapping[str, tuple[str, str]]
 
 
-def find_zeros(study: Study, job: Wildcards) -> Swept:
+def describe_sweep(study: Study, job: Wildcards) -> SweepContent:
     """Return the sweep of a job's case."""
     points = study.sweeps[job["sweep"]].points(job["case"])
     places = {point.name: (point.row.text, point.column.text) for point in points}
     shown = each(lambda _: places, "problem noise sampling")
     view = using("methods near_noise_tolerance", points=shown)
-    return Swept(view(study), study.cases[job["case"]].parameters, places)
+    return SweepContent(view(study), study.cases[job["case"]].parameters, places)
 
 
-def judge(sweep: Swept, identifications: list[Path], calibrated: list[Path], points: Path) -> None:
+def judge(
+    sweep: SweepContent, identifications: list[Path], calibrated: list[Path], points: Path
+) -> None:
     """Compute errors and shares of successful seeds at every point of a case's sweep.
 
     Parameters
@@ -91,7 +93,7 @@ def judge(sweep: Swept, identifications: list[Path], calibrated: list[Path], poi
 
 
 def _rows(
-    sweep: Swept, files: Mapping[str, Path], calibrated: list[Path]
+    sweep: SweepContent, files: Mapping[str, Path], calibrated: list[Path]
 ) -> Iterator[tuple[str | int, ...]]:
     calibrations = {path.stem: path for path in calibrated}
     bounds = {
@@ -106,14 +108,16 @@ def _rows(
             yield name, *sweep.places[name], *judged
 
 
-def _bounds(sweep: Swept, point: Case, calibrated: list[Path]) -> list[tuple[Quantity, float]]:
+def _bounds(
+    sweep: SweepContent, point: Case, calibrated: list[Path]
+) -> list[tuple[Quantity, float]]:
     problem = point.problem.calibrated(calibrated)
     time_s = point.sampling.over(problem.torque.end_s)
     return bounds_percent(problem, point.noise, sweep.parameters, time_s)
 
 
 def _judged(
-    sweep: Swept,
+    sweep: SweepContent,
     point: Case,
     path: Path,
     bounds: list[tuple[Quantity, float]],
@@ -166,7 +170,7 @@ def _median(values: Array) -> float:
     return float(np.median(values)) if len(values) else np.nan
 
 
-def _succeeded(sweep: Swept, point: Case, time_s: Array, found: pd.DataFrame) -> np.ndarray:
+def _succeeded(sweep: SweepContent, point: Case, time_s: Array, found: pd.DataFrame) -> np.ndarray:
     """Return whether each seed is near the noise, (n_seeds,).
 
     Without noise, the misfit of the true values rounded to the genes' two digits takes its
@@ -219,7 +223,7 @@ SWEEP_POINTS = Product(
     "sweep_points",
     {"points": POINTS.path},
     judge,
-    find_zeros,
+    describe_sweep,
     _jobs,
     message="Judging the sweep {sweep} over {case}",
     reads={"identifications": Reads(_identifications), "calibrated": Reads(_calibrations)},
