@@ -16,7 +16,7 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.identify.answer import History, Identification, Progress, Row, silent
 from biogrip.identify.levenberg_marquardt import Minima
-from biogrip.identify.local_fits import ROUGH, LocalFits, alike
+from biogrip.identify.local_fits import FAIR, FINE, ROUGH, LocalFits, alike
 from biogrip.identify.newton_refinement import refine_optima
 from biogrip.identify.problem import Problem
 
@@ -167,25 +167,26 @@ def fit_from(problems: Sequence[Problem], starts: Array) -> Minima:
     Minima
         The optimum of every trace.
     """
-    return _fit_alike(problems, starts, refine_optima)
+    return _fit_alike(problems, starts, refine_optima, FINE)
 
 
 def descend_from(problems: Sequence[Problem], starts: Array) -> Minima:
-    """Fit as `fit_from` does, without the Newton steps: enough to compare basins."""
-    return _fit_alike(problems, starts, lambda _, minima, __: minima)
+    """Fit as `fit_from` does, but only to compare basins: less finely, without Newton steps."""
+    return _fit_alike(problems, starts, lambda _, minima, __: minima, FAIR)
 
 
 def _fit_alike(
     problems: Sequence[Problem],
     starts: Array,
     finish: Callable[[LocalFits, Minima, IntArray], Minima],
+    tolerance: float,
 ) -> Minima:
     """Fit problems with the same responses together; each fit is then finished."""
     starts = np.broadcast_to(starts, (len(problems), len(problems[0].low)))
     groups, found = alike(problems), list[Minima]()
     for group in groups:
         fits, traces = LocalFits([problems[index] for index in group]), np.arange(len(group))
-        found.append(finish(fits, fits.fitted(starts[group], traces), traces))
+        found.append(finish(fits, fits.fitted(starts[group], traces, tolerance), traces))
     return Minima.joined(found)[np.argsort(np.concatenate(groups))]
 
 

@@ -52,6 +52,7 @@ def joined(
         lambda plan: wildcards_of(cases(plan.study)),
         message=f"Putting together the {what} of {{case}}",
         reads={"batches": of_batches(kind.batch_path)},
+        rule="joined",
     )
 
 
