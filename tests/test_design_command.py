@@ -32,16 +32,16 @@ ASKED = """
 search_range:
   k_p: {exponent: [-5, 8]}
 design:
-  {noise_rad: 3.0e-6, samples: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
-   largest_torque_Nm: 8.0e-9, most_steps: 8, tried: 128}
+  {noise_rad: 3.0e-6, readings: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
+   largest_torque_Nm: 8.0e-9, most_steps: 8, candidates: 128}
 only: [liquid_drop_2]
 """
 
 # A camera that reads nothing of c_p: its share is over some milliseconds after a step.
 SLOW = """
 design:
-  {noise_rad: 8.0e-7, samples: 2000, fastest_Hz: 20, longest_s: 300, largest_torque_Nm: 2.0e-9,
-   most_steps: 4, ranges: {k: [15, 50], c: [60, 250]}, drawn: 3, tried: 128}
+  {noise_rad: 8.0e-7, readings: 2000, fastest_Hz: 20, longest_s: 300, largest_torque_Nm: 2.0e-9,
+   most_steps: 4, ranges: {k: [15, 50], c: [60, 250]}, plausible_samples: 3, candidates: 128}
 gripper:
   arm_length_m: 1.6e-3
   left: {stiffness_Nm_per_rad: 5.0e-7}
@@ -98,7 +98,9 @@ def test_a_study_takes_other_shapes_with_the_bounds_that_were_promised(
     shape: str, tmp_path: Path
 ) -> None:
     """What the plan promises of its own torque, the study finds from its file."""
-    text = ASKED.replace("tried: 128", f"tried: 128, shapes: [{shape}], shortest_step_s: 1.0e-4")
+    text = ASKED.replace(
+        "candidates: 128", f"candidates: 128, shapes: [{shape}], shortest_step_s: 1.0e-4"
+    )
     (tmp_path / "asked.yaml").write_text(text)
     said = StringIO()
     with redirect_stdout(said):
@@ -158,7 +160,7 @@ def test_a_slow_camera_is_asked_for_what_it_can_tell(
 ) -> None:
     """Of 20 Hz: a design within its limits, c_p left out, the others as if it were known."""
     key = "" if shortest_s is None else f", shortest_step_s: {shortest_s}"
-    (tmp_path / "asked.yaml").write_text(SLOW.replace("tried: 128", f"tried: 128{key}"))
+    (tmp_path / "asked.yaml").write_text(SLOW.replace("candidates: 128", f"candidates: 128{key}"))
     said = StringIO()
     with redirect_stdout(said):
         assert design(tmp_path) == 0
@@ -208,7 +210,9 @@ def write_trace(case: Case, file: Path) -> Path:
 
 def bounds_after(place: Path, *traces: str) -> dict[str, tuple[str, str]]:
     """Ask what is next after traces; bounds as printed, with the config's and the designed."""
-    (place / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    (place / "asked.yaml").write_text(
+        ASKED.replace("candidates: 128", "candidates: 128, plausible_samples: 3")
+    )
     said = StringIO()
     with redirect_stdout(said):
         assert design(place, *traces) == 0
@@ -294,7 +298,9 @@ def test_messages_on_traces_name_options_that_there_are(
 ) -> None:
     trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
     trace.write_text(trace.read_text().replace("time_s,rotation_rad", header))
-    (tmp_path / "asked.yaml").write_text(ASKED.replace("tried: 128", "tried: 128, drawn: 3"))
+    (tmp_path / "asked.yaml").write_text(
+        ASKED.replace("candidates: 128", "candidates: 128, plausible_samples: 3")
+    )
     assert design(tmp_path, "--after", str(trace), *more) == 1
     error = capsys.readouterr().err
     assert said in error
@@ -319,15 +325,23 @@ def one_torque(inputs: DesignInputs) -> Torque:
         ("seeds: 2\n", [], "no case has a block `design`"),
         (ASKED, ["--case", "liquid_drop_3"], "found no case 'liquid_drop_3'"),
         (ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""), [], "found neither, allowed is one of"),
-        (ASKED.replace("tried: 128", "quantities: [k, q]"), [], "found 'q', allowed are k, k_p"),
-        (ASKED.replace("tried: 128", "ranges: {c: [2.0, 1.0]}"), [], "the lower one first"),
-        (ASKED.replace("tried: 128", "shapes: [step]"), [], "Did you mean 'steps'"),
         (
-            ASKED.replace("tried: 128", "shapes: [ramps], shortest_step_s: 20.0"),
+            ASKED.replace("candidates: 128", "quantities: [k, q]"),
+            [],
+            "found 'q', allowed are k, k_p",
+        ),
+        (ASKED.replace("candidates: 128", "ranges: {c: [2.0, 1.0]}"), [], "the lower one first"),
+        (ASKED.replace("candidates: 128", "shapes: [step]"), [], "Did you mean 'steps'"),
+        (
+            ASKED.replace("candidates: 128", "shapes: [ramps], shortest_step_s: 20.0"),
             [],
             "at least four ramps, 80 s",
         ),
-        (ASKED.replace("tried: 128", "shortest_step_s: 1.0e-6"), [], "at least two samples long"),
+        (
+            ASKED.replace("candidates: 128", "shortest_step_s: 1.0e-6"),
+            [],
+            "at least two samples long",
+        ),
         (
             SLOW.replace("longest_s: 300", "longest_s: 0.8"),
             [],
@@ -339,7 +353,7 @@ def one_torque(inputs: DesignInputs) -> Torque:
             "at least two steps, 1 s, or a fastest_Hz of at least 50.",
         ),
         (
-            SLOW.replace("tried: 128", "tried: 128, quantities: [c_p]"),
+            SLOW.replace("candidates: 128", "candidates: 128, quantities: [c_p]"),
             [],
             "no torque of steps with which readings at 20 Hz tell c_p, even to a factor of e to "
             "the 10; allowed are a faster camera (`fastest_Hz`)",
@@ -387,7 +401,9 @@ def test_what_is_asked_is_what_is_wanted() -> None:
 
 def test_plausible_samples_fill_their_ranges() -> None:
     ranges = "{k: [1.0, 100.0], c: [10.0, 20.0]}"
-    text = ASKED.replace("tried: 128", f"tried: 128, drawn: 20, ranges: {ranges}")
+    text = ASKED.replace(
+        "candidates: 128", f"candidates: 128, plausible_samples: 20, ranges: {ranges}"
+    )
     case = study_of(text).cases["liquid_drop_2"]
     targets = case.block.design
     assert targets is not None
@@ -404,7 +420,7 @@ def test_plausible_samples_fill_their_ranges() -> None:
 def test_where_traces_tell_nothing_parameters_lie_within_both_ranges() -> None:
     """Of what is asked, what is searched: k up to 9.9e7 N/m, dampers up to 9.9e4 N s/m."""
     ranges = "{k: [1.0e-6, 1.0e+12], k_p: [2.0, 3.0], c: [5.0, 1.0e+7]}"
-    text = ASKED.replace("tried: 128", f"tried: 128, ranges: {ranges}")
+    text = ASKED.replace("candidates: 128", f"candidates: 128, ranges: {ranges}")
     low, high = plausible_ends(study_of(text).cases["liquid_drop_2"])
     np.testing.assert_allclose(np.exp(low), [1.1e-4, 2.0, 5.0, 1.1e-5], rtol=1e-9)
     np.testing.assert_allclose(np.exp(high), [9.9e7, 3.0, 9.9e4, 9.9e4], rtol=1e-9)

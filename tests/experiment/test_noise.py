@@ -7,10 +7,10 @@ from scipy.signal import lfilter, periodogram
 from biogrip.arrays import Array
 from biogrip.experiment.noise import KINDS, Noise, add_noise, rms
 from biogrip.experiment.noise_parts import (
+    AR1,
     Drift,
     Flicker,
     Outliers,
-    Relaxing,
     draw_ornstein_uhlenbeck,
 )
 
@@ -84,7 +84,7 @@ def test_a_part_that_remembers_is_an_autoregressive_process() -> None:
     found = draw_ornstein_uhlenbeck(TIMES, np.array([1.0]), np.array([0.5]), rng)
     np.testing.assert_allclose(found, expected, atol=1e-12)
     times = np.array([0.0, 0.3, 0.4, 2.0, 7.0])
-    seen = noises(20_000, times, relaxing=Relaxing(1.0, 2.0))
+    seen = noises(20_000, times, ar1=AR1(1.0, 2.0))
     expected = np.exp(-np.abs(np.subtract.outer(times, times)) / 2.0)
     # A correlation of 20,000 pairs is known to 0.007.
     np.testing.assert_allclose(np.cov(seen.T), expected, atol=4 * 0.01)
@@ -101,7 +101,7 @@ def test_flicker_has_equal_power_in_every_octave() -> None:
 
 
 def test_shares_leave_the_variance_as_it_is() -> None:
-    seen = noises(400, TIMES[::10], relaxing=Relaxing(0.3, 1.0), flicker=Flicker(0.2))
+    seen = noises(400, TIMES[::10], ar1=AR1(0.3, 1.0), flicker=Flicker(0.2))
     assert np.mean(seen**2) == pytest.approx(1, rel=0.05)
 
 
@@ -132,7 +132,7 @@ def test_white_noise_is_what_it_was() -> None:
 
 
 def test_parts_are_no_more_than_the_whole() -> None:
-    noise = Noise("gaussian", 0.1, "peak", relaxing=Relaxing(0.7, 1.0), flicker=Flicker(0.4))
+    noise = Noise("gaussian", 0.1, "peak", ar1=AR1(0.7, 1.0), flicker=Flicker(0.4))
     ((path, text),) = noise.problems()
     assert path == ("flicker", "share")
     assert "found 1.1" in text

@@ -19,7 +19,7 @@ from biogrip import library
 from biogrip.arrays import Array
 from biogrip.cli import main as command
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
+from biogrip.experiment.noise_parts import AR1, Drift, Flicker, Outliers
 from biogrip.products.figures.profiles import draw_profiles
 from biogrip.products.figures.style import (
     BLUE,
@@ -151,7 +151,7 @@ def _kinds() -> dict[str, Noise]:
     return {
         "Gaussian": Noise(*white),
         "uniform": Noise("uniform", 0.1, "peak"),
-        "relaxing: AR(1)": Noise(*white, relaxing=Relaxing(0.5, 20.0)),
+        "ar1: AR(1)": Noise(*white, ar1=AR1(0.5, 20.0)),
         "flicker: 1/f": Noise(*white, flicker=Flicker(0.8)),
         "drift": Noise(*white, drift=Drift(4.0)),
         "outliers": Noise(*white, outliers=Outliers(0.02, 8.0)),
@@ -184,7 +184,7 @@ def residuals() -> Figure:
     kinds = _kinds()
     for axes, name, title in zip(
         grid,
-        ("Gaussian", "relaxing: AR(1)", "outliers"),
+        ("Gaussian", "ar1: AR(1)", "outliers"),
         ("white: no note", "autocorrelated: it wanders", "outliers"),
         strict=True,
     ):

@@ -15,7 +15,7 @@ from scipy.special import chdtrc
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import Drift, Flicker, Outliers, Relaxing
+from biogrip.experiment.noise_parts import AR1, Drift, Flicker, Outliers
 from biogrip.identifiability.likelihood import Likelihood, make_likelihood
 from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
@@ -57,25 +57,25 @@ class Kind:
 
 
 def noise(
-    relaxing: Relaxing | None = None,
+    ar1: AR1 | None = None,
     flicker: Flicker | None = None,
     drift: Drift | None = None,
     outliers: Outliers | None = None,
 ) -> Noise:
-    return Noise("gaussian", LEVEL, "peak", None, relaxing, flicker, drift, outliers)
+    return Noise("gaussian", LEVEL, "peak", None, ar1, flicker, drift, outliers)
 
 
 KINDS = {
     "white": Kind("white", noise()),
-    "fast": Kind("AR(1), all of it, 0.2 s", noise(Relaxing(1.0, 0.2))),
-    "slow": Kind("AR(1), a tenth, 10 s", noise(Relaxing(0.1, 10.0))),
-    "faint": Kind("AR(1), a fiftieth, 10 s", noise(Relaxing(0.02, 10.0))),
+    "fast": Kind("AR(1), all of it, 0.2 s", noise(AR1(1.0, 0.2))),
+    "slow": Kind("AR(1), a tenth, 10 s", noise(AR1(0.1, 10.0))),
+    "faint": Kind("AR(1), a fiftieth, 10 s", noise(AR1(0.02, 10.0))),
     "flicker": Kind("1/f, three tenths", noise(flicker=Flicker(0.3))),
     "drift": Kind("drift of 0.4 standard deviations", noise(drift=Drift(0.4))),
     "outliers": Kind("one in a hundred ten times as large", noise(outliers=Outliers(0.01, 10.0))),
     "all": Kind(
         "half of each of these",
-        noise(Relaxing(0.05, 10.0), Flicker(0.15), Drift(0.2), Outliers(0.005, 10.0)),
+        noise(AR1(0.05, 10.0), Flicker(0.15), Drift(0.2), Outliers(0.005, 10.0)),
     ),
     "gripper": Kind("white; stiffness known to 5 %", noise(), "liquid_drop_2", 0.05),
 }

@@ -8,7 +8,7 @@ from scipy.stats import kstest
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import Outliers, Relaxing
+from biogrip.experiment.noise_parts import AR1, Outliers
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise, uneven
 
 TIMES: Array = np.linspace(0, 400, 4001)
@@ -36,9 +36,9 @@ def test_white_noise_is_seldom_doubted() -> None:
 @pytest.mark.parametrize(
     ("parts", "said"),
     [
-        ({"relaxing": Relaxing(1.0, 0.1)}, "Neighbouring residuals"),
-        ({"relaxing": Relaxing(0.08, 2.0)}, "more of some frequencies"),
-        ({"relaxing": Relaxing(0.05, 20.0)}, "The residual wanders"),
+        ({"ar1": AR1(1.0, 0.1)}, "Neighbouring residuals"),
+        ({"ar1": AR1(0.08, 2.0)}, "more of some frequencies"),
+        ({"ar1": AR1(0.05, 20.0)}, "The residual wanders"),
         ({"outliers": Outliers(0.005, 20.0)}, "outliers, as of Gaussian noise"),
     ],
 )

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import Drift, Outliers, Relaxing
+from biogrip.experiment.noise_parts import AR1, Drift, Outliers
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.multi_start import identify_from
@@ -127,12 +127,12 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
 
 
 def test_noise_is_found_and_said() -> None:
-    noise = Noise("gaussian", 0.02, "peak", relaxing=Relaxing(0.5, 5.0), drift=Drift(2.0))
+    noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
     case_problem = replace(POSED, coloured=True)
     fit = trace_fit(case_problem, TIMES, noisy(noise), find)
     assert fit.noise_model is not None
-    assert fit.noise_model.relaxing + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
+    assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
     away = np.abs(noisy(noise) - noisy(replace(noise, outliers=None))) / (0.02 * CLEAN.max())
     # What is only just outside of the noise may be missed, or not.
     assert set(np.flatnonzero(away > 2 * FAR)) <= set(np.flatnonzero(fit.outliers))

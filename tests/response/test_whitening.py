@@ -23,7 +23,7 @@ def correlation(time_s: Array, noise_model: NoiseModel) -> Array:
     flicker = np.mean([np.exp(-rate * apart) for rate in rates], axis=0)
     matrix: Array = (
         noise_model.white * np.eye(len(time_s))
-        + noise_model.relaxing * np.exp(-apart / noise_model.time_s)
+        + noise_model.ar1 * np.exp(-apart / noise_model.time_s)
         + noise_model.flicker * flicker
     )
     return matrix

@@ -106,7 +106,7 @@ def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
             return _sampled(inputs, phases)
     raise BiogripError(
         "design: with all torques that were found the jaws would have to pull at some instant; "
-        "allowed are more torques to be tried (`tried`)."
+        "allowed are more torques to be tried (`candidates`)."
     )
 
 

@@ -164,7 +164,7 @@ def best_torques(
     if not found:
         raise BiogripError(
             f"design: with none of {count} torques do the jaws press throughout; allowed are more "
-            "(`tried`), or samples that are less different."
+            "(`candidates`), or samples that are less different."
         )
     found.sort(key=lambda each: each[0])
     return [search.torque(shares) for _, search, shares in found]

@@ -25,7 +25,7 @@ class DesignSettings(Block):
 
     noise_rad: Annotated[float, Field(ge=1e-15, le=1.0)]
     """Standard deviation of the sensor's noise."""
-    samples: Annotated[int, Field(ge=10, le=1_000_000)]
+    readings: Annotated[int, Field(ge=10, le=1_000_000)]
     """Total number of readings."""
     fastest_Hz: Annotated[float, Field(ge=1e-3, le=1e9)]
     """Most readings in a second."""
@@ -57,9 +57,9 @@ class DesignSettings(Block):
     ranges: Mapping[str, _Ends] | None = None
     """Lowest and highest plausible value of parameters, in SI units. Those without one are as in
     the case's sample. By default, that sample alone is plausible."""
-    drawn: Annotated[int, Field(ge=2, le=256)] = 8
+    plausible_samples: Annotated[int, Field(ge=2, le=256)] = 8
     """Plausible samples, spread evenly over these ranges. By default 8."""
-    tried: Annotated[int, Field(ge=128, le=1_000_000)] = 2000
+    candidates: Annotated[int, Field(ge=128, le=1_000_000)] = 2000
     """Torques that the search tries, about, as many of each shape. By default 2000."""
     sequence: SequenceSettings | None = None
 

@@ -9,10 +9,10 @@ from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise_parts import (
+    AR1,
     Drift,
     Flicker,
     Outliers,
-    Relaxing,
     draw_ornstein_uhlenbeck,
     flicker_rates,
 )
@@ -41,7 +41,7 @@ class Noise(Block):
     level_rad: Annotated[float | None, Field(ge=0, le=10)] = None
     """Standard deviation of the noise as an instrument has it, the same whatever the sample, e.g.
     3.0e-6. Where it is given, `level` does not count."""
-    relaxing: Relaxing | None = None
+    ar1: AR1 | None = None
     """Autocorrelated component, AR(1); Gaussian. By default none."""
     flicker: Flicker | None = None
     """Component of spectrum 1/f; Gaussian. By default none."""
@@ -52,15 +52,15 @@ class Noise(Block):
 
     def problems(self) -> Iterator[Problem]:
         """Find components whose shares exceed one together."""
-        shares = [part.share for part in (self.relaxing, self.flicker) if part is not None]
+        shares = [part.share for part in (self.ar1, self.flicker) if part is not None]
         if sum(shares) > 1:
-            text = f"found {sum(shares):g} with that of relaxing, allowed is at most 1 together."
+            text = f"found {sum(shares):g} with that of ar1, allowed is at most 1 together."
             yield ("flicker", "share"), text
 
     @property
     def white(self) -> bool:
         """True if readings have independent noise without drift and outliers."""
-        return not (self.relaxing or self.flicker or self.drift or self.outliers)
+        return not (self.ar1 or self.flicker or self.drift or self.outliers)
 
     @property
     def absent(self) -> bool:
@@ -104,10 +104,10 @@ def add_noise(
 
 def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generator) -> Array:
     """Replace shares of white noise by autocorrelated noise, and add drift and outliers."""
-    shares = [part.share for part in (noise.relaxing, noise.flicker) if part is not None]
+    shares = [part.share for part in (noise.ar1, noise.flicker) if part is not None]
     unit = np.sqrt(max(0.0, 1 - sum(shares))) * unit
-    if noise.relaxing is not None:
-        weight, rate = np.array([noise.relaxing.share]), np.array([1 / noise.relaxing.time_s])
+    if noise.ar1 is not None:
+        weight, rate = np.array([noise.ar1.share]), np.array([1 / noise.ar1.time_s])
         unit += draw_ornstein_uhlenbeck(time_s, weight, rate, rng)
     if noise.flicker is not None:
         rates = flicker_rates(time_s)

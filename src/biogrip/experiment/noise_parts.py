@@ -17,7 +17,7 @@ _SLOWEST = 3.0
 
 
 @dataclass(frozen=True)
-class Relaxing(Block):
+class AR1(Block):
     """Ornstein-Uhlenbeck noise of one relaxation time, of spectrum 1/(1 + (2 pi f tau)^2)."""
 
     share: Annotated[float, Field(gt=0, le=1)]

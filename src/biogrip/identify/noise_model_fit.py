@@ -22,7 +22,7 @@ from biogrip.response.whitening import NoiseModel, Whitening
 # Bounds of the logarithm of a component's share over that of white noise: from none to all.
 _LEAST, _MOST = -9.0, 7.0
 # The likelihood has several maxima. Grid of log odds, and of places between the shortest and the
-# longest time; starts are the best points with more relaxing, and with more 1/f noise.
+# longest time; starts are the best points with more ar1, and with more 1/f noise.
 _ODDS, _PLACES = (_LEAST, -4.0, -1.0, 2.0, 6.0), (0.15, 0.35, 0.6, 0.85)
 _STEP, _CONVERGED = 1e-4, 1e-9
 # Step of finite differences.
@@ -139,12 +139,12 @@ class NoiseModelLikelihood:
         return float(left @ left), of_reached, whitening.log_determinant
 
     def _best_of_each(self) -> list[Array]:
-        """Return the best points of a grid with more relaxing, and with more 1/f noise."""
+        """Return the best points of a grid with more ar1, and with more 1/f noise."""
         shortest, longest = self._bounds[1]
         tried = [
-            np.array([relaxing, shortest + place * (longest - shortest), flicker])
-            for relaxing in _ODDS
-            for place in (_PLACES if relaxing > _LEAST else _PLACES[:1])
+            np.array([ar1, shortest + place * (longest - shortest), flicker])
+            for ar1 in _ODDS
+            for place in (_PLACES if ar1 > _LEAST else _PLACES[:1])
             for flicker in _ODDS
         ]
         sides = [x for x in tried if x[0] > x[2]], [x for x in tried if x[0] <= x[2]]
@@ -152,15 +152,15 @@ class NoiseModelLikelihood:
 
 
 def _logarithms(noise_model: NoiseModel) -> Array:
-    odds = np.array([noise_model.relaxing, noise_model.flicker]) / noise_model.white
+    odds = np.array([noise_model.ar1, noise_model.flicker]) / noise_model.white
     return np.array([np.log(odds[0]), np.log(noise_model.time_s), np.log(odds[1])])
 
 
 def _noise_model(x: Array) -> NoiseModel:
     """Return the noise model of two log odds and the logarithm of a time."""
-    relaxing, flicker = np.exp(x[0]), np.exp(x[2])
-    whole = 1 + relaxing + flicker
-    return NoiseModel(float(relaxing / whole), float(np.exp(x[1])), float(flicker / whole))
+    ar1, flicker = np.exp(x[0]), np.exp(x[2])
+    whole = 1 + ar1 + flicker
+    return NoiseModel(float(ar1 / whole), float(np.exp(x[1])), float(flicker / whole))
 
 
 def _independent(directions: Array) -> Array:

@@ -70,9 +70,9 @@ class TraceFit:
 
     def swallowed(self) -> str | None:
         """Say in a sentence if the noise model holds what looks like misfit; else None."""
-        if self.noise_model is None or self.noise_model.relaxing < _NOTICEABLE:
+        if self.noise_model is None or self.noise_model.ar1 < _NOTICEABLE:
             return None
-        share, time_s = self.noise_model.relaxing, self.noise_model.time_s
+        share, time_s = self.noise_model.ar1, self.noise_model.time_s
         duration_s = self.problem.residuals.duration_s
         long = time_s > _LONGEST * duration_s
         if not long and not (share > _MOST and time_s > _SLOW * duration_s):
@@ -89,9 +89,9 @@ class TraceFit:
             return []
         noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
         parts = [f"{_percent(noise_model.white)} white"]
-        if noise_model.relaxing >= _WORTH_SAYING:
+        if noise_model.ar1 >= _WORTH_SAYING:
             parts.append(
-                f"{_percent(noise_model.relaxing)} correlated over some {noise_model.time_s:.2g} s"
+                f"{_percent(noise_model.ar1)} correlated over some {noise_model.time_s:.2g} s"
             )
         if noise_model.flicker >= _WORTH_SAYING:
             parts.append(f"{_percent(noise_model.flicker)} 1/f")
@@ -205,8 +205,8 @@ def _in_turn(
 def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
-    shares = abs(one.relaxing - other.relaxing) + abs(one.flicker - other.flicker)
-    times = min(one.relaxing, other.relaxing) * abs(np.log(one.time_s / other.time_s))
+    shares = abs(one.ar1 - other.ar1) + abs(one.flicker - other.flicker)
+    times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)
 
 

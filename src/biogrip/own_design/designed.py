@@ -78,7 +78,9 @@ def designed(
     block = case.block.design
     assert block is not None
     rng = stream(study_seed, case.name, 0, "design")
-    inputs, plan = plan_within_reach(make_design_inputs(case, earlier), block.tried, rng, progress)
+    inputs, plan = plan_within_reach(
+        make_design_inputs(case, earlier), block.candidates, rng, progress
+    )
     history = torque_history(case.phases)
     sensitivity = compute_sensitivities(
         inputs.gripper,

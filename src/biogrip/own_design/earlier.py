@@ -71,7 +71,9 @@ def estimate_from_recordings(
     earlier, ends = None, plausible_ends(case)
     for count, recorded in enumerate(traces, 1):
         joint = joint_problem(problems[:count], count * [noise_rad])
-        earlier = estimate_from_traces(joint, noise_rad, identify, ends, block.drawn, rng, earlier)
+        earlier = estimate_from_traces(
+            joint, noise_rad, identify, ends, block.plausible_samples, rng, earlier
+        )
         if earlier.misfit_rad > _UNLIKE * noise_rad:
             raise BiogripError(
                 f"--after: {recorded.file}: found {earlier.misfit_rad:.3g} rad that the best fit "

@@ -33,7 +33,7 @@ class NoiseModel:
 
     Parameters
     ----------
-    relaxing
+    ar1
         Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling.
     time_s
         Its relaxation time.
@@ -41,14 +41,14 @@ class NoiseModel:
         Share of noise with spectrum 1/f. The rest is white.
     """
 
-    relaxing: float
+    ar1: float
     time_s: float
     flicker: float
 
     @property
     def white(self) -> float:
         """Share of white noise."""
-        return 1 - self.relaxing - self.flicker
+        return 1 - self.ar1 - self.flicker
 
 
 class Whitening:
@@ -79,7 +79,7 @@ class Whitening:
         flicker = flicker_rates(time_s)
         rates = np.append(1 / noise_model.time_s, flicker)
         shares = np.append(
-            noise_model.relaxing, np.full(len(flicker), noise_model.flicker / len(flicker))
+            noise_model.ar1, np.full(len(flicker), noise_model.flicker / len(flicker))
         )
         self._solve = driver.solve_lower
         self._time_s, self._rates = np.ascontiguousarray(time_s, float), rates

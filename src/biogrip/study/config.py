@@ -13,7 +13,7 @@ from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Block, Distinct, OneOf, Problem
 from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
-from biogrip.study.readings import ReadingBlock
+from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
 
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
@@ -144,12 +144,12 @@ class StudyConfig(Shared):
             "others, and shown in heat maps and their table only."
         ),
     ] = {}
-    readings: Annotated[
-        Mapping[_Name, ReadingBlock],
+    interpretations: Annotated[
+        Mapping[_Name, InterpretationBlock],
         Field(
             max_length=100,
-            description="Readings of the paper, by name, each tried with the genetic algorithm on "
-            "the noisy traces of every simulated case, for a table.",
+            description="Interpretations of the paper, by name, each tried with the genetic algorithm "
+            "on the noisy traces of every simulated case, for a table.",
         ),
     ] = {}
 

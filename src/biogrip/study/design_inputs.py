@@ -39,7 +39,7 @@ def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInpu
         model=model,
         parameters=earlier.parameters if earlier else plausible(case, block),
         noise_rad=block.noise_rad,
-        samples=block.samples,
+        samples=block.readings,
         fastest_Hz=block.fastest_Hz,
         limits=Limits(
             block.longest_s, slots / block.fastest_Hz, block.most_steps, 1 / block.fastest_Hz
@@ -79,7 +79,7 @@ def plausible(case: Case, block: DesignSettings) -> Array:
     # Imported lazily: no other command needs it, and it is slow to import.
     from scipy.stats import qmc
 
-    spread = qmc.Halton(len(names), scramble=False).random(block.drawn + 1)[1:]
+    spread = qmc.Halton(len(names), scramble=False).random(block.plausible_samples + 1)[1:]
     drawn: Array = np.exp(low + (high - low) * spread)
     return drawn
 

@@ -21,6 +21,11 @@ MOST_EXPLAINED = 1000
 _RETIRED: dict[tuple[int | str, ...], str] = {
     ("models", "inertia"): "no longer needed: traces that show the arms ringing are fitted with "
     "their inertia. Leave it out.",
+    ("readings",): "now called `interpretations`.",
+    ("noise", "relaxing"): "now called `ar1`.",
+    ("design", "samples"): "now called `readings`.",
+    ("design", "drawn"): "now called `plausible_samples`.",
+    ("design", "tried"): "now called `candidates`.",
 }
 
 _UNITS = ([*TIME_UNITS], [*ROTATION_UNITS])

@@ -22,8 +22,8 @@ from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
+from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
-from biogrip.study.readings import read_blocks
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import Sweep, make_sweeps, point_blocks
 from biogrip.traces.recordings import Columns
@@ -244,9 +244,9 @@ class Case:
         return self.genetic.mutation_start if mutates else None
 
     @property
-    def readings(self) -> dict[str, "Case"]:
-        """The case under each reading of the paper, by the reading's name."""
-        return {name: cases[self.name] for name, cases in self.study.readings.items()}
+    def interpretations(self) -> dict[str, "Case"]:
+        """The case under each interpretation of the paper, by the interpretation's name."""
+        return {name: cases[self.name] for name, cases in self.study.interpretations.items()}
 
     @property
     def models(self) -> dict[str, Sample]:
@@ -313,11 +313,13 @@ class Study:
         return make_sweeps(self.config.sweeps)
 
     @cached_property
-    def readings(self) -> dict[str, dict[str, Case]]:
-        """Simulated cases under each reading, by name of reading and case."""
-        found: dict[str, dict[str, Case]] = {name: {} for name in self.config.readings}
-        for reading, name, block in read_blocks(self.config.readings, self.config.cases):
-            found[reading] |= self._cases({name: built(CaseBlock, block)})
+    def interpretations(self) -> dict[str, dict[str, Case]]:
+        """Simulated cases under each interpretation, by name of interpretation and case."""
+        found: dict[str, dict[str, Case]] = {name: {} for name in self.config.interpretations}
+        for interpretation, name, block in read_blocks(
+            self.config.interpretations, self.config.cases
+        ):
+            found[interpretation] |= self._cases({name: built(CaseBlock, block)})
         return found
 
     def _cases(self, blocks: Mapping[str, CaseBlock]) -> dict[str, Case]:
@@ -358,9 +360,9 @@ class Study:
         return METHODS["least_squares" if "least_squares" in self.methods else self.shown]
 
     @property
-    def reading_titles(self) -> dict[str, str]:
-        """Titles of the readings by name."""
-        return {name: block.title for name, block in self.config.readings.items()}
+    def interpretation_titles(self) -> dict[str, str]:
+        """Titles of the interpretations by name."""
+        return {name: block.title for name, block in self.config.interpretations.items()}
 
     @property
     def selects_models(self) -> bool:

@@ -12,10 +12,10 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.keys import Problem
 from biogrip.study.case_blocks import METHOD_BLOCKS, OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.config import StudyConfig
+from biogrip.study.interpretations import read_blocks
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.messages import MOST_EXPLAINED, checked, inside, unknown
 from biogrip.study.plain import plain
-from biogrip.study.readings import read_blocks
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
 from biogrip.study.sweeps import list_points, make_sweeps, point_blocks
@@ -156,9 +156,9 @@ def _point_problems(study: StudyConfig) -> Iterator[Problem]:
 
 def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
     """Check every case under every reading as if it were a case of the config."""
-    for reading, _, block in read_blocks(study.readings, study.cases):
+    for interpretation, _, block in read_blocks(study.interpretations, study.cases):
         for path, text in _with_methods(CaseBlock, block)[1]:
-            yield ("readings", reading, "changes", *path), text
+            yield ("interpretations", interpretation, "changes", *path), text
 
 
 def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:

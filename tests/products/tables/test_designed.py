@@ -15,7 +15,7 @@ from biogrip.study.study import Study
 from tests.helpers.default import study_of
 
 OVERLAY = """
-design: {noise_rad: 3.0e-6, samples: 100, fastest_Hz: 1.0e+5, longest_s: 4.0,
+design: {noise_rad: 3.0e-6, readings: 100, fastest_Hz: 1.0e+5, longest_s: 4.0,
          largest_torque_Nm: 1.6e-9}
 only: [endothelial_cell]
 identifiability: {coverage_seeds: SEEDS}

@@ -81,7 +81,8 @@ def _problem(case: Case) -> CaseProblem:
 
 
 _CASE = using(
-    "name sampling design.tried design.drawn least_squares confidence study.study_seed",
+    "name sampling design.candidates design.plausible_samples least_squares confidence "
+    "study.study_seed",
     problem=_problem,
 )
 
@@ -184,7 +185,7 @@ class _Cell:
                 noise_rad,
                 partial(self._identify, AFTER, count),
                 planned.within,
-                planned.case.design.drawn,
+                planned.case.design.plausible_samples,
                 self._stream(f"{AFTER} {count}, drawn"),
                 earlier,
             )
@@ -208,7 +209,7 @@ class _Cell:
 
     def _designed(self, purpose: str, inputs: DesignInputs) -> Experiment:
         rng = self._stream(f"{purpose}, design")
-        _, plan = plan_within_reach(inputs, self._case.design.tried, rng, silent)
+        _, plan = plan_within_reach(inputs, self._case.design.candidates, rng, silent)
         return plan.phases, Sampling(bursts=plan.bursts)
 
     def _identify(self, way: str, count: int, problem: Problem) -> Identification:

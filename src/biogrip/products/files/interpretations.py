@@ -1,19 +1,19 @@
-"""Identifications by the genetic algorithm under readings of the paper: a row per reading, seed."""
+"""Identifications by the genetic algorithm, a row for each interpretation of the paper and seed."""
 
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.products.files.rows import RowFile
 
-READINGS = RowFile(
-    "readings",
+INTERPRETATIONS = RowFile(
+    "interpretations",
     (
         "case",
-        "reading",
+        "interpretation",
         "seed",
         *(parameter.column for parameter in SINGLE_BRANCH),
         "misfit_rad",
         "noise_rms_rad",
         "last_improvement",
     ),
-    "results/readings/{case}.csv",
-    words=("reading",),
+    "results/interpretations/{case}.csv",
+    words=("interpretation",),
 )

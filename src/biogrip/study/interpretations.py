@@ -1,4 +1,4 @@
-"""Readings: alternative interpretations of the paper, each tried on all simulated cases."""
+"""Interpretations: alternative interpretations of the paper, each tried on all simulated cases."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from biogrip.study.source import overlaid
 
 
 @dataclass(frozen=True)
-class ReadingBlock(Block):
+class InterpretationBlock(Block):
     """An alternative interpretation of the paper: changes to every simulated case."""
 
     title: Printed
@@ -21,21 +21,21 @@ class ReadingBlock(Block):
 
 
 def read_blocks(
-    readings: Mapping[str, ReadingBlock], cases: Mapping[str, CaseBlock]
+    interpretations: Mapping[str, InterpretationBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Yield the config block of every simulated case under every reading, as plain data.
+    """Yield the config block of every simulated case under every interpretation, as plain data.
 
     Parameters
     ----------
-    readings, cases
+    interpretations, cases
         Blocks of a study's config.
 
     Yields
     ------
     tuple
-        Name of the reading, name of the case, and the block.
+        Name of the interpretation, name of the case, and the block.
     """
-    for reading, block in readings.items():
+    for interpretation, block in interpretations.items():
         for name, case in cases.items():
             if not case.recorded:
-                yield reading, name, overlaid(plain(case), block.changes)
+                yield interpretation, name, overlaid(plain(case), block.changes)

@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
-from biogrip.experiment.noise_parts import Flicker, Relaxing
+from biogrip.experiment.noise_parts import AR1, Flicker
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood, _logarithms
 from biogrip.response.whitening import NoiseModel, Whitening
 from tests.response.test_whitening import correlation
@@ -53,7 +53,7 @@ def test_what_directions_have_in_it_does_not_matter() -> None:
     ("noise", "expected"),
     [
         (Noise("gaussian", 1.0, "peak"), (0.0, 0.0)),
-        (Noise("gaussian", 1.0, "peak", relaxing=Relaxing(0.5, 10.0)), (0.45, 0.0)),
+        (Noise("gaussian", 1.0, "peak", ar1=AR1(0.5, 10.0)), (0.45, 0.0)),
         (Noise("gaussian", 1.0, "peak", flicker=Flicker(0.5)), (0.0, 0.5)),
     ],
 )
@@ -68,7 +68,7 @@ def test_colours_are_found(noise: Noise, expected: tuple[float, float]) -> None:
         trace = add_noise(np.ones(1500), noise, np.random.default_rng([seed, 5]), times)
         noise_model = NoiseModelLikelihood(times, trace, np.ones((1, 1500))).best()
         # What is forgotten within a sample is white.
-        slow = noise_model.relaxing * np.exp(-1 / noise_model.time_s)
+        slow = noise_model.ar1 * np.exp(-1 / noise_model.time_s)
         found.append((slow, noise_model.flicker))
     np.testing.assert_allclose(np.median(found, axis=0), expected, atol=0.12)
 
@@ -80,7 +80,7 @@ def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
     logarithms is known to 22 %, and Satterthwaite's formula is of first order.
     """
     times = np.arange(400.0)
-    noise = Noise("gaussian", 1.0, "peak", relaxing=Relaxing(0.6, 8.0))
+    noise = Noise("gaussian", 1.0, "peak", ar1=AR1(0.6, 8.0))
     direction = (times / 400)[None]
     logs, freedoms = [], []
     for seed in range(40):

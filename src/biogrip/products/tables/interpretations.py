@@ -1,4 +1,4 @@
-"""Comparison of readings of section 4: success rate, errors and last improvement."""
+"""Comparison of interpretations of section 4: success rate, errors and last improvement."""
 
 from pathlib import Path
 
@@ -9,9 +9,9 @@ from biogrip.arrays import BoolArray
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
 from biogrip.identify.success import near_noise, near_noise_words
-from biogrip.products.files.readings import READINGS
+from biogrip.products.files.interpretations import INTERPRETATIONS
 from biogrip.products.product import of_cases
-from biogrip.products.stages.readings import read_cases
+from biogrip.products.stages.interpretations import read_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.uses import each, from_study
@@ -23,17 +23,17 @@ _ALL = ("k", "k_p", "c")
 _ROUNDING = 0.005
 
 
-def readings(study: Study, found: list[Path]) -> Table:
-    """Compare the readings from the rows of each case, CSV."""
+def interpretations(study: Study, found: list[Path]) -> Table:
+    """Compare the interpretations from the rows of each case, CSV."""
     rows = [
         row
         for path, (name, case) in zip(found, study.cases.items(), strict=True)
-        for row in _rows(study, name, case.truth, READINGS.read(path))
+        for row in _rows(study, name, case.truth, INTERPRETATIONS.read(path))
     ]
     words = near_noise_words(study.near_noise_tolerance)
     columns = (
         Column("case", "Case"),
-        Column("reading", "Reading"),
+        Column("interpretation", "Interpretation"),
         Column("seeds", "Seeds"),
         Column("near_noise_share", f"Share {words}", 2),
         Column("as_close_share", f"Share as close as the paper in {', '.join(_ALL)}", 2),
@@ -41,8 +41,8 @@ def readings(study: Study, found: list[Path]) -> Table:
         Column("last_improvement", "Last improvement", 3),
     )
     caption = (
-        "The genetic algorithm under other readings of section 4, on the same traces. Errors: "
-        "median over seeds of the absolute error. Last improvement: median generation in which "
+        "The genetic algorithm under other interpretations of section 4, on the same traces. "
+        "Errors: median over seeds of the absolute error. Last improvement: median generation in which "
         "the best misfit fell for the last time; the paper shows its fits of Tables 5 and 7 at "
         "generations 70 and 61."
     )
@@ -51,8 +51,8 @@ def readings(study: Study, found: list[Path]) -> Table:
 
 def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
-    for name, title in study.reading_titles.items():
-        mine = found[found["reading"] == name]
+    for name, title in study.interpretation_titles.items():
+        mine = found[found["interpretation"] == name]
         errors = {
             p.name: 100 * np.abs(mine[p.column].to_numpy(float) / truth.parameters[p.name] - 1)
             for p in SINGLE_BRANCH
@@ -92,13 +92,13 @@ def _median(errors: "np.ndarray | None") -> float | None:
     return None if errors is None else float(np.median(errors))
 
 
-READINGS_TABLE = table(
-    readings,
-    name="readings",
-    item="readings",
-    caption="How often the genetic algorithm finds the samples under other readings of the "
+INTERPRETATIONS_TABLE = table(
+    interpretations,
+    name="interpretations",
+    item="interpretations",
+    caption="How often the genetic algorithm finds the samples under other interpretations of the "
     "paper's section 4, and in which generation it improves for the last time.",
-    uses=from_study("reading_titles near_noise_tolerance", cases=each(read_cases, "truth")),
-    reads={"found": of_cases(READINGS.path, read_cases)},
-    when=lambda study: study.readings,
+    uses=from_study("interpretation_titles near_noise_tolerance", cases=each(read_cases, "truth")),
+    reads={"found": of_cases(INTERPRETATIONS.path, read_cases)},
+    when=lambda study: study.interpretations,
 )

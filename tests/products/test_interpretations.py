@@ -1,4 +1,4 @@
-"""Readings of section 4: each found as if the study had said so, and told in one table."""
+"""Interpretations of section 4: each found as if the study had said so, and told in one table."""
 
 from pathlib import Path
 
@@ -7,13 +7,13 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.products.files.identifications import BATCHES, read_identifications
-from biogrip.products.files.readings import READINGS
+from biogrip.products.files.interpretations import INTERPRETATIONS
 from biogrip.products.plan import Plan
 from biogrip.products.stages.identification import IDENTIFICATION
+from biogrip.products.stages.interpretations import READ
 from biogrip.products.stages.measurement import MEASUREMENT
-from biogrip.products.stages.readings import READ
 from biogrip.products.stages.target import TARGET
-from biogrip.products.tables.readings import READINGS_TABLE
+from biogrip.products.tables.interpretations import INTERPRETATIONS_TABLE
 from biogrip.study.study import Study
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
@@ -24,7 +24,7 @@ methods: [genetic]
 measurement: {rate_Hz: 1.0}
 genetic_algorithm: {population: 40, survivors: 20, max_generations: 40}
 cases: {liquid_drop_1: null, endothelial_cell: null}
-readings:
+interpretations:
   printed: {title: as printed, changes: {}}
   patience: {title: patient, changes: {genetic_algorithm: {min_generations: 40}}}
   three:
@@ -42,8 +42,8 @@ def study() -> Study:
 
 @pytest.fixture(scope="module")
 def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the readings have been tried, and the study's own algorithm."""
-    made = tmp_path_factory.mktemp("readings")
+    """Where the interpretations have been tried, and the study's own algorithm."""
+    made = tmp_path_factory.mktemp("interpretations")
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(made)
         plan = Plan(study, Path("results"))
@@ -52,25 +52,25 @@ def folder(study: Study, tmp_path_factory: pytest.TempPathFactory) -> Path:
         MEASUREMENT.run(plan, CASE | batch)
         IDENTIFICATION.run(plan, CASE | batch | {"method": "genetic"})
         READ.run(plan, CASE)
-        READINGS_TABLE.run(plan, {})
+        INTERPRETATIONS_TABLE.run(plan, {})
     return made
 
 
 def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path) -> None:
     path = folder / BATCHES.format(case="liquid_drop_2", method="genetic", batch="seeds_0-2")
     ours = read_identifications(path)
-    rows = READINGS.read(folder / READINGS.path.format(**CASE))
-    same = rows[rows["reading"] == "printed"].reset_index(drop=True)
+    rows = INTERPRETATIONS.read(folder / INTERPRETATIONS.path.format(**CASE))
+    same = rows[rows["interpretation"] == "printed"].reset_index(drop=True)
     for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit_rad"):
         np.testing.assert_array_equal(same[column], ours[column])
     np.testing.assert_array_equal(same["noise_rms_rad"], ours["noise_rms_rad"])
     for name in ("three", "uniform"):
-        others = rows[rows["reading"] == name].reset_index(drop=True)
+        others = rows[rows["interpretation"] == name].reset_index(drop=True)
         assert not np.array_equal(others["misfit_rad"], same["misfit_rad"]), name
 
 
 def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:
-    lines = (folder / "results/tables/readings.csv").read_text(encoding="utf-8").splitlines()
+    lines = (folder / "results/tables/interpretations.csv").read_text(encoding="utf-8").splitlines()
     assert [line.split(",")[1] for line in lines[1:]] == [
         "as printed",
         "patient",
@@ -80,7 +80,7 @@ def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:
 
 
 def test_a_reading_changes_only_what_it_says(study: Study) -> None:
-    found = study.case(CASE["case"]).readings
+    found = study.case(CASE["case"]).interpretations
     assert found["patience"].problem == found["printed"].problem
     assert (found["printed"].genetic.patience, found["patience"].genetic.min_generations) == (
         20,
@@ -92,11 +92,14 @@ def test_a_reading_changes_only_what_it_says(study: Study) -> None:
 
 def test_a_reading_that_no_case_can_have_is_explained() -> None:
     with pytest.raises(
-        BiogripError, match=r"readings.odd.changes.genetic_algorithm.survivors: found 500, allowed"
+        BiogripError,
+        match=r"interpretations.odd.changes.genetic_algorithm.survivors: found 500, allowed",
     ):
-        study_of("readings: {odd: {title: odd, changes: {genetic_algorithm: {survivors: 500}}}}")
+        study_of(
+            "interpretations: {odd: {title: odd, changes: {genetic_algorithm: {survivors: 500}}}}"
+        )
 
 
 def test_the_overlay_that_is_published_is_a_study() -> None:
-    text = (ROOT / "config" / "readings.yaml").read_text(encoding="utf-8")
-    assert len(study_of(text).readings) == 12
+    text = (ROOT / "config" / "interpretations.yaml").read_text(encoding="utf-8")
+    assert len(study_of(text).interpretations) == 12

@@ -1,4 +1,4 @@
-"""Stage 3: identifications by the genetic algorithm under alternative readings of the paper."""
+"""Stage 3: identifications by the genetic algorithm under other interpretations of the paper."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +11,7 @@ from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic import identify_many
-from biogrip.products.files.readings import READINGS
+from biogrip.products.files.interpretations import INTERPRETATIONS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Weight, the
@@ -22,9 +22,9 @@ from biogrip.study.study import Case, Study
 
 
 def read(case: Case, target: Path, rows: Path) -> None:
-    """Identify every noisy trace of a case under every reading by the genetic algorithm.
+    """Identify every noisy trace of a case under every interpretation by the genetic algorithm.
 
-    Random streams are those of the study, so a reading that changes nothing reproduces the
+    Random streams are those of the study, so a interpretation that changes nothing reproduces the
     study's results.
 
     Parameters
@@ -34,24 +34,26 @@ def read(case: Case, target: Path, rows: Path) -> None:
     target
         Target, CSV.
     rows
-        One row per reading and seed, CSV.
+        One row per interpretation and seed, CSV.
     """
-    READINGS.write(rows, _rows(case, target))
+    INTERPRETATIONS.write(rows, _rows(case, target))
 
 
 def _rows(case: Case, target: Path) -> Iterator[tuple[str | int, ...]]:
     time_s, _, rotation = read_target(target)
-    progress = Progress(f"{case.name}, readings", len(case.readings) * case.seeds)
-    for name, reading in case.readings.items():
-        case_problem = reading.problem
+    progress = Progress(f"{case.name}, interpretations", len(case.interpretations) * case.seeds)
+    for name, interpretation in case.interpretations.items():
+        case_problem = interpretation.problem
         for seeds in groups(range(case.seeds)):
             streams = {
                 purpose: [stream(case.study.study_seed, case.name, seed, purpose) for seed in seeds]
                 for purpose in ("noise", "genetic")
             }
-            traces = [add_noise(rotation, reading.noise, rng, time_s) for rng in streams["noise"]]
+            traces = [
+                add_noise(rotation, interpretation.noise, rng, time_s) for rng in streams["noise"]
+            ]
             problems = [case_problem.of(time_s, trace) for trace in traces]
-            found = identify_many(problems, reading.genetic, streams["genetic"])
+            found = identify_many(problems, interpretation.genetic, streams["genetic"])
             for seed, trace, answer in zip(seeds, traces, found, strict=True):
                 names = case_problem.searched.names
                 values = {**case_problem.fixed, **dict(zip(names, answer.parameters, strict=True))}
@@ -73,15 +75,15 @@ def _last_improvement(answer: Identification) -> int:
     return int(falls[-1]) + 1 if len(falls) else 0
 
 
-def _readings(case: Case) -> dict[str, Any]:
+def _interpretations(case: Case) -> dict[str, Any]:
     view = using("problem genetic noise")
-    return {name: view(read) for name, read in case.readings.items()}
+    return {name: view(read) for name, read in case.interpretations.items()}
 
 
 def read_cases(study: Study) -> list[str]:
-    """Return the simulated cases that readings apply to: their model has the paper's parameters."""
+    """Return the simulated cases that interpretations apply to: their model has the paper's parameters."""
     ours = {parameter.name for parameter in SINGLE_BRANCH}
-    names = study.simulated if study.readings else []
+    names = study.simulated if study.interpretations else []
     return [name for name in names if set(study.case(name).sample.model.names) <= ours]
 
 
@@ -90,12 +92,12 @@ def _jobs(plan: Plan) -> list[Wildcards]:
 
 
 READ = Product(
-    "readings_of_case",
-    {"rows": READINGS.path},
+    "interpretations_of_case",
+    {"rows": INTERPRETATIONS.path},
     read,
-    from_case("name seeds study.study_seed", readings=_readings),
+    from_case("name seeds study.study_seed", interpretations=_interpretations),
     _jobs,
-    message="Identifying {case} under every reading of the paper",
+    message="Identifying {case} under every interpretation of the paper",
     reads={"target": the(TARGETS)},
     weight=Weight(120, 1000),
 )
