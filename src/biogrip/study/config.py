@@ -148,8 +148,8 @@ class StudyConfig(Shared):
         Mapping[_Name, InterpretationBlock],
         Field(
             max_length=100,
-            description="Interpretations of the paper, by name, each tried with the genetic algorithm "
-            "on the noisy traces of every simulated case, for a table.",
+            description="Interpretations of the paper, by name, each tried with the genetic "
+            "algorithm on the noisy traces of every simulated case, for a table.",
         ),
     ] = {}
 

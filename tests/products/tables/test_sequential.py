@@ -31,7 +31,7 @@ OVERLAY = """
 only: [endothelial_cell]
 measurement: {rate_Hz: 0.5}
 least_squares: {candidates: 100, starts: 3}
-design: {noise_rad: 3.0e-6, samples: 300, fastest_Hz: 1.0e+5, longest_s: 400.0,
+design: {noise_rad: 3.0e-6, readings: 300, fastest_Hz: 1.0e+5, longest_s: 400.0,
          largest_torque_Nm: 1.6e-9, most_steps: 6, plausible_samples: 4, candidates: 128,
          ranges: {c_p: [1.0e-2, 1.0]}, sequence: {cells: 3, experiments: 2}}
 """

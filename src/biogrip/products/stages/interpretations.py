@@ -81,7 +81,7 @@ def _interpretations(case: Case) -> dict[str, Any]:
 
 
 def read_cases(study: Study) -> list[str]:
-    """Return the simulated cases that interpretations apply to: their model has the paper's parameters."""
+    """Return the simulated cases to interpret: those whose model has the paper's parameters."""
     ours = {parameter.name for parameter in SINGLE_BRANCH}
     names = study.simulated if study.interpretations else []
     return [name for name in names if set(study.case(name).sample.model.names) <= ours]
