@@ -43,8 +43,8 @@ def interpretations(study: Study, found: list[Path]) -> Table:
     caption = (
         "The genetic algorithm under other interpretations of section 4, on the same traces. "
         "Errors: median over seeds of the absolute error. Last improvement: median generation in "
-        "which the best misfit fell for the last time; the paper shows its fits of Tables 5 and 7 at "
-        "generations 70 and 61."
+        "which the best misfit fell for the last time; the paper shows its fits of Tables 5 and 7 "
+        "at generations 70 and 61."
     )
     return Table(caption, columns, rows)
 
