@@ -133,7 +133,7 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: P
     # Two batches of seeds, two methods; what is left is done once for the case.
     batches = {"measurement": 2, "identification": 4, "model_fits": 2, "intervals": 2}
     assert {rule: jobs.pop(rule) for rule in batches} == batches
-    joined = {"identifications", "timings_of_case", "coverage_of_case", "selection_of_case"}
+    joined = {"identifications", "joined"}
     once = {"target", "judgement", "expectation", "errors_of_case", "verdicts", "case_figures"}
     assert jobs == dict.fromkeys(joined | once, 1)
 
