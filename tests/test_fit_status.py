@@ -103,6 +103,28 @@ def test_a_right_set_up_is_ok(tmp_path: Path, noise_model: str) -> None:
     assert [each["fit"] for each in found] == [OK] * len(traces)
 
 
+def test_a_parameter_at_the_end_of_its_range_is_named(tmp_path: Path) -> None:
+    """What the other parameters then are, is not what they are in truth."""
+    narrow = "search_range: {k_p: {exponent: [-3, -1], digit: [1, 9]}}\n"
+    (tmp_path / "narrow.yaml").write_text(FEW + narrow)
+    trace, found = written(tmp_path / "t.csv", RIGHT, 0), tmp_path / "t.json"
+    options = ["--config", tmp_path / "narrow.yaml"]
+    assert command("identify", trace, "--output", found, *options)[0] == 0
+    data = json.loads(found.read_text())
+    assert data["fit"] == REJECTED
+    assert any(
+        note["text"].startswith("k_p is at the upper end of its search range, 0.099 N/m")
+        for note in data["notes"]
+    )
+    # The true c_p is none at all: its range ends above that, and nothing is amiss.
+    (tmp_path / "high.yaml").write_text(
+        FEW + "search_range: {c_p: {exponent: [-1, 8], digit: [1, 9]}}\n"
+    )
+    options = ["--config", tmp_path / "high.yaml", "--force"]
+    assert command("identify", trace, "--output", found, *options)[0] == 0
+    assert json.loads(found.read_text())["fit"] == OK
+
+
 def test_groups_leave_rejected_cells_out_by_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

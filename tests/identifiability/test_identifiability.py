@@ -282,6 +282,8 @@ def test_what_is_said_is_rounded_once() -> None:
     assert item["in_words"] == "determined: 1.1 N/m (1 to 1.16)"
     assert limits_in_short(item) == "1.1 (1 to 1.16)"
     assert diagnosis_data(close)["quantities"][0]["high"] == 1.164998
+    wide = replace(first, profile=replace(profile, low=math.log(0.1), high=math.log(40.0)))
+    assert wide.words() == "determined only within a factor of 20: 1.1 N/m (0.1 to 40)"
 
 
 def test_intervals_hold_the_truth_and_estimates_reach_the_bound() -> None:

@@ -9,6 +9,7 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTION, Note, compute_status
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identifiability.range_ends import note_range_ends
 from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -108,7 +109,8 @@ def diagnose(
         for finding in findings
         if finding.gaps
     ]
-    notes += [*_noise(likelihood), *_pulling(grip, problem.residuals.duration_s)]
+    notes += [*note_range_ends(likelihood, model), *_noise(likelihood)]
+    notes += _pulling(grip, problem.residuals.duration_s)
     if not found.converged:
         notes.append(
             Note(

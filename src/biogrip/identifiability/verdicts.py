@@ -17,6 +17,9 @@ BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
 
+# Limits further than this factor from their middle tell little more than an order of magnitude:
+# moduli of cells of one kind scatter by a factor of about 2 to 3.
+_WIDE = 3.0
 # A combination of undetermined parameters is profiled if the first-order standard
 # deviation of its logarithm is below this.
 _WORTH_A_LOOK = 0.5
@@ -87,12 +90,16 @@ class Finding:
     def _limits_in_words(self) -> str:
         unit = self._unit
         if self.verdict == DETERMINED:
-            return f"determined: {self.value:.3g}{unit} ({self.low:.3g} to {self.high:.3g})"
+            assert self.low is not None
+            assert self.high is not None
+            factor = math.sqrt(self.high / self.low)
+            how = f" only within a factor of {factor:.2g}" if factor > _WIDE else ""
+            return f"determined{how}: {self.value:.3g}{unit} ({self.low:.3g} to {self.high:.3g})"
         if self.verdict == BOUNDED_BELOW:
             return f"only bounded below: at least {self.low:.2g}{unit}"
         if self.verdict == BOUNDED_ABOVE:
             return f"only bounded above: at most {self.high:.2g}{unit}"
-        return "not determined: the trace fits with any value"
+        return "not determined: the trace sets no limit within the search range"
 
     @property
     def best_in_words(self) -> str:
@@ -122,7 +129,7 @@ class Trade:
     def words(self) -> str:
         """Return the trade as a sentence."""
         names = " and ".join(self.members)
-        what = self.finding.words().removeprefix("determined: ")
+        what = self.finding.words().partition(": ")[2]
         return (
             f"{names} trade against each other; determined is {self.finding.quantity.label}: {what}"
         )
