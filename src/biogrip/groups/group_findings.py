@@ -65,7 +65,7 @@ class GroupDifference:
     adjusted_p
         p value adjusted for the number of groups that the quantity is compared in.
     ranks
-        Distribution-free estimate of the difference of logarithms.
+        Estimate of the difference of logarithms by ranks.
     detectable_ratio
         Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`.
     """

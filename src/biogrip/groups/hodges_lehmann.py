@@ -1,8 +1,9 @@
-"""Distribution-free difference between two dishes: the Hodges-Lehmann estimator.
+"""Difference between two dishes by ranks: the Hodges-Lehmann estimator.
 
 The estimate is the median of all differences between a cell of one dish and a cell of the other.
 Its limits invert the rank test of Wilcoxon, Mann and Whitney. It checks results that assume
-normal distributions, and ignores estimation errors of the cells.
+normal distributions. It assumes that the dishes differ by a shift alone: if their spreads
+differ, the interval is too narrow. It ignores estimation errors of the cells.
 
 References
 ----------
