@@ -361,14 +361,28 @@ def test_missing_files_and_directories_are_named(tmp_path: Path) -> None:
     assert refusal(tmp_path / (300 * "x")).startswith(": ")
 
 
-@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
-def test_bytes_that_are_no_text_are_placed(tmp_path: Path, newline: str) -> None:
-    lines = ["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,°"]
-    said = refusal(written(tmp_path / "t.csv", lines, newline, "latin-1"))
-    assert said == ", line 5002: found the byte 0xb0, allowed is text in UTF-8."
+def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    """The byte 0x81 is no character of Windows-1252, and half a pair none of UTF-16."""
+    lines = ["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,\x81"]
+    said = refusal(written(tmp_path / "t.csv", lines, encoding="latin-1"))
+    assert said == ": found no text in UTF-8, UTF-16 or cp1252."
+    (tmp_path / "t.csv").write_bytes(b"\xff\xfe\x00\xd8a")
+    assert refusal(tmp_path / "t.csv") == said
 
 
-@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-32"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])
+def test_a_laboratorys_text_is_read(tmp_path: Path, encoding: str) -> None:
+    lines = [
+        "Nr;Zeit (ms);Winkel (°);Temperatur (°C)",
+        *(f"{i};{i},5;{i}e-6;21" for i in range(12)),
+    ]
+    path = written(tmp_path / "t.csv", lines, "\r\n", encoding)
+    found = read_recording(path, Columns("Zeit (ms)", "Winkel (°)"))
+    assert found.time_s == pytest.approx(1e-3 * (np.arange(12) + 0.5))
+    assert found.rotation_rad == pytest.approx(np.radians(np.arange(12) * 1e-6))
+
+
+@pytest.mark.parametrize("encoding", ["utf-16-le", "utf-32"])
 def test_other_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
     path = written(tmp_path / "t.csv", ["time_s,rotation_rad", *ROWS], encoding=encoding)
     assert refusal(path).startswith(", line 1: found ")
@@ -504,7 +518,7 @@ def test_what_a_column_is_was_said_by_options_or_by_keys(
 @pytest.mark.parametrize(
     ("given", "meant"),
     [
-        *(("radians", "rad"), ("degrees", "deg"), ("°", "deg"), ("milliradians", "mrad")),
+        *(("radians", "rad"), ("degrees", "deg"), ("milliradians", "mrad")),
         *(("microradians", "urad"), ("microrad", "urad"), ("Rad", "rad")),
     ],
 )

@@ -2,9 +2,9 @@
 
 import csv
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
-from io import StringIO
 from itertools import islice
 from pathlib import Path
 from unicodedata import normalize
@@ -33,7 +33,7 @@ _SPELLED_OUT = {
     "rad": ("radian", "radians"),
     "mrad": ("milliradian", "milliradians"),
     "urad": ("microrad", "microradian", "microradians"),
-    "deg": ("degree", "degrees", "°"),
+    "deg": ("degree", "degrees"),
 }
 _SEPARATORS = (",", ";", "\t")
 _GAPS = ("", "-", "na", "n/a", "nan", "#n/a", "#nv")
@@ -107,7 +107,8 @@ class _Layout:
 def read_recording(path: Path, columns: Columns) -> Recording:
     """Read a recorded trace.
 
-    The file is UTF-8 text, with or without byte order mark, with any usual line ends. Empty lines
+    The file is text in UTF-8, in UTF-16 with a byte order mark, or else in Windows-1252, as older
+    programs write it, with any usual line ends. Empty lines
     and lines that start with ``#`` are ignored. The first other line is the header, which decides
     the separator: comma, semicolon or tab. With the last two, numbers may have a decimal comma.
     Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
@@ -147,10 +148,9 @@ def read_recording(path: Path, columns: Columns) -> Recording:
             raise BiogripError(
                 f"{place(path)}: found {found}, allowed is a text file with a trace."
             )
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            sizes, values, lines = _read(path, stream, columns)
-    except UnicodeDecodeError as error:
-        raise BiogripError(_not_text(path)) from error
+        sizes, values, lines = _read_text(path, columns)
+    except UnicodeError as error:
+        raise BiogripError(f"{place(path)}: found no text in UTF-8, UTF-16 or cp1252.") from error
     except OSError as error:
         raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
     gaps = np.any(np.isnan(values), axis=1)
@@ -249,8 +249,22 @@ def _unit_at_end(column: str, allowed: Mapping[str, float]) -> str | None:
 
 
 def _plain(name: str) -> str:
-    """Return a name without padding, with either micro sign written as u."""
-    return normalize("NFKC", name).strip().replace("\u03bc", "u")
+    """Return a name without padding, with either micro sign written as u, and ° as deg."""
+    return normalize("NFKC", name).strip().replace("\u03bc", "u").replace("°", "deg")
+
+
+def _read_text(path: Path, columns: Columns) -> tuple[Array, Array, IntArray]:
+    """Read a file as `_read` does, in the encoding that it seems to have."""
+    with path.open("rb") as content:
+        marked = content.read(2) in (BOM_UTF16_LE, BOM_UTF16_BE)
+    try:
+        with path.open(encoding="utf-16" if marked else "utf-8-sig", newline="") as stream:
+            return _read(path, stream, columns)
+    except UnicodeDecodeError:
+        if marked:
+            raise
+    with path.open(encoding="cp1252", newline="") as stream:
+        return _read(path, stream, columns)
 
 
 def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, Array, IntArray]:
@@ -456,15 +470,3 @@ def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> 
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
             f"(line {lines[row]}), allowed are times that increase{by}."
         )
-
-
-def _not_text(path: Path) -> str:
-    """Return a message with the line of the first byte that is not UTF-8."""
-    content = path.read_bytes()
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        before = StringIO(content[: error.start].decode("utf-8") + "?", newline="")
-        line, byte = sum(1 for _ in before), content[error.start]
-        return f"{place(path, line)}: found the byte 0x{byte:02x}, allowed is text in UTF-8."
-    return f"{place(path)}: changed while it was read."
