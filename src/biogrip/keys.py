@@ -1,4 +1,4 @@
-"""What pydantic does not have for config blocks: names from a registry, and conflicts of keys.
+"""Additions to pydantic for config blocks: names from a registry, and conflicts of keys.
 
 A block is a frozen dataclass whose fields are its keys, with pydantic's `Field` for bounds, and a
 docstring below each. Checks, messages, the JSON Schema and the documentation follow from them.

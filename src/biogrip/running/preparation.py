@@ -1,4 +1,4 @@
-"""What ``biogrip run`` does before Snakemake plans its jobs.
+"""Steps of ``biogrip run`` before Snakemake plans its jobs.
 
 A run puts the results in order: locks of a dead run are removed by ``snakemake --unlock``,
 changed results are set aside, and outdated ones are named to ``--forcerun``.

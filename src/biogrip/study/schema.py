@@ -21,7 +21,7 @@ _MOST_COUNTED = 2**53
 
 
 class Schema:
-    """What a config value may be.
+    """Values that a config key may have.
 
     Parameters
     ----------
