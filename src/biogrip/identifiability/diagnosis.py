@@ -14,6 +14,7 @@ from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, f
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
+from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.response.grip import Grip
 
@@ -140,7 +141,8 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return
-    doubts = list(doubts_about_noise(residuals.left(likelihood.best)))
+    residual = residuals.left(likelihood.best)
+    doubts = list(doubts_about_noise(residual))
     yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
         yield Note(
@@ -154,11 +156,13 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
             f"The noise that was given is {likelihood.noise_rad / misfit_rad:.2g} times what the "
             "fit leaves: its value, or its unit, is not the right one.",
         )
-    scale = residuals.noise_scale_rad
-    if misfit_rad > _TOO_MUCH * scale:
+    # Outliers are noise of the recording: they make a fit doubtful, not wrong.
+    scale, bulk = residuals.noise_scale_rad, residual[~outliers_of(residual)]
+    bulk_rad = float(np.sqrt(np.mean(bulk**2)))
+    if bulk_rad > _TOO_MUCH * scale:
         yield Note(
             REJECTION,
-            f"The misfit is {misfit_rad / scale:.2g} times the noise of the trace: the model, the "
+            f"The misfit is {bulk_rad / scale:.2g} times the noise of the trace: the model, the "
             "protocol, the gripper or the unit is not the right one.",
         )
 

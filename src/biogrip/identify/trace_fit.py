@@ -30,7 +30,7 @@ _STAYED = 0.03
 _WORTH_SAYING = 0.005
 # Noise that is correlated over a longer share of the trace is no noise, if it has a noticeable
 # share of the variance; nor is one that has most of the variance and is slower than the third.
-_LONGEST, _MOST, _SLOW, _NOTICEABLE = 0.2, 0.5, 0.02, 0.2
+_LONGEST, _MOST, _SLOW, _NOTICEABLE = 0.2, 0.5, 0.02, 1 / 3
 
 Find = Callable[[Problem], Identification]
 """Function that finds the global optimum of a problem."""
