@@ -22,6 +22,7 @@ from biogrip.identifiability.fit_status import (
     REJECTION,
     Note,
     compute_status,
+    find_reasons,
     order_notes,
 )
 from biogrip.response.linear import rotation, step_response
@@ -69,6 +70,8 @@ def test_the_heaviest_note_decides() -> None:
     assert compute_status([light, middle]) == DOUBTFUL
     assert compute_status([middle, heavy, light]) == REJECTED
     assert order_notes([light, heavy, middle]) == [heavy, middle, light]
+    assert find_reasons([light]) == []
+    assert find_reasons([middle, heavy, light]) == [REJECTION]
 
 
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])

@@ -361,13 +361,16 @@ def test_missing_files_and_directories_are_named(tmp_path: Path) -> None:
     assert refusal(tmp_path / (300 * "x")).startswith(": ")
 
 
-def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+def test_bytes_that_are_no_text_are_placed(tmp_path: Path, newline: str) -> None:
     """The byte 0x81 is no character of Windows-1252, and half a pair none of UTF-16."""
     lines = ["time_s,rotation_rad", *(f"{i},{i}" for i in range(5000)), "1,\x81"]
-    said = refusal(written(tmp_path / "t.csv", lines, encoding="latin-1"))
-    assert said == ": found no text in UTF-8, UTF-16 or cp1252."
-    (tmp_path / "t.csv").write_bytes(b"\xff\xfe\x00\xd8a")
-    assert refusal(tmp_path / "t.csv") == said
+    allowed = "allowed is text in UTF-8, UTF-16 or Windows-1252."
+    said = refusal(written(tmp_path / "t.csv", lines, newline, "latin-1"))
+    assert said == f", line 5002: found the byte 0x81, {allowed}"
+    content = f"time_s,rotation_rad{newline}".encode("utf-16") + b"\x00\xd8a"
+    (tmp_path / "t.csv").write_bytes(content)
+    assert refusal(tmp_path / "t.csv") == f", line 2: found the byte 0x00, {allowed}"
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "cp1252"])

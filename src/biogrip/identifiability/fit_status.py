@@ -38,3 +38,9 @@ def compute_status(notes: Sequence[Note]) -> str:
 def order_notes(notes: Sequence[Note]) -> list[Note]:
     """Order notes by descending weight, and else as given."""
     return sorted(notes, key=lambda note: -_WEIGHTS.index(note.weight))
+
+
+def find_reasons(notes: Sequence[Note]) -> list[str]:
+    """Return the texts of the notes that decide a status which is not ok."""
+    status = compute_status(notes)
+    return [note.text for note in notes if _STATUS[note.weight] == status != OK]

@@ -1,13 +1,14 @@
 """Parameters that a fit leaves at an end of their search range, though chi^2 falls beyond it."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.fit_status import REJECTION, Note
 from biogrip.identifiability.likelihood import Likelihood
-from biogrip.identify.local_fits import FAIR, LocalFits
+from biogrip.identify.multi_start import descend_from
 
 # Decrease of chi^2 beyond an end that is more than chance: three standard deviations squared.
 _NOTICEABLE = 9.0
@@ -36,9 +37,7 @@ def note_range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
             start[index] += outward * _BEYOND
             (low if outward < 0 else high)[index] += outward * _WIDER
-            wider = LocalFits([problem]).fitted(
-                start[None], np.array([0]), FAIR, low=low, high=high
-            )
+            wider = descend_from([replace(problem, low=low, high=high)], start)
             if likelihood.increase(float(wider.misfit_rad[0])) < -_NOTICEABLE:
                 unit = f" {parameter.unit}" if parameter.unit else ""
                 yield Note(

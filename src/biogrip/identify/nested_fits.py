@@ -187,8 +187,8 @@ def _worse(found: Mapping[str, Answers]) -> Iterator[tuple[str, str, int]]:
 
 def _is_noticeably_lower(misfit_rad: float, than_rad: float, problem: Problem) -> bool:
     """Return True if a misfit is lower by what the data could tell: see `_NOTICEABLE`."""
-    gain = (than_rad / misfit_rad) ** 2 - 1 if misfit_rad else float(than_rad > 0) * np.inf
-    return bool(problem.residuals.samples * gain > _NOTICEABLE)
+    gain = problem.residuals.samples * (than_rad**2 - misfit_rad**2)
+    return gain > _NOTICEABLE * misfit_rad**2
 
 
 def _better_from(answer: Identification, problem: Problem, start: Array) -> Identification:

@@ -79,10 +79,12 @@ def prepared(arguments: Sequence[str]) -> list[str]:
     if not folder.is_dir() or (not options.dryrun and is_locked(folder / ".snakemake")):
         return [*arguments]
     with chdir(folder):
-        _put_in_order(study, changing=not options.dryrun)
         rules = make_rules(products().values(), Plan(study, RESULTS))
+        check_results(RESULTS, files_of(rules), _may_make(rules), changing=not options.dryrun)
+        if not options.dryrun:
+            write_study(study, RESULTS)
         needed = needed_for(map(os.path.normpath, options.targets), rules)
-        stale = [file for file in outdated(rules, RESULTS) if file in needed]
+        stale = [file for file in made_otherwise(rules, RESULTS) if file in needed]
     done = True
     again = [*(options.forcerun or ()), *stale]
     return ["--forcerun", *again, *arguments] if stale else [*arguments]
@@ -102,7 +104,7 @@ def look(rules: Sequence[ProductRule], results: Path) -> None:
         If a file that is not the study's is in the way.
     """
     check_results(results, files_of(rules), _may_make(rules), changing=False)
-    stale = outdated(rules, results)
+    stale = made_otherwise(rules, results)
     if stale:
         print(
             f"biogrip: made for other settings, by other code or of other files: {len(stale)} "
@@ -112,7 +114,7 @@ def look(rules: Sequence[ProductRule], results: Path) -> None:
         )
 
 
-def outdated(rules: Iterable[ProductRule], results: Path) -> list[str]:
+def made_otherwise(rules: Iterable[ProductRule], results: Path) -> list[str]:
     """Return the results that were made otherwise than the study's jobs would."""
     found = Provenance(results, Manifest(results)).made_otherwise(rules)
     return [f"{results}/{name}" for name in found]
@@ -148,13 +150,6 @@ def _checked(options: Any, folder: Path) -> Study:
 def _unlock(arguments: Sequence[str]) -> None:
     command = [sys.executable, "-m", "snakemake", "--unlock", *arguments]
     subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False)
-
-
-def _put_in_order(study: Study, *, changing: bool) -> None:
-    rules = make_rules(products().values(), Plan(study, RESULTS))
-    check_results(RESULTS, files_of(rules), _may_make(rules), changing=changing)
-    if changing:
-        write_study(study, RESULTS)
 
 
 def _may_make(rules: Sequence[ProductRule]) -> Any:

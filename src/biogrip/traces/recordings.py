@@ -5,6 +5,7 @@ import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from io import StringIO
 from itertools import islice
 from pathlib import Path
 from unicodedata import normalize
@@ -108,11 +109,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     """Read a recorded trace.
 
     The file is text in UTF-8, in UTF-16 with a byte order mark, or else in Windows-1252, as older
-    programs write it, with any usual line ends. Empty lines
-    and lines that start with ``#`` are ignored. The first other line is the header, which decides
-    the separator: comma, semicolon or tab. With the last two, numbers may have a decimal comma.
-    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
-    may hold anything.
+    programs write it, with any usual line ends. Empty lines and lines that start with ``#`` are
+    ignored. The first other line is the header, which decides the separator: comma, semicolon or
+    tab. With the last two, numbers may have a decimal comma. Cells may be quoted and padded with
+    blanks, but a quoted cell ends on its line. Other columns may hold anything.
 
     The unit is that of `columns`, or else the end of the column's name, as in ``rotation_urad``,
     ``phi (mrad)`` or ``time [s]``; it is never guessed. The micro sign may replace the u.
@@ -149,8 +149,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
                 f"{place(path)}: found {found}, allowed is a text file with a trace."
             )
         sizes, values, lines = _read_text(path, columns)
-    except UnicodeError as error:
-        raise BiogripError(f"{place(path)}: found no text in UTF-8, UTF-16 or cp1252.") from error
+    except UnicodeDecodeError as error:
+        # Windows-1252 is read last, and Python calls it a charmap.
+        encoding = "utf-16" if error.encoding.startswith("utf-16") else "cp1252"
+        raise BiogripError(_not_text(path, encoding)) from error
     except OSError as error:
         raise BiogripError(f"{place(path)}: cannot be read: {error.strerror}.") from error
     gaps = np.any(np.isnan(values), axis=1)
@@ -470,3 +472,18 @@ def _check_order(path: Path, columns: Columns, time: Array, lines: IntArray) -> 
             f"{place(path, lines[row + 1], columns.time)}: found {found} "
             f"(line {lines[row]}), allowed are times that increase{by}."
         )
+
+
+def _not_text(path: Path, encoding: str) -> str:
+    """Return a message with the line of the first byte that is no text."""
+    content = path.read_bytes()
+    try:
+        content.decode(encoding)
+    except UnicodeDecodeError as error:
+        before = StringIO(content[: error.start].decode(encoding) + "?", newline="")
+        line, byte = sum(1 for _ in before), content[error.start]
+        return (
+            f"{place(path, line)}: found the byte 0x{byte:02x}, allowed is text in UTF-8, UTF-16 "
+            "or Windows-1252."
+        )
+    return f"{place(path)}: changed while it was read."

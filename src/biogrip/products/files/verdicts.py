@@ -7,11 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.digits import round_increase, rounded_numbers
+from biogrip.identifiability.fit_status import (
+    REJECTED,
+    Note,
+    compute_status,
+    find_reasons,
+    order_notes,
+)
 from biogrip.products.files.json_object import read_object
 
 if TYPE_CHECKING:
     from biogrip.identifiability.diagnosis import Diagnosis
-    from biogrip.identifiability.fit_status import Note
     from biogrip.identifiability.verdicts import Finding
 
 PATH = "results/identifiability/{case}.json"
@@ -21,28 +27,25 @@ FIT_REJECTED = "fit rejected"
 EXPECTED = "results/identifiability/expected/{case}.json"
 
 
-def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence["Note"] = ()) -> dict[str, Any]:
+def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
     """Return a diagnosis and further notes as plain data in SI units, rounded."""
     data: dict[str, Any] = rounded_numbers(exact_data(diagnosis, notes))
     return data
 
 
-def exact_data(diagnosis: "Diagnosis", notes: Sequence["Note"] = ()) -> dict[str, Any]:
+def exact_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
     """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded.
 
     A rejected fit determines nothing: its quantities have the best fit as value, no limits, and
     the verdict `FIT_REJECTED`.
     """
-    from biogrip.identifiability.fit_status import REJECTED, compute_status, order_notes
-
     likelihood = diagnosis.likelihood
     ordered = order_notes([*diagnosis.notes, *notes])
     status = compute_status(ordered)
     rejected = status == REJECTED
-    heaviest = ordered[0].weight if ordered and status != "ok" else None
     return {
         "fit": status,
-        "reasons": [note.text for note in ordered if note.weight == heaviest],
+        "reasons": find_reasons(ordered),
         "samples": likelihood.problem.residuals.samples,
         "misfit_rad": likelihood.misfit_rad,
         "noise_rad": likelihood.noise_rad,
