@@ -1,6 +1,6 @@
 """Messages about config values, from pydantic's errors: what was found, and what is allowed."""
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any, TypeVar
 
@@ -18,7 +18,7 @@ T = TypeVar("T")
 MOST_EXPLAINED = 1000
 
 # Keys of earlier versions of the config, by their last two names.
-_RETIRED: dict[tuple[int | str, ...], str] = {
+_RETIRED: dict[tuple[Hashable, ...], str] = {
     ("models", "inertia"): "no longer needed: traces that show the arms ringing are fitted with "
     "their inertia. Leave it out.",
     ("readings",): "now called `interpretations`.",
@@ -76,8 +76,11 @@ def _nothing(schema: Schema, path: tuple[Hashable, ...]) -> str | None:
     return f"found nothing, allowed is {schema.word}." if schema.node else None
 
 
-def unknown(name: object, allowed: list[str]) -> str:
-    """Return the message about a key that a block does not have."""
+def unknown(path: Sequence[Hashable], allowed: list[str]) -> str:
+    """Return the message about a key that a block does not have, or no longer has."""
+    name, above = path[-1], tuple(path[-2:])
+    if above in _RETIRED:
+        return f"unknown key, {_RETIRED[above]}"
     return f"unknown key.{nearest(name, allowed)} Allowed here: {', '.join(allowed)}."
 
 
@@ -113,10 +116,8 @@ def _explained(schema: Schema, error: ErrorDetails) -> Problem:
 def _text(path: tuple[int | str, ...], leaf: Schema, above: Schema, error: ErrorDetails) -> str:
     found = error["input"]
     match error["type"]:
-        case "extra_forbidden" | "unexpected_keyword_argument" if path[-2:] in _RETIRED:
-            return f"unknown key, {_RETIRED[path[-2:]]}"
         case "extra_forbidden" | "unexpected_keyword_argument":
-            return unknown(path[-1], [*above.keys])
+            return unknown(path, [*above.keys])
         case "missing":
             return "is missing and has no default."
         case "literal_error":

@@ -76,7 +76,7 @@ def _with_methods(kind: type[T], block: Any) -> tuple[T | None, list[Problem]]:
 def _method_problems(path: KeyPath, kind: type[Shared], block: Mapping[str, Any]) -> list[Problem]:
     allowed = [*kind.model_fields, *METHOD_BLOCKS]
     found: list[Problem] = [
-        ((*path, name), unknown(name, allowed)) for name in block if name not in allowed
+        ((*path, name), unknown((*path, name), allowed)) for name in block if name not in allowed
     ]
     for name in METHOD_BLOCKS:
         problems = checked(block_class(name), block.get(name, {}))[1]
