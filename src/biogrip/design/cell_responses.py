@@ -19,24 +19,16 @@ _MARGIN = 2e-3
 
 @dataclass(frozen=True)
 class CellResponses:
-    """Responses of plausible samples to a torque whose largest is 1 N m, in cells.
-
-    Parameters
-    ----------
-    sensitivity : (n, n_parameters, n_cells)
-        d phi / d log p in rad.
-    capacity : (n_cells,)
-        Largest number of readings in each cell.
-    turned_rad
-        Largest rotation.
-    pull
-        Largest shortfall of a sample's force below its margin, relative to its largest.
-    """
+    """Responses of plausible samples to a torque whose largest is 1 N m, in cells."""
 
     sensitivity: Array
+    """d phi / d log p in rad, (n, n_parameters, n_cells)."""
     capacity: Array
+    """Largest number of readings in each cell, (n_cells,)."""
     turned_rad: float
+    """Largest rotation."""
     pull: float
+    """Largest shortfall of a sample's force below its margin, relative to its largest."""
 
 
 @dataclass(frozen=True)

@@ -26,21 +26,14 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True)
 class Criterion:
-    """A criterion over plausible samples.
-
-    Parameters
-    ----------
-    name
-        One of `CRITERIA`.
-    over
-        ``"worst"`` for the maximum over the samples, ``"mean"`` for their mean.
-    targets : (n_asked,)
-        Indices of the parameters that are asked for.
-    """
+    """A criterion over plausible samples."""
 
     name: str
+    """One of `CRITERIA`."""
     over: str
+    """``"worst"`` for the maximum over the samples, ``"mean"`` for their mean."""
     targets: tuple[int, ...]
+    """Indices of the parameters that are asked for, (n_asked,)."""
 
     def values(self, covariances: Array) -> Array:
         """Return the criterion of every sample, (n,), from covariances (n, n_asked, n_asked)."""

@@ -31,21 +31,15 @@ _TRIED = 128
 
 @dataclass(frozen=True, eq=False)
 class Earlier:
-    """Information of earlier traces: plausible samples and their Fisher information.
-
-    Parameters
-    ----------
-    parameters : (n, n_parameters)
-        Plausible samples, the best fit first.
-    information : (n, n_parameters, n_parameters)
-        Fisher information on the log-parameters of each from these experiments.
-    misfit_rad
-        RMS misfit of the best fit.
-    """
+    """Information of earlier traces: plausible samples and their Fisher information."""
 
     parameters: Array
+    """Plausible samples, the best fit first, (n, n_parameters)."""
     information: Array
+    """Fisher information on the log-parameters of each from these experiments, (n, n_parameters,
+    n_parameters)."""
     misfit_rad: float
+    """RMS misfit of the best fit."""
 
     @property
     def best(self) -> Array:

@@ -25,50 +25,36 @@ _NOTHING = 1e-6 * NO_BOUND**-2
 
 @dataclass(frozen=True, eq=False)
 class DesignInputs:
-    """The design problem: simulated system, limits of the experiment, and criterion.
-
-    Parameters
-    ----------
-    gripper, model
-        Arms and sample model of the simulation; both arms are driven alike.
-    parameters : (n, n_parameters)
-        Parameters of the plausible samples.
-    noise_rad
-        Standard deviation of the sensor's noise.
-    samples
-        Number of readings of the rotation.
-    fastest_Hz
-        Largest number of readings per second.
-    limits
-        Limits of the torque's steps, ramps and sinusoids.
-    shapes
-        Names in `biogrip.design.shapes.SHAPES` of the torque's allowed families.
-    largest_Nm
-        Largest torque.
-    stroke_rad
-        Largest rotation of the arms.
-    criterion
-        Criterion to be minimized.
-    before : (n, n_parameters, n_parameters) or (1, n_parameters, n_parameters)
-        Information on the log-parameters from earlier experiments; for those out of reach, also
-        a prior standard deviation of `NO_BOUND`.
-    out_of_reach
-        Indices of parameters that no torque determines, see `biogrip.design.within_reach`.
-    """
+    """The design problem: simulated system, limits of the experiment, and criterion."""
 
     gripper: Gripper
+    """Both arms are driven alike."""
     model: SampleModel
+    """Sample model."""
     parameters: Array
+    """Parameters of the plausible samples, (n, n_parameters)."""
     noise_rad: float
+    """Standard deviation of the sensor's noise."""
     samples: int
+    """Number of readings of the rotation."""
     fastest_Hz: float
+    """Largest number of readings per second."""
     limits: Limits
+    """Limits of the torque's steps, ramps and sinusoids."""
     shapes: tuple[str, ...]
+    """Names in `biogrip.design.shapes.SHAPES` of the torque's allowed families."""
     largest_Nm: float
+    """Largest torque."""
     stroke_rad: float
+    """Largest rotation of the arms."""
     criterion: Criterion
+    """Criterion to be minimized."""
     before: Array
+    """Information on the log-parameters from earlier experiments, (n, n_parameters, n_parameters)
+    or (1, n_parameters, n_parameters); for those out of reach, also a prior standard deviation of
+    `NO_BOUND`."""
     out_of_reach: tuple[int, ...] = ()
+    """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
 
     def bounds(self, information: Array) -> Array:
         """Return `relative_bounds` without the prior on parameters that are out of reach.

@@ -37,21 +37,15 @@ _DROPPED = 1e-9
 
 @dataclass(frozen=True)
 class Optimum:
-    """The optimal sampling.
-
-    Parameters
-    ----------
-    samples : (n_cells,)
-        Numbers of readings in each cell, not integer.
-    covariances : (n, n_asked, n_asked)
-        Covariances of the log-parameters asked for, of each plausible sample.
-    gap
-        Share by which the typical relative bound may exceed that of the best sampling.
-    """
+    """The optimal sampling."""
 
     samples: Array
+    """Numbers of readings in each cell, not integer, (n_cells,)."""
     covariances: Array
+    """Covariances of the log-parameters asked for, of each plausible sample, (n, n_asked,
+    n_asked)."""
     gap: float
+    """Share by which the typical relative bound may exceed that of the best sampling."""
 
 
 def best_sampling(

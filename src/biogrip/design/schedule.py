@@ -31,26 +31,18 @@ _OF_A_PERIOD, _FURTHER = 64, 1.3
 
 @dataclass(frozen=True)
 class Plan:
-    """A designed experiment: protocol and sampling, with their information.
-
-    Parameters
-    ----------
-    phases
-        Torques of both arms.
-    bursts
-        Sampling times of the rotation.
-    information : (n, n_parameters, n_parameters)
-        Fisher information of the log-parameters of the plausible samples, including that of
-        earlier experiments.
-    gap
-        Share by which the typical relative bound may exceed that of the best sampling of this
-        torque.
-    """
+    """A designed experiment: protocol and sampling, with their information."""
 
     phases: tuple[Phase, ...]
+    """Torques of both arms."""
     bursts: tuple[Burst, ...]
+    """Sampling times of the rotation."""
     information: Array
+    """Fisher information of the log-parameters of the plausible samples, including that of earlier
+    experiments, (n, n_parameters, n_parameters)."""
     gap: float
+    """Share by which the typical relative bound may exceed that of the best sampling of this
+    torque."""
 
     @property
     def torque(self) -> TorqueHistory:
@@ -65,24 +57,16 @@ class Plan:
 
 @dataclass(frozen=True)
 class SamplingProblem:
-    """Cells of time of an experiment, over which readings are to be distributed.
-
-    Parameters
-    ----------
-    each
-        Cells after each step.
-    starts : (n_steps,)
-        Slots at which steps begin.
-    sensitivity : (n, n_parameters, n_cells)
-        Sensitivities to the log-parameters in units of the noise.
-    capacity : (n_cells,)
-        Largest number of readings in each cell.
-    """
+    """Cells of time of an experiment, over which readings are to be distributed."""
 
     each: tuple[TimeBins, ...]
+    """Cells after each step."""
     starts: IntArray
+    """Slots at which steps begin, (n_steps,)."""
     sensitivity: Array
+    """Sensitivities to the log-parameters in units of the noise, (n, n_parameters, n_cells)."""
     capacity: Array
+    """Largest number of readings in each cell, (n_cells,)."""
 
 
 def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:

@@ -33,18 +33,12 @@ _DECIMALS = 8
 
 @dataclass(frozen=True)
 class Torque:
-    """A torque against time.
-
-    Parameters
-    ----------
-    waveform
-        Torque in shares of the largest.
-    largest_Nm
-        Largest torque.
-    """
+    """A torque against time."""
 
     waveform: Waveform
+    """Torque in shares of the largest."""
     largest_Nm: float
+    """Largest torque."""
 
 
 class TorqueSearch:

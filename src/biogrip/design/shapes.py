@@ -10,18 +10,12 @@ from biogrip.design.waveform import Limits, Waveform
 
 @dataclass(frozen=True)
 class Shape:
-    """A family of torques.
-
-    Parameters
-    ----------
-    shares
-        Number of numbers between 0 and 1 that define a torque.
-    waveform
-        Function that converts them to a torque.
-    """
+    """A family of torques."""
 
     shares: int
+    """Number of numbers between 0 and 1 that define a torque."""
     waveform: Callable[[Array, Limits], Waveform]
+    """Function that converts them to a torque."""
 
 
 SHAPES: Mapping[str, Shape] = {

@@ -17,24 +17,16 @@ _SINGLE = 24
 
 @dataclass(frozen=True)
 class TimeBins:
-    """Cells after a step.
-
-    Parameters
-    ----------
-    first : (n_cells,)
-        First slot of each; slot j is j slots after the step.
-    slots : (n_cells,)
-        Number of successive slots in each.
-    repeats : (n_cells,)
-        Number of repetitions of these slots in each.
-    stride
-        Number of slots from one repetition to the next.
-    """
+    """Cells after a step."""
 
     first: IntArray
+    """First slot of each, (n_cells,); slot j is j slots after the step."""
     slots: IntArray
+    """Number of successive slots in each, (n_cells,)."""
     repeats: IntArray
+    """Number of repetitions of these slots in each, (n_cells,)."""
     stride: int = 0
+    """Number of slots from one repetition to the next."""
 
     @property
     def capacity(self) -> IntArray:

@@ -28,42 +28,34 @@ from biogrip.response.ringing import ringing_modes
 
 @dataclass(frozen=True)
 class View:
-    """Responses after some steps of a torque whose largest is 1 N m.
-
-    Parameters
-    ----------
-    sensitivity : (n, n_parameters, n_steps, n_times)
-        d phi / d log p in rad.
-    rotation : (n, n_steps, n_times)
-        In rad.
-    force : (n, n_steps, n_times)
-        Jaw force in N.
-    """
+    """Responses after some steps of a torque whose largest is 1 N m."""
 
     sensitivity: Array
+    """d phi / d log p in rad, (n, n_parameters, n_steps, n_times)."""
     rotation: Array
+    """In rad, (n, n_steps, n_times)."""
     force: Array
+    """Jaw force in N, (n, n_steps, n_times)."""
 
 
 @dataclass(frozen=True)
 class _Factors:
-    """Coefficients of the functions of the time since a step.
-
-    Parameters
-    ----------
-    growing, decaying, lasting : (n_steps, n, n_modes)
-        e^(r e) - 1, e^(r e) and e e^(r e).
-    resting, linear, sine, cosine : (n_steps, n, n_modes)
-        1, e, sin(w e) and cos(w e).
-    """
+    """Coefficients of the functions of the time since a step."""
 
     growing: ComplexArray
+    """e^(r e) - 1, (n_steps, n, n_modes), as are the others."""
     decaying: ComplexArray
+    """e^(r e)."""
     lasting: ComplexArray
+    """e e^(r e)."""
     resting: ComplexArray
+    """1."""
     linear: ComplexArray
+    """e."""
     sine: ComplexArray
+    """sin(w e)."""
     cosine: ComplexArray
+    """cos(w e)."""
 
 
 class Views:

@@ -9,47 +9,32 @@ from biogrip.arrays import Array, BoolArray
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the torque's stretches.
-
-    Parameters
-    ----------
-    longest_s
-        Duration of the experiment.
-    shortest_s
-        Shortest duration of a stretch; all durations are whole multiples of it.
-    most_steps
-        Largest number of stretches.
-    slot_s
-        Time between two readings at the fastest; periods are whole multiples of it.
-    """
+    """Limits of the torque's stretches."""
 
     longest_s: float
+    """Duration of the experiment."""
     shortest_s: float
+    """Shortest duration of a stretch; all durations are whole multiples of it."""
     most_steps: int
+    """Largest number of stretches."""
     slot_s: float
+    """Time between two readings at the fastest; periods are whole multiples of it."""
 
 
 @dataclass(frozen=True)
 class Waveform:
-    """Torque against time as successive stretches.
-
-    Parameters
-    ----------
-    durations_s : (n_steps,)
-    levels, ends : (n_steps,)
-        Torque at the beginning and at the end of a stretch, linear between, in shares of the
-        largest.
-    amplitudes : (n_steps,)
-        Amplitudes of sinusoids on top, which start at their mean, rising.
-    periods_s : (n_steps,)
-        Periods of the sinusoids; infinite where there is none.
-    """
+    """Torque against time as successive stretches."""
 
     durations_s: Array
+    """Durations of the stretches, (n_steps,)."""
     levels: Array
+    """Torque at the beginning of a stretch, (n_steps,), in shares of the largest."""
     ends: Array
+    """Torque at its end, linear between, (n_steps,)."""
     amplitudes: Array
+    """Amplitudes of sinusoids on top, which start at their mean, rising, (n_steps,)."""
     periods_s: Array
+    """Periods of the sinusoids, (n_steps,); infinite where there is none."""
 
     @property
     def slopes(self) -> Array:

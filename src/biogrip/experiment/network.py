@@ -10,20 +10,16 @@ from biogrip.arrays import Array
 
 @dataclass(frozen=True)
 class Network:
-    """Springs and dampers of n samples.
-
-    Parameters
-    ----------
-    k_p, c_p : (n,)
-        Parallel spring (N/m) and damper (N s/m).
-    k, c : (n, n_branches)
-        Spring and damper of each Maxwell branch.
-    """
+    """Springs and dampers of n samples."""
 
     k_p: Array
+    """Parallel spring in N/m, (n,)."""
     c_p: Array
+    """Parallel damper in N s/m, (n,)."""
     k: Array
+    """Spring of each Maxwell branch in N/m, (n, n_branches)."""
     c: Array
+    """Damper of each Maxwell branch in N s/m, (n, n_branches)."""
 
 
 # Stiffness or damping of a rigid element, in N/m or N s/m, too large to affect a response.

@@ -33,20 +33,16 @@ class Harmonic:
 
 @dataclass(frozen=True)
 class Load:
-    """Closing torque of one arm within a phase, as a function of the time since its start.
-
-    Parameters
-    ----------
-    value_Nm, slope_Nm_per_s, curvature_Nm_per_s2
-        The quadratic value + slope t + curvature t^2 / 2.
-    harmonics
-        Sinusoids on top of it.
-    """
+    """Closing torque of one arm within a phase, as a function of the time since its start."""
 
     value_Nm: float
+    """Value of the quadratic value + slope t + curvature t^2 / 2."""
     slope_Nm_per_s: float = 0.0
+    """Its slope."""
     curvature_Nm_per_s2: float = 0.0
+    """Its curvature."""
     harmonics: tuple[Harmonic, ...] = ()
+    """Sinusoids on top of it."""
 
     def at(self, elapsed: ArrayLike) -> Array:
         """Return the torque in N m at times in s after the start of the phase."""
@@ -59,50 +55,37 @@ class Load:
 
 @dataclass(frozen=True)
 class Phase:
-    """A stretch of the protocol.
-
-    Parameters
-    ----------
-    duration_s
-        Duration.
-    left, right
-        Closing torques tau_2 and tau_4, as increments on those that close the
-        arms onto the sample.
-    """
+    """A stretch of the protocol."""
 
     duration_s: float
     left: Load
+    """Closing torque tau_2, as an increment on that which closes the arm onto the sample."""
     right: Load
+    """Closing torque tau_4, likewise."""
 
 
 @dataclass(frozen=True)
 class TorqueHistory:
-    """A protocol as a list of torque changes, to which linear responses superpose.
-
-    Parameters
-    ----------
-    time_s : (n_events,)
-        Starts of the phases.
-    left, right : (n_events, 3)
-        Jumps of value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2 and
-        tau_4 at these times.
-    harmonic_time_s, omega_rad_per_s : (n_harmonics,)
-        Start and angular frequency of sinusoids Re(a e^(i omega (t - start))); each is
-        followed by one of opposite sign, which switches it off.
-    harmonic_left, harmonic_right : (n_harmonics,)
-        Complex amplitudes a in N m.
-    end_s
-        End of the protocol.
-    """
+    """A protocol as a list of torque changes, to which linear responses superpose."""
 
     time_s: Array
+    """Starts of the phases, (n_events,)."""
     left: Array
+    """Jumps of value (N m), slope (N m/s) and curvature (N m/s^2) of tau_2 at these times,
+    (n_events, 3)."""
     right: Array
+    """Those of tau_4, (n_events, 3)."""
     harmonic_time_s: Array
+    """Starts of sinusoids Re(a e^(i omega (t - start))), (n_harmonics,); each is followed by one of
+    opposite sign, which switches it off."""
     omega_rad_per_s: Array
+    """Their angular frequencies, (n_harmonics,)."""
     harmonic_left: ComplexArray
+    """Their complex amplitudes a of tau_2 in N m, (n_harmonics,)."""
     harmonic_right: ComplexArray
+    """Those of tau_4, (n_harmonics,)."""
     end_s: float
+    """End of the protocol."""
 
     @cached_property
     def symmetric(self) -> bool:

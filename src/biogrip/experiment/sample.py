@@ -34,18 +34,12 @@ def model_named(name: str, branches: int = 1) -> SampleModel:
 
 @dataclass(frozen=True)
 class Sample:
-    """Name of a sample's constitutive model, and its number of branches.
-
-    Parameters
-    ----------
-    name
-        Name of the model.
-    branches
-        Number of Maxwell branches of a generalized one.
-    """
+    """Name of a sample's constitutive model, and its number of branches."""
 
     name: str
+    """Name of the model."""
     branches: int = 1
+    """Number of Maxwell branches of a generalized one."""
 
     @property
     def model(self) -> SampleModel:

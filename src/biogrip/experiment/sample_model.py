@@ -22,31 +22,21 @@ _SUFFIXES = {
 
 @dataclass(frozen=True)
 class Parameter:
-    """A parameter of a sample model.
-
-    Parameters
-    ----------
-    name
-        Identifier in config, columns and code.
-    kind
-        ``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or
-        ``"exponent"``; decides the unit.
-    meaning
-        A few words for tables.
-    range_name
-        Which entry of the search range holds for it.
-    may_vanish
-        Whether zero is a possible value: the element is then not there.
-    below
-        What all its values are below, if anything.
-    """
+    """A parameter of a sample model."""
 
     name: str
+    """Identifier in config, columns and code."""
     kind: str
+    """``"stiffness"``, ``"damping"``, ``"springpot"`` (a modulus at 1 rad/s) or ``"exponent"``;
+    decides the unit."""
     meaning: str
+    """A few words for tables."""
     range_name: str
+    """Which entry of the search range holds for it."""
     may_vanish: bool = False
+    """Whether zero is a possible value: the element is then not there."""
     below: float = inf
+    """What all its values are below, if anything."""
 
     @property
     def unit(self) -> str:
@@ -71,42 +61,30 @@ Turned: TypeAlias = Callable[..., tuple[Array | float, ...]]
 
 @dataclass(frozen=True)
 class SampleModel:
-    """A named constitutive model.
-
-    Parameters
-    ----------
-    name, title
-        Name in the config; name in print.
-    parameters
-        What there is to identify, in the order of the columns of a population.
-    network
-        Turns parameters of shape (n, n_parameters) into a `Network`.
-    exchangeable
-        Parameters whose sum deserves a row of its own in tables, because stiff
-        branches make them trade against each other.
-    branches
-        Spring and damper of each Maxwell branch, by name; with several, the fastest first.
-    example
-        Parameters of some sample, which tests are about.
-    contains
-        Models that it becomes where elements vanish, by candidate, and how their parameters are
-        turned into its own (`biogrip.experiment.nesting`).
-    within
-        Likewise, candidates that become it, and how its parameters are turned into theirs.
-    branched
-        Makes the model with a number of Maxwell branches, if there is such.
-    """
+    """A named constitutive model."""
 
     name: str
+    """Name in the config."""
     title: str
+    """Name in print."""
     parameters: tuple[Parameter, ...]
+    """What there is to identify, in the order of the columns of a population."""
     network: Callable[[ArrayLike], Network]
+    """Turns parameters of shape (n, n_parameters) into a `Network`."""
     example: tuple[float, ...]
+    """Parameters of some sample, which tests are about."""
     exchangeable: tuple[str, ...] = ()
+    """Parameters whose sum deserves a row of its own in tables, because stiff branches make them
+    trade against each other."""
     branches: tuple[tuple[str, str], ...] = ()
+    """Spring and damper of each Maxwell branch, by name; with several, the fastest first."""
     contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    """Models that it becomes where elements vanish, by candidate, and how their parameters are
+    turned into its own (`biogrip.experiment.nesting`)."""
     within: Mapping[str, Turned] = field(default_factory=dict, hash=False)
+    """Likewise, candidates that become it, and how its parameters are turned into theirs."""
     branched: "Callable[[int], SampleModel] | None" = None
+    """Makes the model with a number of Maxwell branches, if there is such."""
 
     @property
     def names(self) -> tuple[str, ...]:

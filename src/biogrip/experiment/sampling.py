@@ -30,21 +30,14 @@ class Burst(Block):
 
 @dataclass(frozen=True)
 class Sampling:
-    """Sampling of the rotation: a uniform rate, listed times, or bursts.
-
-    Parameters
-    ----------
-    rate_Hz
-        Uniform rate, from 0 to the end of the protocol.
-    times_s
-        Sampling times, instead of a rate.
-    bursts
-        Bursts, instead of a rate.
-    """
+    """Sampling of the rotation: a uniform rate, listed times, or bursts."""
 
     rate_Hz: float = 0.0
+    """Uniform rate, from 0 to the end of the protocol."""
     times_s: tuple[float, ...] = ()
+    """Sampling times, instead of a rate."""
     bursts: tuple[Burst, ...] = ()
+    """Bursts, instead of a rate."""
 
     def over(self, end_s: float) -> Array:
         """Return the sampling times in s, (n_samples,), of a protocol that ends at `end_s`."""

@@ -65,21 +65,15 @@ _ROUNDING = 2.0**-44
 
 @dataclass(frozen=True)
 class Ladder:
-    """Parallel spring, damper and Maxwell branches that represent n springpots.
-
-    Parameters
-    ----------
-    spring : (n,)
-        Parallel spring in N/m.
-    damper : (n,)
-        Parallel damper in N s/m.
-    springs : (n_branches, n)
-        Springs of the Maxwell branches, in N/m; their rates are `BRANCH_RATES_PER_S`.
-    """
+    """Parallel spring, damper and Maxwell branches that represent n springpots."""
 
     spring: NDArray[Any]
+    """Parallel spring in N/m, (n,)."""
     damper: NDArray[Any]
+    """Parallel damper in N s/m, (n,)."""
     springs: NDArray[Any]
+    """Springs of the Maxwell branches in N/m, (n_branches, n); their rates are
+    `BRANCH_RATES_PER_S`."""
 
 
 def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:

@@ -48,24 +48,16 @@ UNPUBLISHED = Published(table=None, identified={}, error_percent={})
 
 @dataclass(frozen=True)
 class Truth:
-    """Model and true parameters of a simulated sample, and the paper's results for it.
-
-    Parameters
-    ----------
-    title
-        Name in print.
-    sample
-        Its constitutive model.
-    parameters
-        True values by name, SI units; empty if the trace was recorded.
-    published
-        Results of the paper.
-    """
+    """Model and true parameters of a simulated sample, and the paper's results for it."""
 
     title: str
+    """Name in print."""
     sample: Sample
+    """Its constitutive model."""
     parameters: Mapping[str, float]
+    """True values by name, SI units; empty if the trace was recorded."""
     published: Published
+    """Results of the paper."""
 
     @property
     def model(self) -> SampleModel:

@@ -24,30 +24,23 @@ from biogrip.study.study import Case
 
 @dataclass(frozen=True)
 class Designed:
-    """A designed experiment.
-
-    Parameters
-    ----------
-    case
-        Case that the experiment is for.
-    inputs
-        Inputs of the design, without parameters that no torque determines.
-    plan
-        The designed experiment.
-    before, after : (n, n_parameters)
-        Relative bounds for the plausible samples with the config's protocol and sampling (before)
-        and with the plan (after), at the same noise and with inertia.
-    force_time_s, force_N : (n_times,), (n, n_times)
-        Jaw force under the plan.
-    """
+    """A designed experiment."""
 
     case: Case
+    """Case that the experiment is for."""
     inputs: DesignInputs
+    """Inputs of the design, without parameters that no torque determines."""
     plan: Plan
+    """The designed experiment."""
     before: Array
+    """Relative bounds for the plausible samples with the config's protocol and sampling, at the
+    same noise and with inertia, (n, n_parameters)."""
     after: Array
+    """The same with the plan."""
     force_time_s: Array
+    """Times of the jaw force, (n_times,)."""
     force_N: Array
+    """Jaw force under the plan, (n, n_times)."""
 
 
 def designed(

@@ -22,18 +22,12 @@ _UNLIKE = 2.0
 
 @dataclass(frozen=True)
 class Recorded:
-    """A recorded trace, with the case that describes how it was recorded.
-
-    Parameters
-    ----------
-    case
-        Case with the trace's protocol and gripper.
-    file
-        CSV file.
-    """
+    """A recorded trace, with the case that describes how it was recorded."""
 
     case: Case
+    """Case with the trace's protocol and gripper."""
     file: Path
+    """CSV file."""
 
 
 def estimate_from_recordings(

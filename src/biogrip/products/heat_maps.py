@@ -19,21 +19,14 @@ from biogrip.study.sweeps import Axis
 
 @dataclass(frozen=True)
 class ShownAxis:
-    """An axis of a sweep as it is shown.
-
-    Parameters
-    ----------
-    label
-        Title, with the unit.
-    values
-        Values as shown, by their text in files.
-    reconstructed
-        True if the paper does not give the values.
-    """
+    """An axis of a sweep as it is shown."""
 
     label: str
+    """Title, with the unit."""
     values: Mapping[str, str]
+    """Values as shown, by their text in files."""
     reconstructed: bool
+    """True if the paper does not give the values."""
 
     @property
     def title(self) -> str:
@@ -43,31 +36,20 @@ class ShownAxis:
 
 @dataclass(frozen=True)
 class HeatMaps:
-    """Titles, axes and tolerances of a sweep's table and heat maps.
-
-    Parameters
-    ----------
-    title
-        Title of the sweep.
-    cases
-        Titles of the cases, by name.
-    methods
-        Identifiers by name.
-    rows, columns
-        Axes of the grid.
-    near_noise_tolerance
-        Share by which a misfit may exceed the noise to count as near it.
-    reconstructed
-        Keys of the gripper that the paper does not give.
-    """
+    """Titles, axes and tolerances of a sweep's table and heat maps."""
 
     title: str
+    """Title of the sweep."""
     cases: Mapping[str, str]
+    """Titles of the cases, by name."""
     methods: Mapping[str, Method]
+    """Identifiers by name."""
     rows: ShownAxis
     columns: ShownAxis
     near_noise_tolerance: float
+    """Share by which a misfit may exceed the noise to count as near it."""
     reconstructed: tuple[str, ...]
+    """Keys of the gripper that the paper does not give."""
 
 
 def heat_maps(study: Study, job: Wildcards) -> HeatMaps:

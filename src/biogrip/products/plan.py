@@ -20,18 +20,12 @@ Wildcards = Mapping[str, str]
 
 @dataclass(frozen=True)
 class Plan:
-    """The jobs of a study.
-
-    Parameters
-    ----------
-    study
-        The study.
-    results
-        Folder of the results; batches that have results there are kept.
-    """
+    """The jobs of a study."""
 
     study: Study
+    """The study."""
     results: Path
+    """Folder of the results; batches that have results there are kept."""
     _planned: dict[tuple[str, ...], list[Batch]] = field(default_factory=dict, init=False)
 
     def batches(self, stage: str, case: str, method: str = "") -> list[Batch]:

@@ -18,22 +18,16 @@ FIGURE_KINDS = (".png", ".pdf")
 
 @dataclass(frozen=True)
 class Weight:
-    """Resources of a job on a cluster.
-
-    Parameters
-    ----------
-    minutes, megabytes
-        Upper limits; every retry raises both.
-    group
-        Successive jobs of a group are submitted as one.
-    local
-        True if the job is too short to be worth submitting.
-    """
+    """Resources of a job on a cluster."""
 
     minutes: int = 5
+    """Upper limit; every retry raises it."""
     megabytes: int = 1000
+    """Likewise."""
     group: str | None = None
+    """Successive jobs of a group are submitted as one."""
     local: bool = False
+    """True if the job is too short to be worth submitting."""
 
 
 LIGHT = Weight(local=True)
@@ -43,18 +37,12 @@ JUDGEMENT = Weight(60, 1000, group="verdicts")
 
 @dataclass(frozen=True)
 class Reads:
-    """Input files of a product.
-
-    Parameters
-    ----------
-    files
-        Function of plan and wildcards that names the files.
-    one
-        True if it is always a single file.
-    """
+    """Input files of a product."""
 
     files: Callable[[Plan, Wildcards], list[str]]
+    """Function of plan and wildcards that names the files."""
     one: bool = False
+    """True if it is always a single file."""
 
 
 def the(pattern: str) -> Reads:
@@ -74,52 +62,38 @@ def of_batches(pattern: str) -> Reads:
 
 @dataclass(frozen=True)
 class Product:
-    """A product of the study, made by one or more jobs of a Snakemake rule.
-
-    Parameters
-    ----------
-    name
-        Name in commands, logs and the report.
-    writes
-        Output files by name, as patterns with the job's wildcards in braces.
-    make
-        Function that makes the outputs, called with the view of `uses`, and by keyword with the
-        files of `reads` and `writes` (lists if there may be several), and ``method``, ``seeds`` or
-        ``seed`` if any.
-    uses
-        What it uses of the config: the function can read nothing else.
-    jobs
-        Function that returns the wildcards of every job in a plan.
-    message
-        Message of a job in the log, with wildcards in braces.
-    reads
-        Input files by name.
-    weight
-        Resources of a job.
-    rule
-        Products of a rule are made by one job, as start-up takes longer than most of them.
-    category, item, caption
-        Place and caption in the report; a product without category is not in it.
-    modules
-        Function of the wildcards that names further modules whose code the product depends on.
-    by_default
-        True if a run makes it by default.
-    """
+    """A product of the study, made by one or more jobs of a Snakemake rule."""
 
     name: str
+    """Name in commands, logs and the report."""
     writes: Mapping[str, str]
+    """Output files by name, as patterns with the job's wildcards in braces."""
     make: Callable[..., None]
+    """Function that makes the outputs, called with the view of `uses`, and by keyword with the
+    files of `reads` and `writes` (lists if there may be several), and ``method``, ``seeds`` or
+    ``seed`` if any."""
     uses: Uses
+    """What it uses of the config: the function can read nothing else."""
     jobs: Callable[[Plan], Iterable[Wildcards]]
+    """Function that returns the wildcards of every job in a plan."""
     message: str
+    """Message of a job in the log, with wildcards in braces."""
     reads: Mapping[str, Reads] = field(default_factory=dict)
+    """Input files by name."""
     weight: Weight = LIGHT
+    """Resources of a job."""
     rule: str = ""
+    """Products of a rule are made by one job, as start-up takes longer than most of them."""
     category: str = ""
+    """Place in the report; a product without category is not in it."""
     item: str = ""
+    """Likewise, within the category."""
     caption: str = ""
+    """Caption in the report."""
     modules: Callable[[Wildcards], tuple[str, ...]] = lambda _: ()
+    """Function of the wildcards that names further modules whose code the product depends on."""
     by_default: bool = True
+    """True if a run makes it by default."""
 
     @property
     def module(self) -> str:

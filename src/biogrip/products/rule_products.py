@@ -10,21 +10,14 @@ from biogrip.products.product import Product
 
 @dataclass(frozen=True)
 class RuleProducts:
-    """Products that one rule makes, with its jobs.
-
-    Parameters
-    ----------
-    rule
-        Name of the Snakemake rule.
-    products
-        Products of each job.
-    jobs
-        Wildcards of each job.
-    """
+    """Products that one rule makes, with its jobs."""
 
     rule: str
+    """Name of the Snakemake rule."""
     products: tuple[Product, ...]
+    """Products of each job."""
     jobs: tuple[Wildcards, ...]
+    """Wildcards of each job."""
 
 
 def group_by_rule(products: Iterable[Product], plan: Plan) -> list[RuleProducts]:

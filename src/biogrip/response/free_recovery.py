@@ -19,21 +19,14 @@ from biogrip.response.linear import phi_function
 
 @dataclass(frozen=True)
 class Forcing:
-    """Loads from an instant on, while the torque is smooth.
-
-    Parameters
-    ----------
-    powers : (n_loads, 3)
-        Value, slope and curvature at that instant.
-    omega_rad_per_s : (n_harmonics,)
-        Angular frequencies of sinusoids on top.
-    amplitudes : (n_loads, n_harmonics)
-        Their complex amplitudes at that instant.
-    """
+    """Loads from an instant on, while the torque is smooth."""
 
     powers: Array
+    """Value, slope and curvature at that instant, (n_loads, 3)."""
     omega_rad_per_s: Array
+    """Angular frequencies of sinusoids on top, (n_harmonics,)."""
     amplitudes: ComplexArray
+    """Their complex amplitudes at that instant, (n_loads, n_harmonics)."""
 
     def at(self, elapsed_s: Array) -> Array:
         """Return the loads at times since the instant, (n_loads, n_times)."""
@@ -104,24 +97,16 @@ class Modes:
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of a system from an initial state.
-
-    Parameters
-    ----------
-    rates : (n_modes, 1)
-        Rates of decay.
-    shapes : (n_states, n_modes)
-        States by modes.
-    start : (n_modes,)
-        Initial values of the modes.
-    forcing
-        Loads on the modes.
-    """
+    """Motion of a system from an initial state."""
 
     rates: Array
+    """Rates of decay, (n_modes, 1)."""
     shapes: Array
+    """States by modes, (n_states, n_modes)."""
     start: Array
+    """Initial values of the modes, (n_modes,)."""
     forcing: Forcing
+    """Loads on the modes."""
 
     def at(self, elapsed_s: Array) -> Array:
         """Return the states at times since the beginning, (n_states, n_times)."""

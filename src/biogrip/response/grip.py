@@ -17,22 +17,16 @@ _A_PHASE, _A_PERIOD, _MOST = 200, 32, 200_000
 
 @dataclass(frozen=True)
 class Grip:
-    """The force of the jaws on a sample that they hold throughout a protocol.
-
-    Parameters
-    ----------
-    largest_N
-        Largest force with which the jaws press.
-    lowest_N, lowest_at_s
-        Lowest force, negative if the jaws pull, else after the largest one; and its time.
-    pulls_from_s
-        Time from which the jaws would have to pull; None if they press throughout.
-    """
+    """The force of the jaws on a sample that they hold throughout a protocol."""
 
     largest_N: float
+    """Largest force with which the jaws press."""
     lowest_N: float
+    """Lowest force, negative if the jaws pull, else after the largest one."""
     lowest_at_s: float
+    """Time of the lowest force."""
     pulls_from_s: float | None
+    """Time from which the jaws would have to pull; None if they press throughout."""
 
     def words(self) -> str | None:
         """Describe from when and how hard the jaws would have to pull, if they would."""

@@ -37,20 +37,14 @@ class StepResponse:
 
     A unit step of drive d at time 0 turns arm a (`LEFT`, `RIGHT`) by
     ``static[:, a, d] + sum_j weights[:, a, d, j] exp(rates[:, j] t)``.
-
-    Parameters
-    ----------
-    static : (n, n_arms, n_drives)
-        Final rotation in rad per N m.
-    rates : (n, n_modes)
-        Exponents in 1/s, real without inertia, complex with it.
-    weights : (n, n_arms, n_drives, n_modes)
-        In rad per N m.
     """
 
     static: Array
+    """Final rotation in rad per N m, (n, n_arms, n_drives)."""
     rates: NDArray[Any]
+    """Exponents in 1/s, (n, n_modes), real without inertia, complex with it."""
     weights: NDArray[Any]
+    """In rad per N m, (n, n_arms, n_drives, n_modes)."""
 
 
 def is_symmetric(gripper: Gripper, torque: TorqueHistory) -> bool:

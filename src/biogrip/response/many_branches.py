@@ -36,19 +36,14 @@ _LEAST_DIFFERENCE = 1e-30
 
 @dataclass(frozen=True)
 class Impedance:
-    """Impedance H = Z + b^2 G of n samples between the arms.
-
-    Parameters
-    ----------
-    weights, rates : (1 + n_rates, n)
-        A and the K_j; zero and the r_j, ascending. Complex if the samples' elements are.
-    level : (n,)
-        B.
-    """
+    """Impedance H = Z + b^2 G of n samples between the arms."""
 
     weights: NDArray[Any]
+    """A and the K_j, (1 + n_rates, n); complex if the samples' elements are."""
     rates: NDArray[Any]
+    """Zero and the r_j, ascending, (1 + n_rates, n)."""
     level: NDArray[Any]
+    """B, (n,)."""
 
     def zeros(self) -> Zeros:
         """Return the rates of the modes; elements must be real."""

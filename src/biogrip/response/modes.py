@@ -33,41 +33,30 @@ _COMPLEX_STEP = 1e-30
 
 
 class Modes(NamedTuple):
-    """Step responses of n samples' left arm, and their derivatives by the log-parameters.
-
-    Parameters
-    ----------
-    rates : (n, n_modes)
-        In 1/s; real and negative, or complex with a negative real part.
-    weights : (n, n_drives, n_modes)
-        In rad per N m.
-    rate_slopes : (n, n_parameters, n_modes)
-    weight_slopes : (n, n_parameters, n_drives, n_modes)
-    """
+    """Step responses of n samples' left arm, and their derivatives by the log-parameters."""
 
     rates: NDArray[Any]
+    """In 1/s, (n, n_modes); real and negative, or complex with a negative real part."""
     weights: NDArray[Any]
+    """In rad per N m, (n, n_drives, n_modes)."""
     rate_slopes: NDArray[Any]
+    """(n, n_parameters, n_modes)."""
     weight_slopes: NDArray[Any]
+    """(n, n_parameters, n_drives, n_modes)."""
 
 
 @dataclass(frozen=True)
 class Polynomials:
-    """Rotation of the left arm over torque of n samples, with derivatives by log-parameters.
-
-    Parameters
-    ----------
-    denominator : (n, terms)
-        In ascending powers of s.
-    denominator_slopes : (n_parameters, n, terms)
-    numerators : (n_drives, n, terms)
-    numerator_slopes : (n_parameters, n_drives, n, terms)
-    """
+    """Rotation of the left arm over torque of n samples, with derivatives by log-parameters."""
 
     denominator: Array
+    """In ascending powers of s, (n, terms)."""
     denominator_slopes: Array
+    """(n_parameters, n, terms)."""
     numerators: Array
+    """(n_drives, n, terms)."""
     numerator_slopes: Array
+    """(n_parameters, n_drives, n, terms)."""
 
     def of(self, rows: NDArray[Any]) -> "Polynomials":
         """Return the polynomials of some of the samples."""

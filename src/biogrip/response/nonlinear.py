@@ -48,27 +48,18 @@ STAGES = 5
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Discretisation and tolerance of the correction.
-
-    Parameters
-    ----------
-    first_s
-        Length of the first element after a jump of the torque.
-    growth
-        Ratio of each element's length to the one before.
-    per_period
-        Elements in a period of the fastest sinusoid.
-    tolerance
-        Largest change in the last sweep, relative to the peak.
-    most_sweeps
-        Limit of sweeps.
-    """
+    """Discretisation and tolerance of the correction."""
 
     first_s: float
+    """Length of the first element after a jump of the torque."""
     growth: float
+    """Ratio of each element's length to the one before."""
     per_period: float
+    """Elements in a period of the fastest sinusoid."""
     tolerance: float
+    """Largest change in the last sweep, relative to the peak."""
     most_sweeps: int
+    """Limit of sweeps."""
 
 
 FINE = Accuracy(first_s=1e-8, growth=1.3, per_period=8.0, tolerance=1e-13, most_sweeps=200)
@@ -80,24 +71,18 @@ COARSE = Accuracy(first_s=1e-3, growth=2.0, per_period=4.0, tolerance=1e-8, most
 
 @dataclass(frozen=True)
 class Correction:
-    """Nonlinear minus linear rotation of n samples, as polynomials on a mesh.
-
-    Parameters
-    ----------
-    edges_s : (n_elements + 1,)
-        The mesh.
-    values_rad : (n, n_arms, n_elements, STAGES + 1)
-        Rotation at the start of each element and at its nodes.
-    force_N : (n, n_elements, STAGES + 1)
-        Nonlinear minus linear jaw force there; after a jump of the torque, at the start.
-    converged : (n,)
-        True if the sweeps converged.
-    """
+    """Nonlinear minus linear rotation of n samples, as polynomials on a mesh."""
 
     edges_s: Array
+    """The mesh, (n_elements + 1,)."""
     values_rad: Array
+    """Rotation at the start of each element and at its nodes, (n, n_arms, n_elements, STAGES +
+    1)."""
     force_N: Array
+    """Nonlinear minus linear jaw force there, (n, n_elements, STAGES + 1); after a jump of the
+    torque, at the start."""
     converged: np.ndarray
+    """True if the sweeps converged, (n,)."""
 
     def at(self, time_s: Array, arm: int = LEFT) -> Array:
         """Evaluate nonlinear minus linear rotation in rad at ascending times, (n, n_times)."""

@@ -32,31 +32,22 @@ _GROWTH, _PER_PERIOD, _AT_ONCE = 1.1, 48, 2048
 
 @dataclass(frozen=True)
 class UnilateralResponse:
-    """Response of gripper and sample with unilateral contact.
-
-    Parameters
-    ----------
-    rotation_rad : (2, n_times)
-        Closing rotations of the left and the right arm.
-    jaw_force_N : (n_times,)
-        Never negative.
-    touching : (n_times,)
-        True while the jaws touch the sample.
-    shortening_m : (n_times,)
-        Shortening of the sample.
-    dampers_m : (n_branches, n_times)
-        Shortening of the damper of each Maxwell branch.
-    parted_s, met_s
-        Times at which contact was lost, and at which it was regained.
-    """
+    """Response of gripper and sample with unilateral contact."""
 
     rotation_rad: Array
+    """Closing rotations of the left and the right arm, (2, n_times)."""
     jaw_force_N: Array
+    """Never negative, (n_times,)."""
     touching: BoolArray
+    """True while the jaws touch the sample, (n_times,)."""
     shortening_m: Array
+    """Shortening of the sample, (n_times,)."""
     dampers_m: Array
+    """Shortening of the damper of each Maxwell branch, (n_branches, n_times)."""
     parted_s: tuple[float, ...]
+    """Times at which contact was lost."""
     met_s: tuple[float, ...]
+    """Times at which it was regained."""
 
 
 @dataclass(frozen=True)

@@ -29,21 +29,14 @@ MOST_SAMPLES = 50_000
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Autocorrelation model of noise, by the shares of its components in the variance.
-
-    Parameters
-    ----------
-    ar1
-        Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling.
-    time_s
-        Its relaxation time.
-    flicker
-        Share of noise with spectrum 1/f. The rest is white.
-    """
+    """Autocorrelation model of noise, by the shares of its components in the variance."""
 
     ar1: float
+    """Share of an Ornstein-Uhlenbeck process, AR(1) at uniform sampling."""
     time_s: float
+    """Its relaxation time."""
     flicker: float
+    """Share of noise with spectrum 1/f. The rest is white."""
 
     @property
     def white(self) -> float:

@@ -18,18 +18,12 @@ _LONGEST_NAME = 80
 
 @dataclass(frozen=True)
 class ConfigFiles:
-    """Config files of a study with line numbers, the later merged over the earlier.
-
-    Parameters
-    ----------
-    lines
-        Line (from 1) of every key and list item, by file.
-    command_line
-        Top-level keys set on the command line, which override all files.
-    """
+    """Config files of a study with line numbers, the later merged over the earlier."""
 
     lines: tuple[tuple[str, dict[KeyPath, int]], ...]
+    """Line (from 1) of every key and list item, by file."""
     command_line: frozenset[Hashable] = frozenset()
+    """Top-level keys set on the command line, which override all files."""
 
     def place(self, path: KeyPath) -> str:
         """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.

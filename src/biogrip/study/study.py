@@ -34,20 +34,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Case:
-    """A case of the study: one sample with its experiment and identification.
-
-    Parameters
-    ----------
-    name
-        Name used in files.
-    block
-        Config block, with the study's blocks merged in.
-    study
-        The study that it belongs to.
-    """
+    """A case of the study: one sample with its experiment and identification."""
 
     name: str
+    """Name used in files."""
     block: CaseBlock
+    """Config block, with the study's blocks merged in."""
     study: "Study"
 
     @property
@@ -286,15 +278,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Study:
-    """A study whose config has been checked.
-
-    Parameters
-    ----------
-    config
-        The whole config, with the study's blocks merged into every case.
-    """
+    """A study whose config has been checked."""
 
     config: StudyConfig
+    """The whole config, with the study's blocks merged into every case."""
 
     @cached_property
     def cases(self) -> dict[str, Case]:

@@ -82,58 +82,41 @@ class SweepBlock(Block):
 
 @dataclass(frozen=True)
 class Value:
-    """A value on an axis of a sweep's grid.
-
-    Parameters
-    ----------
-    name, text, shown
-        Text for case names, text for files (numbers as in the config), and text for the axis
-        (numbers in the axis' unit).
-    overrides
-        Values that replace those of the case, by dotted key.
-    """
+    """A value on an axis of a sweep's grid."""
 
     name: str
+    """Text for case names."""
     text: str
+    """Text for files; numbers as in the config."""
     shown: str
+    """Text for the axis; numbers in the axis' unit."""
     overrides: dict[str, float | str]
+    """Values that replace those of the case, by dotted key."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of a sweep's grid, with its values.
-
-    Parameters
-    ----------
-    label
-        Title with unit.
-    values
-        Values in the order of the config.
-    """
+    """One axis of a sweep's grid, with its values."""
 
     label: str
+    """Title with unit."""
     values: tuple[Value, ...]
+    """Values in the order of the config."""
 
 
 @dataclass(frozen=True)
 class Point:
-    """A point of a sweep's grid, i.e. a case with two values changed.
-
-    Parameters
-    ----------
-    name
-        Name of the point's case. It is made of the values only, since random streams derive from
-        it: an added value must not rename other points.
-    case
-        Case that the point's case is derived from.
-    row, column
-        Values of the point on both axes.
-    """
+    """A point of a sweep's grid, i.e. a case with two values changed."""
 
     name: str
+    """Name of the point's case. It is made of the values only, since random streams derive from it:
+    an added value must not rename other points."""
     case: str
+    """Case that the point's case is derived from."""
     row: Value
+    """Value on the axis of the rows."""
     column: Value
+    """Value on the axis of the columns."""
 
     @property
     def overrides(self) -> dict[str, float | str]:
@@ -143,21 +126,13 @@ class Point:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A grid of values, laid over each of some cases.
-
-    Parameters
-    ----------
-    name, title
-        Name used in files, and title.
-    cases
-        Names of cases of the study.
-    rows, columns
-        Axes of the grid.
-    """
+    """A grid of values, laid over each of some cases."""
 
     name: str
+    """Name used in files."""
     title: str
     cases: tuple[str, ...]
+    """Names of cases of the study."""
     rows: Axis
     columns: Axis
 

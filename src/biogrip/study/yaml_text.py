@@ -33,21 +33,14 @@ _SHOWN = 40
 
 @dataclass
 class _Open:
-    """A block or list whose end has not been reached in the parsing events.
-
-    Parameters
-    ----------
-    anchor
-        Its anchor, if it has one.
-    before
-        Number of values before it.
-    levels
-        Levels of nesting inside, itself included.
-    """
+    """A block or list whose end has not been reached in the parsing events."""
 
     anchor: str | None
+    """Its anchor, if it has one."""
     before: int
+    """Number of values before it."""
     levels: int = 1
+    """Levels of nesting inside, itself included."""
 
 
 def shown_path(file: Path) -> str:

@@ -25,34 +25,25 @@ SHOWN_SEEDS = 100
 
 @dataclass(frozen=True)
 class Fit:
-    """A trace and the response that was fitted to it.
-
-    Parameters
-    ----------
-    time_s, measured_rad, fitted_rad : (n_samples,)
-        Sampling times, and noisy and fitted rotation.
-    target_rad : (n_samples,) or None
-        Noise-free rotation; None if the trace was recorded.
-    """
+    """A trace and the response that was fitted to it."""
 
     time_s: Array
+    """Sampling times, (n_samples,)."""
     target_rad: Array | None
+    """Noise-free rotation, (n_samples,); None if the trace was recorded."""
     measured_rad: Array
+    """Noisy rotation, (n_samples,)."""
     fitted_rad: Array
+    """Fitted rotation, (n_samples,)."""
 
 
 @dataclass(frozen=True)
 class TypicalFit(Fit):
-    """The identification of the typical seed, see `typical`.
-
-    Parameters
-    ----------
-    seed, generations
-        Seed, and the number of generations it took.
-    """
+    """The identification of the typical seed, see `typical`."""
 
     seed: int
     generations: int
+    """Number of generations that it took."""
 
 
 def typical_fit(

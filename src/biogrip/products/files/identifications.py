@@ -56,34 +56,22 @@ def columns(model: SampleModel) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Record:
-    """One identification, with case, method and seed.
-
-    Parameters
-    ----------
-    case, method
-        Names of the case and of the method.
-    model, searched, fixed
-        Sample model, the same without fixed parameters, and values of fixed parameters
-        by name.
-    seed
-        Seed of the trace.
-    answer
-        Result of the method.
-    noise_rms_rad
-        RMS of the noise in the trace; None for a recorded trace.
-    cpu_s
-        Processor time in seconds; the mean over seeds that are identified together.
-    """
+    """One identification, with case, method and seed."""
 
     case: str
     method: str
     model: SampleModel
     searched: SampleModel
+    """The model without fixed parameters."""
     fixed: Mapping[str, float]
+    """Values of fixed parameters by name."""
     seed: int
+    """Seed of the trace."""
     answer: Identification
     noise_rms_rad: float | None
+    """RMS of the noise in the trace; None for a recorded trace."""
     cpu_s: float
+    """Processor time in seconds; the mean over seeds that are identified together."""
 
 
 def write_identifications(path: Path, records: list[Record]) -> None:

@@ -24,27 +24,18 @@ _END = "\r\n"
 
 @dataclass(frozen=True)
 class RowFile:
-    """A kind of CSV file.
-
-    Parameters
-    ----------
-    what
-        Content of a row, for messages.
-    columns
-        Column names.
-    path
-        Path pattern of a case's file, or path of the study's.
-    batch_path
-        Path pattern of a batch's file, if a case's file is joined from batches.
-    words
-        Columns to read as text even if they look like numbers.
-    """
+    """A kind of CSV file."""
 
     what: str
+    """Content of a row, for messages."""
     columns: tuple[str, ...]
+    """Column names."""
     path: str
+    """Path pattern of a case's file, or path of the study's."""
     batch_path: str = ""
+    """Path pattern of a batch's file, if a case's file is joined from batches."""
     words: tuple[str, ...] = ()
+    """Columns to read as text even if they look like numbers."""
 
     def write(self, path: Path, rows: Iterable[Sequence[Any]]) -> None:
         """Write a header and rows, consuming an iterator row by row."""

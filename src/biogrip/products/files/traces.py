@@ -28,24 +28,16 @@ _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
 
 @dataclass(frozen=True)
 class Measurements:
-    """Noisy traces of one case.
-
-    Parameters
-    ----------
-    time_s : (n_samples,)
-        Sampling instants, ascending.
-    target_rad : (n_samples,) or None
-        Trace without noise; None for a recorded trace.
-    rotation_rad
-        Noisy trace of each seed, (n_samples,) each.
-    gaps
-        Number of rows of a recording that were left out for want of a number.
-    """
+    """Noisy traces of one case."""
 
     time_s: Array
+    """Sampling instants, ascending, (n_samples,)."""
     target_rad: Array | None
+    """Trace without noise, (n_samples,); None for a recorded trace."""
     rotation_rad: dict[int, Array]
+    """Noisy trace of each seed, (n_samples,) each."""
     gaps: int = 0
+    """Number of rows of a recording that were left out for want of a number."""
 
 
 def write_target(

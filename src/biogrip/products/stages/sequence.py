@@ -41,28 +41,20 @@ earlier traces; one designed for the ranges, repeated; one designed for the cell
 
 @dataclass(frozen=True)
 class Sequences:
-    """Sequences of experiments with the cells of one case.
-
-    Parameters
-    ----------
-    case
-        The case; its protocol and sampling are the first experiment, with known noise.
-    inputs
-        Inputs of designs for the ranges.
-    low, high
-        Log bounds between which cells are drawn.
-    within
-        Log bounds of the prior.
-    experiments
-        Number of experiments in a sequence.
-    """
+    """Sequences of experiments with the cells of one case."""
 
     case: Case
+    """The case; its protocol and sampling are the first experiment, with known noise."""
     inputs: DesignInputs
+    """Inputs of designs for the ranges."""
     low: Array
+    """Lower log bounds between which cells are drawn."""
     high: Array
+    """Upper ones."""
     within: tuple[Array, Array]
+    """Log bounds of the prior."""
     experiments: int
+    """Number of experiments in a sequence."""
 
 
 def sequenced(study: Study) -> list[str]:

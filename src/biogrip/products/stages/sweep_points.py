@@ -42,21 +42,14 @@ _FACTOR, _BOUNDS = math.log(2), 4.0
 
 @dataclass(frozen=True)
 class SweepContent:
-    """The sweep of a case.
-
-    Parameters
-    ----------
-    study
-        The study with the points as cases.
-    parameters
-        True values by name, SI units.
-    places
-        Values on the axes by point, as text in files.
-    """
+    """The sweep of a case."""
 
     study: Study
+    """The study with the points as cases."""
     parameters: Mapping[str, float]
+    """True values by name, SI units."""
     places: Mapping[str, tuple[str, str]]
+    """Values on the axes by point, as text in files."""
 
 
 def describe_sweep(study: Study, job: Wildcards) -> SweepContent:

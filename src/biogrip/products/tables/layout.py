@@ -16,36 +16,25 @@ Cell = str | float | int | None
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table: its names in CSV and print.
-
-    Parameters
-    ----------
-    name, heading
-        Name in the CSV, and heading in print.
-    digits
-        Significant digits of numbers in print.
-    """
+    """A column of a table: its names in CSV and print."""
 
     name: str
+    """Name in the CSV."""
     heading: str
+    """Heading in print."""
     digits: int = 3
+    """Significant digits of numbers in print."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table with caption, columns and rows.
-
-    Parameters
-    ----------
-    caption
-        Description of the table in a sentence or two.
-    columns, rows
-        Columns and rows; None is an empty cell.
-    """
+    """A table with caption, columns and rows."""
 
     caption: str
+    """Description of the table in a sentence or two."""
     columns: tuple[Column, ...]
     rows: Sequence[tuple[Cell, ...]]
+    """None is an empty cell."""
 
 
 def write(table: Table, output: Path) -> None:
