@@ -21,15 +21,7 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 
 
 def draw(case: Case, identifications: Path, histories: Path) -> Figure:
-    """Draw each seed's excess of the misfit over its noise, highlighting the typical seed.
-
-    Parameters
-    ----------
-    case
-        The case.
-    identifications, histories
-        Files of the case, CSV and Parquet.
-    """
+    """Draw each seed's excess of the misfit over its noise, highlighting the typical seed."""
     found = read_identifications(identifications, case.study.shown_method.name)
     noise = found.set_index("seed")["noise_rms_rad"]
     noisy = bool((noise > 0).all())

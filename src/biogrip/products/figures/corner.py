@@ -37,15 +37,7 @@ _WIDE = 5.0
 
 
 def draw(case: Case, posterior: Path, samples: Path) -> Figure:
-    """Draw the posterior of a case.
-
-    Parameters
-    ----------
-    case
-        The case.
-    posterior, samples
-        Summary of the posterior, JSON, and its samples, Parquet.
-    """
+    """Draw the posterior of a case."""
     model = with_fixed(case.sample.model, case.fixed)
     values = read_samples(samples, model)
     return draw_corner(

@@ -19,13 +19,7 @@ _SHOWN_PERCENT = (0.1, 1000.0)
 
 
 def draw(case: Case) -> Figure:
-    """Draw maps of the bounds over k_p and c, in the study's experiment and in the case's own.
-
-    Parameters
-    ----------
-    case
-        Both experiments; k and c_p of all samples in the map are the case's.
-    """
+    """Draw maps of the bounds over k_p and c, in the study's experiment and in the case's own."""
     symbols = [parameter.symbol for parameter in case.searched.parameters]
     drawn = figure(PAGE_IN, 3.6)
     grid = drawn.subplots(2, len(symbols), sharex=True, sharey=True, squeeze=False)

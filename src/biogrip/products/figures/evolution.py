@@ -17,15 +17,7 @@ from biogrip.study.study import Case
 
 
 def draw(case: Case, identifications: Path, histories: Path) -> Figure:
-    """Draw every parameter over generations for all seeds, highlighting the typical seed.
-
-    Parameters
-    ----------
-    case
-        The case.
-    identifications, histories
-        Files of the case, CSV and Parquet.
-    """
+    """Draw every parameter over generations for all seeds, highlighting the typical seed."""
     truth, step = case.truth, case.study.shown_method.step
     found = read_identifications(identifications, case.study.shown_method.name)
     shown = int(typical(found)["seed"])

@@ -20,15 +20,7 @@ from biogrip.study.study import Case
 def draw(
     case: Case, identifications: Path, measurements: list[Path], calibrated: list[Path]
 ) -> Figure:
-    """Draw the fit of a case's typical seed.
-
-    Parameters
-    ----------
-    case
-        The case.
-    identifications, measurements, calibrated
-        Files of the case: CSV, Parquet, and YAML if its gripper was calibrated.
-    """
+    """Draw the fit of a case's typical seed."""
     problem = case.problem.calibrated(calibrated)
     fit = typical_fit(problem, case.study.shown_method.name, identifications, measurements)
     ended = f"{case.study.shown_method.step} {fit.generations}"

@@ -19,15 +19,7 @@ from biogrip.study.study import Case
 
 
 def draw(case: Case, target: Path) -> Figure:
-    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion.
-
-    Parameters
-    ----------
-    case
-        The case.
-    target
-        Its target, CSV.
-    """
+    """Draw the jaw force under bilateral contact, and the rotation with and without adhesion."""
     time_s, _, rotation = read_target(target)
     torque = torque_history(case.phases)
     network = case.sample.model.sample(case.parameters)

@@ -17,15 +17,7 @@ from biogrip.study.study import Case
 
 
 def draw(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path]) -> Figure:
-    """Draw the judged trace of a case and its best fit.
-
-    Parameters
-    ----------
-    case
-        The case.
-    verdicts, measurements, calibrated
-        Files of the case: JSON, Parquet, and YAML if its gripper was calibrated.
-    """
+    """Draw the judged trace of a case and its best fit."""
     problem = case.problem.calibrated(calibrated)
     found = {item["quantity"]: item["value"] for item in read_verdicts(verdicts)["quantities"]}
     values = {name: found[name] for name in problem.searched.names}

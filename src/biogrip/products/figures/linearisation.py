@@ -24,15 +24,7 @@ _MOST_CASES = 3
 
 
 def draw(study: Study, differences: Path) -> Figure:
-    """Draw the difference for the last case at twenty times the torque, and maps of a few.
-
-    Parameters
-    ----------
-    study
-        The study with its simulated cases.
-    differences
-        The comparison of the models, CSV.
-    """
+    """Draw the difference for the last case at twenty times the torque, and maps of a few."""
     comparison = DIFFERENCES.read(differences)
     cases = dict(list(study.cases.items())[:_MOST_CASES])
     drawn = figure(PAGE_IN, 2.6)

@@ -46,15 +46,7 @@ _STYLES: tuple[dict[str, Any], ...] = (
 
 
 def draw(study: Study, identifications: list[Path], targets: list[Path]) -> Figure:
-    """Draw moduli over frequency, and sensitivities over time.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    identifications, targets
-        Files of the cases in their order, CSV.
-    """
+    """Draw moduli over frequency, and sensitivities over time."""
     drawn = figure(PAGE_IN, 4.4)
     axes = drawn.subplots(2, len(study.cases), squeeze=False, height_ratios=[1.35, 1])
     files = zip(study.cases.values(), identifications, targets, strict=True)

@@ -58,17 +58,7 @@ def draw(
     measurements: list[Path],
     calibrated: list[Path],
 ) -> Figure:
-    """Draw the first case's typical fit, and identified over target values of a few cases.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    identifications, expected
-        CSV and JSON files of the cases, in their order.
-    measurements, calibrated
-        Files of the first case: Parquet, and YAML if its gripper was calibrated.
-    """
+    """Draw the first case's typical fit, and identified over target values of a few cases."""
     cases = list(study.cases.values())
     drawn = figure(PAGE_IN, 3.0)
     axes = drawn.subplots(1, 1 + len(cases), width_ratios=[2] + [1.05] * len(cases))

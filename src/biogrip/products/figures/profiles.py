@@ -28,17 +28,7 @@ _WIDE = 5.0
 
 
 def draw(case: Case, measured: Path, expected: list[Path]) -> Figure:
-    """Draw the profile of every quantity of a case, with confidence limits.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measured
-        Verdicts on the judged trace, JSON.
-    expected
-        Verdicts on the trace without noise, JSON, if the truth is known.
-    """
+    """Draw the profile of every quantity of a case, with confidence limits."""
     others = [read_verdicts(path) for path in expected]
     return draw_profiles(case.title, case.parameters, read_verdicts(measured), others)
 

@@ -38,13 +38,6 @@ def draw(maps: HeatMaps, points: list[Path]) -> Figure:
 
     Numbers in cells are for the first method; brackets hold the share of the second method, and
     the bound.
-
-    Parameters
-    ----------
-    maps
-        The sweep's cases, axes and titles.
-    points
-        Judged points, CSV, one file per case and named like it.
     """
     cases = dict(list(maps.cases.items())[:_MOST_CASES])
     rows = len(maps.rows.values)

@@ -47,19 +47,7 @@ def draw(
     expected: Path,
     calibrated: list[Path],
 ) -> Figure:
-    """Draw identified over target for every quantity and method.
-
-    Parameters
-    ----------
-    case
-        The case.
-    identifications, target
-        Files of the case, CSV.
-    expected
-        Expected verdicts, JSON.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    """
+    """Draw identified over target for every quantity and method."""
     items = read_verdicts(expected)["quantities"]
     verdicts = {item["quantity"]: item["verdict"] for item in items}
     found = read_identifications(identifications)

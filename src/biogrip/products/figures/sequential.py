@@ -29,15 +29,7 @@ _OPEN = 100.0
 
 
 def draw(case: Case, rows: list[Path]) -> Figure:
-    """Draw the share of cells in which each quantity is known, and the intervals' half widths.
-
-    Parameters
-    ----------
-    case
-        The case.
-    rows
-        Estimates and limits for each cell, CSV.
-    """
+    """Draw the share of cells in which each quantity is known, and the intervals' half widths."""
     symbols = {p.name: p.symbol for p in case.problem.searched.parameters}
     found = pd.concat([SEQUENCES.read(file) for file in rows])
     found = found.assign(well=known_well(found), half=half_widths(found))

@@ -42,15 +42,7 @@ _TRUE = _POINTS | {
 
 
 def draw(case: Case, measured: Path, identifications: Path) -> Figure:
-    """Draw the increase of chi-squared over the two exchangeable dampers of a case.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measured, identifications
-        Verdicts with a valley, JSON, and identifications, CSV, of the case.
-    """
+    """Draw the increase of chi-squared over the two exchangeable dampers of a case."""
     found = read_verdicts(measured)
     valley = found["valley"]
     x, y = valley["x"], valley["y"]

@@ -18,15 +18,7 @@ _LOWEST = 1e-3
 
 
 def draw(case: Case, identifications: Path) -> Figure:
-    """Draw the sorted increases of chi-squared over the lowest known, for every method.
-
-    Parameters
-    ----------
-    case
-        The case.
-    identifications
-        Files of the case, CSV.
-    """
+    """Draw the sorted increases of chi-squared over the lowest known, for every method."""
     found = read_identifications(identifications)
     increase = np.maximum(chi_square_increase(found, case.samples), _LOWEST)
     tolerance = case.study.optimum_tolerance

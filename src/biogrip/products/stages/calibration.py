@@ -16,17 +16,7 @@ from biogrip.study.study import Case
 
 
 def run(case: Case, gripper: Path, records: Path) -> None:
-    """Simulate both arms' free motion with noise, and identify their properties.
-
-    Parameters
-    ----------
-    case
-        The case.
-    gripper
-        The calibrated gripper, YAML.
-    records
-        The records, Parquet.
-    """
+    """Simulate both arms' free motion with noise, and identify their properties."""
     test = case.calibration
     time_s = sample_times(test.duration_s, test.rate_Hz)
     noise = Noise("gaussian", test.noise_level, "peak")

@@ -36,25 +36,7 @@ def identify(
     history: Path,
     timing: Path,
 ) -> None:
-    """Identify a batch of seeds with one method.
-
-    Parameters
-    ----------
-    case
-        The case.
-    method
-        Name of the method.
-    seeds
-        Seeds of the batch.
-    measurements
-        Noisy traces, Parquet.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    parameters, history
-        Identified parameters, CSV, and histories, Parquet.
-    timing
-        Processor times, CSV; for traces identified together, the mean.
-    """
+    """Identify a batch of seeds with one method; traces identified together share their time."""
     case_problem = case.problem.calibrated(calibrated)
     identified = identifier(method, case.methods[method])
     recorded = read_measurements(measurements, list(seeds))

@@ -29,15 +29,6 @@ def join(
 ) -> None:
     """Join batches in the order of their methods and seeds.
 
-    Parameters
-    ----------
-    case
-        The case.
-    batches, history_batches
-        Files of the identification stage, in the order of methods and seeds.
-    parameters, history
-        Joined files of the case.
-
     Raises
     ------
     BiogripError

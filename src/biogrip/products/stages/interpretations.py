@@ -26,15 +26,6 @@ def read(case: Case, target: Path, rows: Path) -> None:
 
     Random streams are those of the study, so a interpretation that changes nothing reproduces the
     study's results.
-
-    Parameters
-    ----------
-    case
-        The case.
-    target
-        Target, CSV.
-    rows
-        One row per interpretation and seed, CSV.
     """
     INTERPRETATIONS.write(rows, _rows(case, target))
 

@@ -53,21 +53,6 @@ def estimate(
     The noise of a seed is that of its measurement. A second estimate has parameters without
     information fixed at their true values, as the Cramér-Rao bound assumes. Some seeds get a full
     verdict as well, as users are shown it, see `judged_in_full`.
-
-    Parameters
-    ----------
-    case
-        The case.
-    seeds
-        Seeds of the batch.
-    target
-        Target, CSV.
-    expected
-        Expected verdicts, JSON, which name the quantities that traces should determine.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    intervals
-        One row per quantity and seed, CSV.
     """
     case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)

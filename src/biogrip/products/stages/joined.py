@@ -14,16 +14,7 @@ from biogrip.study.study import Case, Study
 
 
 def join(case: Case, batches: list[Path], rows: Path) -> None:
-    """Join CSV files that have the same columns.
-
-    Parameters
-    ----------
-    case
-        The case with its number of seeds; batches may hold more, of an earlier run with more.
-    batches
-        The files, in the order of their seeds.
-    rows
-        Joined file with the rows of these seeds.
+    """Join CSV files that have the same columns, without seeds of an earlier run with more.
 
     Raises
     ------

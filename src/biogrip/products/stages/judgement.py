@@ -53,19 +53,7 @@ def fit_judged(
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
-    """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measurements
-        Noisy traces, Parquet.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    verdicts
-        Verdicts, profiles and valley, JSON.
-    """
+    """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
     case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
@@ -110,17 +98,6 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
 
     They are what to expect of any trace of the case. Without noise, the rounding of the
     target's digits takes its place.
-
-    Parameters
-    ----------
-    case
-        The case.
-    target
-        Target, CSV.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    verdicts
-        Verdicts and profiles, JSON.
     """
     case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)

@@ -39,21 +39,7 @@ def fit(
     calibrated: list[Path],
     fits: Path,
 ) -> None:
-    """Fit a batch of seeds by least squares with each model.
-
-    Parameters
-    ----------
-    case
-        The case.
-    seeds
-        Seeds of the batch.
-    measurements
-        Noisy traces, Parquet.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    fits
-        One row per model and seed, CSV.
-    """
+    """Fit a batch of seeds by least squares with each model."""
     case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, list(seeds))
     MODEL_FITS.write(fits, _rows(case, case_problem, seeds, recorded))

@@ -50,23 +50,7 @@ def sample(
     posterior: Path,
     samples: Path,
 ) -> None:
-    """Sample the posterior of the trace of seed 0.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measurements
-        Noisy traces, Parquet.
-    verdicts
-        Verdicts on the same trace, JSON.
-    calibrated
-        A calibration, YAML, whose arms replace the gripper's, if there is one.
-    posterior
-        Summary of the posterior, JSON.
-    samples
-        Posterior samples, Parquet.
-    """
+    """Sample the posterior of the trace of seed 0."""
     case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
     time_s, trace = recorded.time_s, recorded.rotation_rad[TRACE]

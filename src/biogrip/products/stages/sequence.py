@@ -99,17 +99,7 @@ def sequences(study: Study, job: Wildcards) -> Sequences:
 
 
 def sequence(planned: Sequences, seed: int, rows: Path) -> None:
-    """Simulate sequences of experiments with one cell, in all four ways.
-
-    Parameters
-    ----------
-    planned
-        The case's sequences.
-    seed
-        Number of the cell.
-    rows
-        Estimates and limits after each experiment, CSV.
-    """
+    """Simulate sequences of experiments with one cell, in all four ways."""
     SEQUENCES.write(rows, _Cell(planned, seed).rows())
 
 

@@ -66,16 +66,7 @@ def judge(
 ) -> None:
     """Compute errors and shares of successful seeds at every point of a case's sweep.
 
-    Parameters
-    ----------
-    sweep
-        The sweep of the case.
-    identifications
-        Identifications of every point, CSV, named like the point.
-    calibrated
-        Calibrations, YAML, of points that use one, named like the point.
-    points
-        One row per point, method and quantity, CSV.
+    Files are named like their point.
 
     Raises
     ------

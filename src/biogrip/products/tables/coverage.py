@@ -53,17 +53,7 @@ def coverage(
     intervals: list[Path],
     calibrated: list[Path],
 ) -> Table:
-    """Compare estimates and intervals of many seeds with the true values and the bound.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    targets, intervals
-        Files of the cases, CSV, in their order.
-    calibrated
-        Calibrations, YAML, of cases that use one, in their order.
-    """
+    """Compare estimates and intervals of many seeds with the true values and the bound."""
     calibrations = iter(calibrated)
     rows: list[tuple[Cell, ...]] = []
     for (name, case), target, file in zip(study.cases.items(), targets, intervals, strict=True):

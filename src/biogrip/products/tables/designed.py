@@ -43,17 +43,7 @@ def _is_covered(case: Case) -> bool:
 
 
 def designed(study: Study, expected: list[Path], intervals: list[Path]) -> Table:
-    """Compare bounds of both experiments with estimates of many seeds.
-
-    Parameters
-    ----------
-    study
-        The study with its designed cases.
-    expected
-        Verdicts on traces without noise, JSON, in the order of the cases.
-    intervals
-        Estimates and limits of cases with intervals, CSV, in their order.
-    """
+    """Compare bounds of both experiments with estimates of many seeds."""
     files = iter(intervals)
     rows: list[tuple[Cell, ...]] = []
     for (name, case), foreseen in zip(study.cases.items(), expected, strict=True):

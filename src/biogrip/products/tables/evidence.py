@@ -41,15 +41,7 @@ def evidence(
     measurements: list[Path],
     targets: list[Path],
 ) -> Table:
-    """Compare statements of the paper with results of the study.
-
-    Parameters
-    ----------
-    study
-        Values that statements are compared with.
-    identifications, measurements, targets
-        Files of the cases: CSV, Parquet and CSV.
-    """
+    """Compare statements of the paper with results of the study."""
     rows = [*_actuator_rows(study), *_gripper_rows(study), *_gene_rows(study)]
     for name, case in study.cases.items():
         truth = case.truth

@@ -23,13 +23,7 @@ _COLUMNS = (
 
 
 def linearisation(_: Study, differences: Path) -> Table:
-    """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`.
-
-    Parameters
-    ----------
-    differences
-        The comparison of the models, CSV.
-    """
+    """Return, for every case and angle, the torque factor that reaches `LIMIT_PERCENT`."""
     rows: list[tuple[Cell, ...]] = []
     for (case, angle), group in DIFFERENCES.read(differences).groupby(
         ["case", "reference_angle_deg"], sort=False

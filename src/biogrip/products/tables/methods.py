@@ -29,15 +29,7 @@ _LEADING = (
 
 
 def methods(study: Study, identifications: list[Path]) -> Table:
-    """Compare success rate, errors and cost of each method.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    identifications
-        Identifications of the cases, CSV, in their order.
-    """
+    """Compare success rate, errors and cost of each method."""
     labels = dict.fromkeys(
         _label(quantity)
         for case in study.cases.values()

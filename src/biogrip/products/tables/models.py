@@ -25,15 +25,7 @@ _COLUMNS = (
 
 
 def models(study: Study, fits: list[Path]) -> Table:
-    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`.
-
-    Parameters
-    ----------
-    study
-        The study with its cases.
-    fits
-        Fits of all models, CSV.
-    """
+    """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
     found = pd.concat([MODEL_FITS.read(path) for path in fits])
     found["aic"], found["bic"] = aic_and_bic(
         found["misfit_rad"], found["samples"], found["parameters"]

@@ -24,15 +24,7 @@ _BY_METHOD = {
 
 
 def robustness(maps: HeatMaps, points: list[Path]) -> Table:
-    """Join the points of a sweep over all its cases.
-
-    Parameters
-    ----------
-    maps
-        Titles and axes of the sweep.
-    points
-        Judged points, CSV, one file per case and named like it.
-    """
+    """Join the points of a sweep over all its cases."""
     rows: list[tuple[Cell, ...]] = []
     for name in maps.cases:
         found = read_points(points, name)

@@ -43,15 +43,7 @@ _COLUMNS = (
 
 
 def sequential(study: Study, rows: list[Path]) -> Table:
-    """Compute how well cells are known after each number of experiments.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    rows
-        Estimates and limits for each cell, CSV, case after case.
-    """
+    """Compute how well cells are known after each number of experiments."""
     found = pd.concat([SEQUENCES.read(file) for file in rows])
     lines = [line for case in study.cases for line in _lines(case, found[found["case"] == case])]
     levels = [case.confidence for case in study.cases.values()]

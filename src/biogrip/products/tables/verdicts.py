@@ -30,17 +30,7 @@ _COLUMNS = (
 
 
 def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
-    """List the verdicts on all quantities of a case.
-
-    Parameters
-    ----------
-    case
-        The case.
-    measured
-        Verdicts on the judged trace, JSON.
-    expected
-        Verdicts on the trace without noise, JSON, if the truth is known.
-    """
+    """List the verdicts on all quantities of a case."""
     found, others = read_verdicts(measured), [read_verdicts(path) for path in expected]
     foreseen_of = {item["quantity"]: item for item in others[0]["quantities"]} if others else {}
     rows: list[tuple[Cell, ...]] = []
