@@ -119,7 +119,6 @@ def _dimensions(axes: Axes, comb: CombDrive) -> None:
 
 COMB = drawing(
     draw,
-    name="comb",
     caption="Figure 7 of the paper: (a, b) the comb drive to scale, overlapping as at rest, (a) on "
     "its side; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",

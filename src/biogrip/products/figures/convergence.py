@@ -82,7 +82,6 @@ def _mutation(axes: Axes, start: int, last: int) -> None:
 
 CONVERGENCE = drawing(
     draw,
-    name="convergence",
     caption="Figure 8 of the paper: the best misfit of every seed over the RMS of the noise in its "
     "trace, step by step. Typical is the seed of median excess at the end.",
     uses=from_case("title mutation_start study.shown_method study.near_noise_tolerance"),

@@ -12,7 +12,9 @@ from biogrip.products.figures.style import save, styled
 from biogrip.products.product import EVALUATION, FIGURE_KINDS, LIGHT, Product
 
 
-def drawing(draw: Callable[..., Figure], *, name: str, file: str = "", **declared: Any) -> Product:
+def drawing(
+    draw: Callable[..., Figure], *, name: str = "", file: str = "", **declared: Any
+) -> Product:
     """Declare a figure of the study, or of each of its cases or sweeps.
 
     Parameters
@@ -20,7 +22,7 @@ def drawing(draw: Callable[..., Figure], *, name: str, file: str = "", **declare
     draw
         Function that draws the figure from what it uses and, by keyword, from the files of `reads`.
     name
-        Name of the product.
+        Name of the product; by default that of its module.
     file
         Name of the file, if it differs from `name`.
     declared
@@ -32,6 +34,7 @@ def drawing(draw: Callable[..., Figure], *, name: str, file: str = "", **declare
         with styled():
             save(draw(given, **files), png)
 
+    name = name or draw.__module__.rpartition(".")[2]
     file = file or name
     usual: dict[str, Any] = {"item": file, "weight": EVALUATION if "cases" in declared else LIGHT}
     return shown(

@@ -85,7 +85,6 @@ def _mapped(study: Study) -> list[str]:
 
 DESIGNED_MAP = drawing(
     draw,
-    name="designed_map",
     caption="Cramér-Rao bounds of every parameter, all of them free, over the parallel spring "
     "k_p and the branch's damper c of a sample, in the study's experiment (above) and in the "
     f"case's own (below), at the same noise. The line is {100 * WELL:g} %, the star the case.",

@@ -81,7 +81,6 @@ def _beside(ratio: float) -> str:
 
 EVOLUTION = drawing(
     draw,
-    name="evolution",
     caption="As Figure 10 of the paper: the parameters of the best individual, step by step, for "
     "every seed. Typical is the seed of median excess of the misfit over the noise in its trace. "
     "Named above each panel: how far from the target it ends.",

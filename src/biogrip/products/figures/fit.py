@@ -63,7 +63,6 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
 
 FIT = drawing(
     draw,
-    name="fit",
     caption="As Figures 9, 11 and 12 of the paper: target, noisy measurement and its fit, of the "
     "seed of median excess of the misfit over the noise in its trace; and below the residuals of "
     "the measurement (points) and of the target (line).",

@@ -75,7 +75,6 @@ def _from_loss(found: UnilateralResponse, values: Array) -> Array:
 
 FORCE = drawing(
     draw,
-    name="force",
     caption="The force of the jaws on the sample if they hold it throughout, as the model has it. "
     "Where it is negative the sample would have to stick to jaws that pull it; below, the target "
     "and, where a linear model allows, the rotation of jaws that let go there.",

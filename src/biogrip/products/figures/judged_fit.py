@@ -29,7 +29,6 @@ def draw(case: Case, verdicts: Path, measurements: Path, calibrated: list[Path])
 
 JUDGED_FIT = drawing(
     draw,
-    name="judged_fit",
     caption="The trace that this case's verdicts are about, its best fit, and below the "
     "residuals of the trace (points) and of the target (line).",
     uses=from_case("title problem recorded published.axis_rad"),

@@ -189,7 +189,6 @@ def _networks(axes: Axes) -> None:
 
 LINKAGE = drawing(
     draw,
-    name="linkage",
     caption="Figures 4 to 6 of the paper: (a) the gripper as a linkage, to scale, holding a sample "
     f"of {1e6 * LARGEST_M:g} µm; (b) its tips at the reference and closed as far as the study's "
     "softest sample lets them, the rotation enlarged as it says, and their displacements along x; "

@@ -141,7 +141,6 @@ def _agreed(moduli: Array) -> BoolArray:
 
 MODULI = drawing(
     draw,
-    name="moduli",
     caption="Upper row: storage modulus G' (solid) and loss modulus G'' (dashed) of the true "
     "sample, and of all fits to its traces; shaded is the band in which nine tenths of the fits "
     f"near the noise agree on the modulus to {NEAR:.0%}, whatever their parameters. Lower row: how "

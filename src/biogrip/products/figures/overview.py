@@ -187,7 +187,6 @@ def _first(study: Study) -> str:
 
 OVERVIEW = drawing(
     draw,
-    name="overview",
     caption="(a) Target, noisy measurement and typical fit of the first case. (b to d) Identified "
     "over target value of every seed of the first three cases, for c + c_p and each parameter that "
     "traces can tell from zero; triangles at the edge stand for values off the axis.",

@@ -117,7 +117,6 @@ def _window(item: dict[str, Any]) -> tuple[float, float]:
 
 PROFILES = drawing(
     draw,
-    name="profiles",
     caption="Profile likelihoods of one seed, and without noise (grey); shaded: the confidence "
     "interval; dashed: its threshold; dotted: the increase at an end of the search range above "
     "which the interval has a limit on that side.",

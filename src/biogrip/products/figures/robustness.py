@@ -159,5 +159,4 @@ ROBUSTNESS_FIGURE = drawing(
     uses=heat_maps,
     reads={"points": points_of_cases()},
     sweeps=True,
-    rule="",
 )

@@ -163,7 +163,6 @@ def _legend(drawn: Figure, case: Case, methods: list[str], seeds: int) -> None:
 
 SCATTER = drawing(
     draw,
-    name="scatter",
     caption="Identified over target values for every method and seed; shaded, where "
     "traces determine it: the confidence interval by the Cramér-Rao bound, with parameters "
     "without information fixed; dashed: the paper. Bars are quartiles, triangles "

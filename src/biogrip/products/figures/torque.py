@@ -91,7 +91,6 @@ def _line(
 
 TORQUE = drawing(
     draw,
-    name="torque",
     caption="Figure 3 of the paper: torque of each comb drive against time, and the voltage it "
     "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
     "the smallest and at the largest sample that the gripper takes.",

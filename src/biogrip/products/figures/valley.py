@@ -118,7 +118,6 @@ def _points(axes: Axes, points: Array, ends: Array, style: dict[str, Any], label
 
 VALLEY = drawing(
     draw,
-    name="valley",
     caption="Rise of χ² over c and c_p, all else fitted, around the fits of all seeds and where it "
     f"is below {_DEEP:g}: the valley along which they trade against each other and, if it is that "
     "deep, its arm along which c is that of a branch too weak and slow to be seen (it goes on "

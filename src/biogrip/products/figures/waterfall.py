@@ -60,7 +60,6 @@ def draw(case: Case, identifications: Path) -> Figure:
 
 WATERFALL = drawing(
     draw,
-    name="waterfall",
     caption="Increase of χ² over the global optimum at the end of each method, sorted over seeds. "
     "Dashed: tolerance of the optimum; dotted: the study's much larger tolerance of the noise.",
     uses=from_case(

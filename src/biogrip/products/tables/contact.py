@@ -50,7 +50,6 @@ def contacts(study: Study) -> Table:
 
 CONTACT = table(
     contacts,
-    name="contact",
     item="input: contact",
     caption="Rotation, torque and voltage that close the jaws onto samples of several sizes.",
     uses=from_study("gripper jaw_gap_m actuator phases"),

@@ -133,8 +133,6 @@ def _error(target: float, value: float | None) -> float | None:
 
 CONTACT_LOSS = table(
     contact_loss,
-    name="contact_loss",
-    item="contact loss",
     caption="Errors of identifications that assume bilateral contact in traces with loss of "
     "contact, and in the readings before the loss.",
     uses=from_study(

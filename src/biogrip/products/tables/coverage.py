@@ -132,8 +132,6 @@ def _calibrated(study: Study) -> list[str]:
 
 COVERAGE = table(
     coverage,
-    name="coverage",
-    item="coverage",
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
     "their intervals, and the verdicts that users are shown, hold the truth.",
     rule="tables",

@@ -11,7 +11,7 @@ from biogrip.products.tables.layout import Table, write
 
 
 def table(
-    make: Callable[..., Table], *, name: str, stem: str = "results/tables/{name}", **declared: Any
+    make: Callable[..., Table], *, name: str = "", stem: str = "", **declared: Any
 ) -> Product:
     """Declare a table of the study, or of each of its cases or sweeps.
 
@@ -20,9 +20,9 @@ def table(
     make
         Function that makes the table from what it uses and, by keyword, the files of `reads`.
     name
-        Name of the product.
+        Name of the product; by default that of its module.
     stem
-        Path without suffix.
+        Path without suffix, if it is not ``results/tables/`` and the name.
     declared
         What else `biogrip.products.declared.shown` takes.
     """
@@ -32,4 +32,6 @@ def table(
         inputs = {key: file for key, file in files.items() if f".{key}" not in TABLE_KINDS}
         write(make(given, **inputs), csv)
 
-    return shown(written, "Tables", TABLE_KINDS, stem.format(name=name), name=name, **declared)
+    name = name or make.__module__.rpartition(".")[2]
+    stem, usual = stem or f"results/tables/{name}", {"item": name.replace("_", " ")}
+    return shown(written, "Tables", TABLE_KINDS, stem, name=name, **usual | declared)

@@ -101,7 +101,6 @@ def _of_seeds(found: pd.DataFrame | None, name: str, truth: float, bound: float)
 
 DESIGNED = table(
     designed,
-    name="designed",
     item="designed experiments",
     caption="Bounds of designed experiments beside those of the study's own, with spread and "
     "coverage over seeds identified in them.",

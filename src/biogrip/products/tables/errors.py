@@ -39,8 +39,6 @@ def _cell(name: str, text: str) -> Cell:
 
 ERRORS = table(
     errors,
-    name="errors",
-    item="errors",
     caption=CAPTION,
     uses=from_study("near_noise_tolerance"),
     reads={"tables": of_cases(ERRORS_OF_CASE.writes["csv"], every)},

@@ -118,7 +118,6 @@ CAPTION = (
 
 ERRORS_OF_CASE = table(
     errors_of_case,
-    name="errors_of_case",
     stem="results/tables/errors",
     item="errors",
     caption=CAPTION,

@@ -169,8 +169,6 @@ def _measurements(study: Study) -> list[str]:
 
 EVIDENCE = table(
     evidence,
-    name="evidence",
-    item="evidence",
     caption="Statements of the paper beside what the study computes, and what speaks for the "
     "reconstructed values.",
     rule="tables",

@@ -94,8 +94,6 @@ def _median(errors: "np.ndarray | None") -> float | None:
 
 INTERPRETATIONS_TABLE = table(
     interpretations,
-    name="interpretations",
-    item="interpretations",
     caption="How often the genetic algorithm finds the samples under other interpretations of the "
     "paper's section 4, and in which generation it improves for the last time.",
     uses=from_study("interpretation_titles near_noise_tolerance", cases=each(read_cases, "truth")),

@@ -81,8 +81,6 @@ def _row(
 
 LEFT_OUT = table(
     left_out,
-    name="left_out",
-    item="left out",
     caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
     "inertia.",
     uses=from_study("gripper actuator phases", cases=each(simulated, "sample parameters")),

@@ -59,8 +59,6 @@ CAPTION = (
 
 LINEARISATION = table(
     linearisation,
-    name="linearisation",
-    item="linearisation",
     caption=CAPTION,
     rule="tables",
     reads={"differences": the(DIFFERENCES.path)},

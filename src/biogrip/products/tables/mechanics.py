@@ -82,8 +82,6 @@ def _rows(case: Case) -> list[tuple[Cell, ...]]:
 
 MECHANICS = table(
     mechanics,
-    name="mechanics",
-    item="mechanics",
     caption="Strain, force, stiffness and apparent modulus of every simulated sample, beside the "
     "gripper's own stiffness.",
     uses=from_study(

@@ -83,8 +83,6 @@ def _label(quantity: list[Parameter]) -> str:
 
 METHODS_COMPARED = table(
     methods,
-    name="methods",
-    item="methods",
     caption="The identifiers on the same traces: share of seeds at the global optimum and within "
     "the study's tolerance of the noise, responses simulated, errors.",
     rule="tables",

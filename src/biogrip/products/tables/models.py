@@ -55,7 +55,6 @@ def models(study: Study, fits: list[Path]) -> Table:
 
 MODELS_COMPARED = table(
     models,
-    name="models",
     item="sample models",
     caption="Number of seeds in which each sample model has the lowest AIC and BIC.",
     rule="tables",

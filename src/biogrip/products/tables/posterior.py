@@ -80,8 +80,6 @@ def _rounded(value: float | None) -> float | None:
 
 POSTERIOR_TABLE = table(
     posteriors,
-    name="posterior",
-    item="posterior",
     caption="Posteriors of one trace of each case, beside its profile likelihoods, and how far "
     "the samples have converged.",
     uses=from_study(cases=each(sampled, "parameters")),

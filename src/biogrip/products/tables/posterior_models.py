@@ -54,7 +54,6 @@ def posterior_models(study: Study, files: list[Path]) -> Table:
 
 POSTERIOR_MODELS = table(
     posterior_models,
-    name="posterior_models",
     item="evidence of models",
     caption="Evidence of sample models for one trace of each case, beside AIC and BIC.",
     uses=from_study(cases=each(_compared)),

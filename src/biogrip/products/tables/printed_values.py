@@ -55,8 +55,6 @@ def printed_values(study: Study) -> Table:
 
 PRINTED_VALUES = table(
     printed_values,
-    name="printed_values",
-    item="printed values",
     caption="The numbers printed in Tables 5 to 7, held against the paper's own two-digit "
     "encoding, ranges and error formula.",
     rule="tables",

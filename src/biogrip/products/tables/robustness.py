@@ -77,11 +77,9 @@ def _capital(text: str) -> str:
 
 ROBUSTNESS = table(
     robustness,
-    name="robustness",
     item="robustness: {sweep}",
     caption=CAPTION,
     uses=heat_maps,
     reads={"points": points_of_cases()},
     sweeps=True,
-    rule="",
 )

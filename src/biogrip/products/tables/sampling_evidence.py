@@ -80,7 +80,6 @@ def _drop_redundant(bounds: list[tuple[Quantity, float]]) -> list[Quantity]:
 
 SAMPLING_EVIDENCE = table(
     sampling_evidence,
-    name="sampling_evidence",
     item="evidence: sampling",
     caption="The errors that the paper prints, beside the standard deviations that the study's "
     "noise leaves at least at several sampling rates. Only near the rate at which the two are "

@@ -112,7 +112,6 @@ def _every_file(plan: Plan, _: Wildcards) -> list[str]:
 
 SEQUENTIAL = table(
     sequential,
-    name="sequential",
     item="sequential experiments",
     caption="Accuracy of simulated cells' parameters over the number of experiments: the study's "
     "experiment repeated, or each experiment designed from all earlier traces.",

@@ -39,7 +39,6 @@ def timings(study: Study, times: list[Path]) -> Table:
 # Not in tables/, since times are not reproducible.
 TIMES = table(
     timings,
-    name="timings",
     stem="results/timings",
     item="processor times",
     caption="Processor time of the identifications on the machine that made this report.",

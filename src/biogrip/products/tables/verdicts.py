@@ -78,8 +78,6 @@ def target_of(quantity: str, parameters: Mapping[str, float]) -> float | None:
 
 VERDICTS = table(
     verdicts,
-    name="verdicts",
-    item="verdicts",
     caption="Verdicts on every quantity from profile likelihoods of one seed's trace, with "
     "confidence limits, beside those expected from the trace without noise.",
     uses=from_case("name title parameters"),
