@@ -20,8 +20,7 @@ def whole(samples: Array, capacity: Array) -> IntArray:
     room = counts < capacity
     order = np.argsort(-np.where(room, samples - counts, -1.0), kind="stable")
     counts[order[:missing]] += 1
-    found: IntArray = counts.astype(np.intp)
-    return found
+    return counts.astype(np.intp)
 
 
 def make_bursts(

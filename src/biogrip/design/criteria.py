@@ -38,15 +38,12 @@ class Criterion:
     def values(self, covariances: Array) -> Array:
         """Return the criterion of every sample, (n,), from covariances (n, n_asked, n_asked)."""
         if self.name == "D":
-            value: Array = np.linalg.slogdet(covariances)[1]
-            return value
+            return np.linalg.slogdet(covariances)[1]
         diagonals = np.diagonal(covariances, axis1=1, axis2=2)
         if self.name == "A":
-            mean: Array = diagonals.mean(axis=1)
-            return mean
+            return diagonals.mean(axis=1)
         if self.name == "largest":
-            largest: Array = diagonals.max(axis=1)
-            return largest
+            return diagonals.max(axis=1)
         return _eigenvalues(covariances)[:, -1]
 
     def smooth(self, covariances: Array, sharpness: float) -> float:
@@ -117,8 +114,7 @@ def _power_mean(values: Array, power: float) -> Array:
     """Return the logarithm of the p-norm of positive values, along the last axis."""
     largest = values.max(axis=-1)
     sums = np.sum((values / largest[..., None]) ** power, axis=-1)
-    logs: Array = np.log(largest) + np.log(sums) / power
-    return logs
+    return np.log(largest) + np.log(sums) / power
 
 
 def _singled_out(values: Array, sharpness: float) -> Array:
@@ -158,8 +154,7 @@ def whitened(information: Array, sensitivity: Array) -> Array:
     singular = np.linalg.eigvalsh(correlations)[:, 0] < _ROUNDING
     lifted = np.where(singular, _ROUNDING, 0.0)[:, None, None] * np.eye(information.shape[1])
     root = np.linalg.cholesky(correlations + lifted)
-    white: Array = np.linalg.solve(root, sensitivity / length[:, :, None])
-    return white
+    return np.linalg.solve(root, sensitivity / length[:, :, None])
 
 
 def _correlations(information: Array) -> tuple[Array, Array]:

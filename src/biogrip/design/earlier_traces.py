@@ -44,8 +44,7 @@ class Earlier:
     @property
     def best(self) -> Array:
         """Log-parameters of the best fit, (n_parameters,)."""
-        logs: Array = np.log(self.parameters[0])
-        return logs
+        return np.log(self.parameters[0])
 
 
 def estimate_from_traces(
@@ -138,8 +137,7 @@ def _drawn(
     roots = np.linalg.cholesky(sensitivity + np.eye(int(free.sum()))).swapaxes(1, 2)
     z = rng.standard_normal((len(x), int(free.sum()), 1))
     x[:, free] += np.linalg.solve(roots, z)[..., 0]
-    drawn: Array = np.clip(x, problem.low, problem.high)
-    return drawn
+    return np.clip(x, problem.low, problem.high)
 
 
 def _undetermined(information: Array, problem: Problem) -> BoolArray:

@@ -102,8 +102,7 @@ def compute_sensitivities(
 
 def compute_information(sensitivity: Array) -> Array:
     """Return the Fisher information, (n, n_parameters, n_parameters), of sensitivities."""
-    information: Array = sensitivity @ sensitivity.swapaxes(1, 2)
-    return information
+    return sensitivity @ sensitivity.swapaxes(1, 2)
 
 
 def relative_bounds(information: Array) -> Array:

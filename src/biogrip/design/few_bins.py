@@ -63,5 +63,4 @@ def in_few_bins(
     )
     if found.x is None:
         return samples
-    spread: Array = found.x * total
-    return spread
+    return found.x * total

@@ -174,8 +174,7 @@ def _mixed(
 
     def worth_of(inverse: Array) -> Array:
         _, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
-        found: Array = np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
-        return found
+        return np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
 
     power = 1.0 if criterion.name == "D" else 0.5
     inverse, value = at(shares)

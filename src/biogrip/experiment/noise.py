@@ -98,8 +98,7 @@ def add_noise(
         if time_s is None:
             raise ValueError("noise with parts that are not white needs the sampling times")
         unit = _with_parts(unit, time_s, noise, rng)
-    noisy: Array = rotation_rad + standard_deviation(rotation_rad, noise) * unit
-    return noisy
+    return rotation_rad + standard_deviation(rotation_rad, noise) * unit
 
 
 def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generator) -> Array:
@@ -143,8 +142,7 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
     if noise.level_rad is not None:
         return np.full_like(magnitude, noise.level_rad)
     scale = magnitude if noise.reference == "signal" else np.full_like(magnitude, magnitude.max())
-    deviation: Array = noise.level * scale
-    return deviation
+    return noise.level * scale
 
 
 def rms(values: Array) -> float:

@@ -85,8 +85,7 @@ def draw_ornstein_uhlenbeck(
     for before, kept, state in zip(states[:-1], np.exp(-elapsed), states[1:], strict=True):
         state += np.multiply(kept, before, out=left)
     # One product per reading: the order of its sums does not depend on the number of readings.
-    total: Array = (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
-    return total
+    return (states[:, None] @ np.sqrt(weights)[:, None])[:, 0, 0]
 
 
 def flicker_rates(time_s: Array) -> Array:
@@ -110,5 +109,4 @@ def flicker_rates(time_s: Array) -> Array:
     slowest = 1 / (_SLOWEST * (time_s[-1] - time_s[0]))
     fastest = 1 / float(np.diff(time_s).min())
     count = 2 + int(np.log(fastest / slowest) / _EFOLDS)
-    rates: Array = np.geomspace(slowest, fastest, count)
-    return rates
+    return np.geomspace(slowest, fastest, count)

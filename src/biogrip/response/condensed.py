@@ -203,8 +203,7 @@ class Condensed:
         family = np.concatenate((family.reshape(-1, len(time_s)), projected))
         basis, triangle = np.linalg.qr(family.T)
         turned, share, _ = np.linalg.svd(triangle)
-        span: Array = basis @ turned[:, share > _RANK * share[0]]
-        return span
+        return basis @ turned[:, share > _RANK * share[0]]
 
     @cached_property
     def _chosen(self) -> IntArray:
@@ -214,8 +213,7 @@ class Condensed:
 
         span = self.dense.values_of_rows(self._span.T)
         _, order = qr(span, mode="r", pivoting=True)
-        chosen: IntArray = np.sort(order[: span.shape[0]])
-        return chosen
+        return np.sort(order[: span.shape[0]])
 
     @cached_property
     def _basis(self) -> Array:

@@ -180,8 +180,7 @@ class DenseSamples:
         if piece.triangle is None:
             return self._all_s[piece.first : piece.stop]
         start, end = self._all_s[piece.first], self._all_s[piece.stop - 1]
-        nodes: Array = 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
-        return nodes
+        return 0.5 * (start + end) + 0.5 * (end - start) * _PLACES
 
     @staticmethod
     def _count(piece: _Piece) -> int:

@@ -32,8 +32,7 @@ class Forcing:
         """Return the loads at times since the instant, (n_loads, n_times)."""
         powers = np.stack((np.ones_like(elapsed_s), elapsed_s, elapsed_s**2 / 2))
         turning = np.exp(1j * self.omega_rad_per_s[:, None] * elapsed_s)
-        loads: Array = self.powers @ powers + (self.amplitudes @ turning).real
-        return loads
+        return self.powers @ powers + (self.amplitudes @ turning).real
 
     def later(self, elapsed_s: float) -> "Forcing":
         """Return the same loads, counted from a later instant on."""

@@ -42,8 +42,7 @@ def while_ringing(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> Boo
     """Return True for times, (n_times,), at which arms may ring."""
     changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
     last = np.maximum(changes_s.searchsorted(time_s, side="right") - 1, 0)
-    ringing: BoolArray = time_s - changes_s[last] <= ringing_s(gripper)
-    return ringing
+    return time_s - changes_s[last] <= ringing_s(gripper)
 
 
 def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array) -> Array:

@@ -234,8 +234,7 @@ def _product(factors: list[Array], one: Array) -> Array:
 def poles(denominator: Array, *, real: bool) -> NDArray[Any]:
     """Compute the roots of denominators, shape (n, n_modes), moved apart if they coincide."""
     if denominator.shape[1] == 2:
-        rates: NDArray[Any] = -(denominator[:, :1] / denominator[:, 1:])
-        return rates
+        return -(denominator[:, :1] / denominator[:, 1:])
     if denominator.shape[1] == 3 and real:
         return real_quadratic_roots(denominator)
     found = roots(denominator)

@@ -139,5 +139,4 @@ def _polynomial(arm: Arm) -> Array:
 def _value(arm: Arm, s: ComplexArray) -> ComplexArray:
     """Return the impedance of a free arm."""
     k, c, inertia = _polynomial(arm)
-    value: ComplexArray = k + s * (c + s * inertia)
-    return value
+    return k + s * (c + s * inertia)

@@ -115,8 +115,7 @@ class SeriesMisfit:
         parameters : (n, n_parameters)
             Sample parameters in the model's order, SI units.
         """
-        misfit: Array = self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
-        return misfit
+        return self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
 
     def of_each(self, parameters: Array, traces: IntArray) -> Array:
         """Compute the misfits in rad of populations, each to one trace, (n_populations, n).

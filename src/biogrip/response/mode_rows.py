@@ -101,8 +101,7 @@ class ModeRows:
         mixed[:, 1:] += moved[..., None] * power_slopes[:, None]
         # One product per sample: the order of its sums does not depend on the number of samples.
         pieces = self._table[piece].reshape(count, -1, self._rows)
-        rows: Array = mixed.reshape(count, 1 + parameters, -1) @ pieces
-        return rows
+        return mixed.reshape(count, 1 + parameters, -1) @ pieces
 
 
 def _powers(place: Array) -> tuple[Array, Array]:

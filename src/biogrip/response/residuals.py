@@ -239,8 +239,7 @@ class Residuals:
         values = np.where(found.converged[:, None, None], found.values_rad[:, LEFT], np.nan)
         # One product per sample: the order of its sums does not depend on the number of samples.
         shape = len(log_parameters), -1, len(condensed.of_corrections)
-        rows: Array = differences(values.reshape(shape)) @ condensed.of_corrections
-        return rows
+        return differences(values.reshape(shape)) @ condensed.of_corrections
 
     def condensed_misfit(self, parameters: Array) -> Array:
         """Compute RMS misfits of a population, (n,) in rad, each independent of the others.

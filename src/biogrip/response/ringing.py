@@ -174,8 +174,7 @@ def _closest(rates: ComplexArray, size: Array) -> Array:
     """Return the smallest relative distance between two poles of each sample, (n,)."""
     distance = np.abs(rates[:, :, None] - rates[:, None, :]) / size[:, None, :]
     distance[:, range(rates.shape[1]), range(rates.shape[1])] = np.inf
-    nearest: Array = distance.min(axis=(1, 2))
-    return nearest
+    return distance.min(axis=(1, 2))
 
 
 def _circled(polynomials: Polynomials, rates: ComplexArray) -> Modes:

@@ -163,5 +163,4 @@ def _newton_polygon_radii(coefficients: Array) -> Array:
             for j in range(k + 1, degree + 1):
                 chord = log[:, i] + (log[:, j] - log[:, i]) * (k - i) / (j - i)
                 hull[:, k] = np.maximum(hull[:, k], chord)
-    radii: Array = np.exp(hull[:, :-1] - hull[:, 1:])
-    return radii
+    return np.exp(hull[:, :-1] - hull[:, 1:])

@@ -161,5 +161,4 @@ def _around(parameters: Array, step: float, *, slopes: bool) -> Array:
         unit = np.eye(count)
         both_ways = np.stack((unit, -unit), axis=1).reshape(-1, count)
         steps = step * np.concatenate((steps, both_ways))
-    around: Array = (parameters[:, None] * np.exp(steps)).reshape(-1, count)
-    return around
+    return (parameters[:, None] * np.exp(steps)).reshape(-1, count)

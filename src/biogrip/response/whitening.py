@@ -105,5 +105,4 @@ class Whitening:
         solved = self._solve(
             self._time_s, self._rates, self._left, self._right, columns, np.empty_like(columns)
         )
-        white: Array = (solved / self._deviations[:, None]).T.reshape(rows.shape)
-        return white
+        return (solved / self._deviations[:, None]).T.reshape(rows.shape)

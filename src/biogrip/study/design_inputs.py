@@ -80,8 +80,7 @@ def plausible(case: Case, block: DesignSettings) -> Array:
     from scipy.stats import qmc
 
     spread = qmc.Halton(len(names), scramble=False).random(block.plausible_samples + 1)[1:]
-    drawn: Array = np.exp(low + (high - low) * spread)
-    return drawn
+    return np.exp(low + (high - low) * spread)
 
 
 def plausible_ends(case: Case) -> tuple[Array, Array]:

@@ -29,8 +29,7 @@ def documented() -> dict[str, Any]:
     Block.__pydantic_config__["use_attribute_docstrings"] = True
     for model in (CaseBlock, StudyConfig):
         model.model_rebuild(force=True)
-    found: dict[str, Any] = tidy(StudyConfig.model_json_schema())
-    return found
+    return tidy(StudyConfig.model_json_schema())
 
 
 def reference(config: Path) -> str:

@@ -135,8 +135,7 @@ def _modulus(network: Network, omega: Array) -> Array:
 def _agreed(moduli: Array) -> BoolArray:
     """Return True at frequencies where nine tenths of fits, (n, n_omega), agree on the modulus."""
     low, high = np.quantile(np.abs(moduli), (0.05, 0.95), axis=0)
-    agreed: BoolArray = high < (1 + NEAR) * low
-    return agreed
+    return high < (1 + NEAR) * low
 
 
 MODULI = drawing(

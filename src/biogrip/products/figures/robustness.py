@@ -99,8 +99,7 @@ def _grid(maps: HeatMaps, points: pd.DataFrame, column: str) -> Array:
     """Return a column's values as a grid, (n_rows, n_columns)."""
     wide = points.pivot_table(index="row", columns="column", values=column, dropna=False)
     rows, columns = (list(axis.values) for axis in (maps.rows, maps.columns))
-    found: Array = wide.reindex(index=rows, columns=columns).to_numpy(float)
-    return found
+    return wide.reindex(index=rows, columns=columns).to_numpy(float)
 
 
 def _heat_map(axes: Axes, maps: HeatMaps, values: Array, norm: Normalize, colours: str) -> None:

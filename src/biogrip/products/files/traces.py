@@ -111,8 +111,7 @@ def _target_columns(path: Path) -> Array:
             f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "
             "allowed is a finite number."
         )
-    columns: Array = values.T
-    return columns
+    return values.T
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:

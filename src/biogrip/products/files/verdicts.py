@@ -29,8 +29,7 @@ EXPECTED = "results/identifiability/expected/{case}.json"
 
 def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
     """Return a diagnosis and further notes as plain data in SI units, rounded."""
-    data: dict[str, Any] = rounded_numbers(exact_data(diagnosis, notes))
-    return data
+    return rounded_numbers(exact_data(diagnosis, notes))
 
 
 def exact_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:

@@ -140,8 +140,7 @@ def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
     """
     with np.errstate(divide="ignore"):
         away = np.abs(np.log(values / truth))
-    inside: BoolArray = away <= np.fmax(_FACTOR, _BOUNDS * bound)
-    return inside
+    return away <= np.fmax(_FACTOR, _BOUNDS * bound)
 
 
 def _errors_percent(values: Array, truth: float) -> Array:

@@ -69,8 +69,7 @@ def half_widths(found: pd.DataFrame) -> "pd.Series[float]":
 
 def known_well(found: pd.DataFrame) -> BoolArray:
     """Return whether each row's interval is narrow enough to count as determined."""
-    well: BoolArray = (half_widths(found) <= WELL).to_numpy()
-    return well
+    return (half_widths(found) <= WELL).to_numpy()
 
 
 def _lines(case: str, found: pd.DataFrame) -> list[tuple[Cell, ...]]:
