@@ -26,14 +26,12 @@ def whole(samples: Array, capacity: Array) -> IntArray:
 def make_bursts(
     each: Sequence[TimeBins], starts: IntArray, counts: IntArray, fastest_Hz: float
 ) -> tuple[Burst, ...]:
-    """Convert readings of cells to bursts; successive full cells share a burst.
+    """Convert readings of cells after steps to bursts; successive full cells share a burst.
 
     Parameters
     ----------
-    each
-        Cells after each step.
-    starts : (n_steps,)
-        Slots at which steps begin.
+    each, starts : (n_steps,)
+        Cells after each step, and slots at which steps begin.
     counts : (n_cells,)
         Numbers of readings in all cells.
     fastest_Hz

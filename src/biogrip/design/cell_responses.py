@@ -46,18 +46,9 @@ class _Part:
 def compute_cell_responses(
     views: Views, time_bins: TimeBins, waveform: Waveform, fastest_Hz: float
 ) -> CellResponses:
-    """Compute the responses of plausible samples to a torque, in cells.
+    """Compute the responses of plausible samples to a torque in N m if its largest is 1, in cells.
 
-    Parameters
-    ----------
-    views
-        Modes of the samples, with responses in the middle of the cells.
-    time_bins
-        Cells after a step, longer than any step.
-    waveform
-        Torque, in N m if its largest is 1.
-    fastest_Hz
-        Number of slots per second.
+    The cells after a step are longer than any step; there are `fastest_Hz` slots per second.
     """
     moving = views.under(waveform)
     slots = np.round(waveform.durations_s * fastest_Hz).astype(np.intp)

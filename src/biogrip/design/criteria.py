@@ -137,18 +137,9 @@ def inverted(information: Array) -> Array:
 
 
 def whitened(information: Array, sensitivity: Array) -> Array:
-    """Transform sensitivities such that the information becomes the identity matrix.
+    """Transform sensitivities, (n, n_parameters, n_cells), so that information is the identity.
 
     In directions whose information is only rounding errors, they become tiny.
-
-    Parameters
-    ----------
-    information : (n, n_parameters, n_parameters)
-    sensitivity : (n, n_parameters, n_cells)
-
-    Returns
-    -------
-    (n, n_parameters, n_cells)
     """
     correlations, length = _correlations(information)
     singular = np.linalg.eigvalsh(correlations)[:, 0] < _ROUNDING

@@ -87,20 +87,9 @@ def estimate_from_traces(
 
 
 def information_at(problem: Problem, noise_rad: float, log_parameters: Array) -> Array:
-    """Compute the Fisher information of log-parameters from the traces of a problem.
+    """Compute the Fisher information on log-parameters, (n, n_parameters, n_parameters).
 
-    Parameters
-    ----------
-    problem
-        One trace or several, whose information is summed.
-    noise_rad
-        Standard deviation of the noise.
-    log_parameters : (n, n_parameters)
-        Samples at which it is computed.
-
-    Returns
-    -------
-    (n, n_parameters, n_parameters)
+    That of several traces is their sum. Samples are (n, n_parameters).
     """
     slopes = problem.residuals.condensed_responses(log_parameters)[:, 1:] / noise_rad
     return compute_information(slopes)

@@ -72,12 +72,7 @@ class SamplingProblem:
 def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
     """Find the best sampling of the first torque with which the jaws press throughout.
 
-    Parameters
-    ----------
-    inputs
-        Design problem.
-    torques
-        From `best_torques`, which checks contact at fewer instants.
+    The torques are those of `best_torques`, which checks contact at fewer instants.
 
     Raises
     ------
@@ -148,14 +143,9 @@ def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
 
 
 def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:
-    """Compute the jaw force of samples, with inertia, at instants dense after each step.
+    """Compute times in s, (n_times,), dense after each step, and jaw forces in N, (n, n_times).
 
-    Returns
-    -------
-    time_s : (n_times,)
-        In s.
-    force : (n, n_times)
-        In N.
+    With inertia.
     """
     history = torque_history(tuple(phases))
     lengths = np.diff(np.append(history.time_s, history.end_s))

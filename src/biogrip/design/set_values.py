@@ -10,15 +10,7 @@ _DIGITS = 4
 
 
 def set_values(inputs: DesignInputs, torque: Torque) -> tuple[Phase, ...]:
-    """Round a torque to values that can be set, both arms alike; no torque becomes larger.
-
-    Parameters
-    ----------
-    inputs
-        Design problem, which gives the fastest sampling rate.
-    torque
-        Torque to be rounded.
-    """
+    """Round a torque to values that can be set, both arms alike; no torque becomes larger."""
     waveform, rate = torque.waveform, inputs.fastest_Hz
     levels, ends, amplitudes = (
         [_rounded_down(torque.largest_Nm * share) for share in shares]

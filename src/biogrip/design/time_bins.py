@@ -41,17 +41,7 @@ class TimeBins:
 
 
 def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins:
-    """Divide the slots after a step into cells of growing length.
-
-    Parameters
-    ----------
-    slots
-        Number of slots to the next step, whose own slot is left out.
-    growth
-        Factor by which cells become longer.
-    longest
-        Length of cells at most.
-    """
+    """Divide the slots up to the next step into cells that grow by a factor, up to a longest."""
     firsts = list(range(1, min(_SINGLE, slots)))
     place = float(_SINGLE)
     while place < slots:

@@ -40,22 +40,18 @@ class View:
 
 @dataclass(frozen=True)
 class _Factors:
-    """Coefficients of the functions of the time since a step."""
+    """Coefficients of functions of the time e since a step, (n_steps, n, n_modes).
+
+    Those of e^(r e) - 1, e^(r e), e e^(r e), 1, e, sin(w e) and cos(w e).
+    """
 
     growing: ComplexArray
-    """e^(r e) - 1, (n_steps, n, n_modes), as are the others."""
     decaying: ComplexArray
-    """e^(r e)."""
     lasting: ComplexArray
-    """e e^(r e)."""
     resting: ComplexArray
-    """1."""
     linear: ComplexArray
-    """e."""
     sine: ComplexArray
-    """sin(w e)."""
     cosine: ComplexArray
-    """cos(w e)."""
 
 
 class Views:

@@ -24,16 +24,8 @@ def apparent_modulus(
 ) -> float:
     """Return Young's modulus in Pa of a sphere from a force and the shortening it causes.
 
-    Parameters
-    ----------
-    force_N
-        Force between the jaws.
-    shortening_m
-        Decrease of the distance between the jaws since first contact.
-    size_m
-        Diameter of the sphere.
-    poisson
-        Poisson's ratio of the material.
+    The shortening is counted from first contact, the size is the sphere's diameter, and `poisson`
+    is Poisson's ratio of the material.
     """
     indentation, radius = 0.5 * shortening_m, 0.5 * size_m
     return 0.75 * (1 - poisson**2) * force_N / math.sqrt(radius * indentation**3)

@@ -126,17 +126,6 @@ def standard_deviation(rotation_rad: Array, noise: Noise) -> Array:
     """Return the noise's standard deviation in rad at every reading of a noise-free trace.
 
     Drift and outliers are not included.
-
-    Parameters
-    ----------
-    rotation_rad : (n_samples,)
-        Noise-free rotation.
-    noise
-        Noise that is added to it.
-
-    Returns
-    -------
-    (n_samples,)
     """
     magnitude = np.abs(rotation_rad)
     if noise.level_rad is not None:

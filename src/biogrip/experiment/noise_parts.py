@@ -56,7 +56,7 @@ class Outliers(Block):
 def draw_ornstein_uhlenbeck(
     time_s: Array, weights: Array, rates_per_s: Array, rng: np.random.Generator
 ) -> Array:
-    """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times.
+    """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times, (n_times,).
 
     From reading to reading, each is an AR(1) process [1]_.
 
@@ -68,10 +68,6 @@ def draw_ornstein_uhlenbeck(
         Variance of each, and the inverse of its relaxation time.
     rng
         Random generator.
-
-    Returns
-    -------
-    (n_times,)
 
     References
     ----------
@@ -89,17 +85,10 @@ def draw_ornstein_uhlenbeck(
 
 
 def flicker_rates(time_s: Array) -> Array:
-    """Return rates of Ornstein-Uhlenbeck processes whose sum has the spectrum 1/f [1]_.
+    """Return rates in 1/s of processes whose sum has the spectrum 1/f [1]_, (n_processes,).
 
-    Parameters
-    ----------
-    time_s : (n_times,)
-        Ascending times, whose whole range of frequencies the processes cover.
-
-    Returns
-    -------
-    (n_processes,)
-        In 1/s, a geometric series; all processes have the same variance.
+    A geometric series for Ornstein-Uhlenbeck processes of the same variance, which cover all
+    frequencies of ascending times.
 
     References
     ----------

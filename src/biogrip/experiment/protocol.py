@@ -167,21 +167,10 @@ def load(
 
 
 def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[Any]:
-    """Combine the torques of the two arms into the drives of `step_response`.
+    """Combine torques, or jumps, of both arms, (...), into the drives of `step_response`.
 
-    One drive, the common one, if both arms are driven alike; else that of the
-    left arm, and left minus right.
-
-    Parameters
-    ----------
-    left, right : (...)
-        Torques, or jumps of torque, of the arms.
-    symmetric
-        True if they are the same.
-
-    Returns
-    -------
-    (n_drives, ...)
+    One drive, the common one, if both arms are driven alike; else that of the left arm, and left
+    minus right: (n_drives, ...).
     """
     return left[None] if symmetric else np.stack((left, left - right))
 

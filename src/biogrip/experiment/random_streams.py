@@ -6,17 +6,10 @@ import numpy as np
 
 
 def stream(study_seed: int, case: str, seed: int, purpose: str) -> np.random.Generator:
-    """Return the generator of one purpose of one seed of one case.
+    """Return the generator of one purpose, e.g. ``"noise"``, of one seed of one case.
 
     Its seed sequence is a child of the study's seed, with a spawn key made of the names
     and numbers alone: no other case or seed, and no order of jobs, can change it.
-
-    Parameters
-    ----------
-    study_seed
-        The seed of the study.
-    case, seed, purpose
-        Case, seed and purpose, e.g. ``"endothelial_cell", 7, "noise"``.
     """
     key = (*_words(case), seed, *_words(purpose))
     return np.random.default_rng(np.random.SeedSequence(study_seed, spawn_key=key))

@@ -113,20 +113,11 @@ class SampleModel:
         )
 
     def in_order(self, parameters: Array) -> IntArray:
-        """Order in which branches relax one after the other, the fastest first.
+        """Order in which branches of samples, (n, n_parameters), relax, the fastest first.
 
         A trace is the same whichever branch is called which; so that samples and fits
-        can be compared, branches are counted by their relaxation times c/k.
-
-        Parameters
-        ----------
-        parameters : (n, n_parameters)
-            Of n samples.
-
-        Returns
-        -------
-        (n, n_parameters)
-            For every column the one that belongs there, as of `numpy.take_along_axis`.
+        can be compared, branches are counted by their relaxation times c/k. For every column it is
+        the one that belongs there, (n, n_parameters), as of `numpy.take_along_axis`.
         """
         order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
         if len(self.free_branches) > 1:

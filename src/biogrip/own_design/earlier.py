@@ -35,16 +35,8 @@ def estimate_from_recordings(
 ) -> Earlier:
     """Fit the traces of one sample jointly, adding one after another.
 
-    Parameters
-    ----------
-    traces
-        Traces in the order of the experiments. Search range, least squares and the block `design`
-        are those of the first trace's case.
-    read_as
-        Columns, offset and drift of the files, and their noise if it differs from the block's;
-        noise is assumed white.
-    study_seed
-        Seed of random starts and of posterior samples.
+    Search range, least squares and the block `design` are those of the first trace's case. Noise is
+    assumed white, and as in that block if the options do not say otherwise.
 
     Raises
     ------

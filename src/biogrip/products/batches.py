@@ -37,14 +37,7 @@ def plan_batches(seeds: int, batch_size: int, existing: Iterable[Batch] = ()) ->
 
     Seeds without a batch are cut at multiples of the batch size. Existing batches are kept
     whole, so raising the number of seeds recomputes none of them, and an interrupted run continues
-    with the batches it started with.
-
-    Parameters
-    ----------
-    seeds, batch_size
-        Number of seeds, and most seeds of a batch.
-    existing
-        Batches that have results; of two that overlap, the one that starts first is kept.
+    with the batches it started with. Of two that overlap, the one that starts first is kept.
     """
     plan: list[Batch] = []
     covered = 0

@@ -29,21 +29,7 @@ def designed_cases(study: Study) -> list[str]:
 
 
 def bounds(case: Case, experiment: Experiment, parameters: Array) -> Array:
-    """Return relative Cramér-Rao bounds of parameters in an experiment, with all of them unknown.
-
-    Parameters
-    ----------
-    case
-        Gripper, model and noise.
-    experiment
-        Protocol and sampling.
-    parameters : (n, n_parameters)
-        Parameters of n samples, SI units.
-
-    Returns
-    -------
-    (n, n_parameters)
-    """
+    """Return relative Cramér-Rao bounds of n samples, (n, n_parameters), with all unknown."""
     phases, sampling = experiment
     torque = torque_history(phases)
     times = sampling.over(torque.end_s)

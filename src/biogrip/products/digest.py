@@ -25,11 +25,8 @@ _DIGITS = 12
 def digest(settings: object) -> str:
     """Return a hash of settings that is the same on all processors.
 
-    Parameters
-    ----------
-    settings
-        Views, frozen dataclasses, mappings, sequences, arrays, text, numbers, None,
-        and functions of the package.
+    Settings are views, frozen dataclasses, mappings, sequences, arrays, text, numbers, None, and
+    functions of the package.
     """
     code: set[str] = set()
     text = json.dumps(_plain(settings, code))

@@ -27,13 +27,7 @@ _SAYING = (
 
 @cache
 def fingerprint(*modules: str) -> str:
-    """Hash of what `source_files` names: one value where a list of files would be long.
-
-    Parameters
-    ----------
-    modules
-        For example ``"biogrip.products.stages.target"``.
-    """
+    """Hash of what `source_files` names: one value where a list of files would be long."""
     digest = hashlib.sha256()
     for file in source_files(*modules):
         digest.update(hashlib.sha256(Path(file).read_bytes()).digest())
@@ -41,13 +35,7 @@ def fingerprint(*modules: str) -> str:
 
 
 def source_files(*modules: str) -> list[str]:
-    """Files of modules and of all package modules that they import, sorted.
-
-    Parameters
-    ----------
-    modules
-        For example ``"biogrip.products.stages.target"``.
-    """
+    """Files of modules, by dotted names, and of all of the package that they import, sorted."""
     visited: set[str] = set()
     waiting = list(modules)
     while waiting:

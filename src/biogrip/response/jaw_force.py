@@ -42,16 +42,8 @@ def jaw_force_response(
 ) -> StepResponse:
     """Compute the jaw force of n samples after unit torque steps, in N per N m.
 
-    Parameters
-    ----------
-    gripper, network, symmetric, inertia
-        As in `step_response`. Without inertia a parallel damper makes the force jump
-        with the torque.
-
-    Returns
-    -------
-    StepResponse
-        The force takes the place of an arm.
+    The force takes the place of an arm. Arguments are those of `step_response`; without inertia a
+    parallel damper makes the force jump with the torque.
     """
     if network.k.shape[1] > MOST_BRANCHES:
         return StepResponse(
@@ -69,16 +61,9 @@ def jaw_force_response(
 
 
 def linear_jaw_force(response: StepResponse, torque: TorqueHistory, time_s: Array) -> Array:
-    """Compute the jaw force of the linear model in N, shape (n, n_times), at any times.
+    """Compute the jaw force of the linear model in N, (n, n_times), at any times.
 
-    Parameters
-    ----------
-    response
-        From `jaw_force_response`.
-    torque
-        The protocol.
-    time_s : (n_times,)
-        At the instant of a step: what follows it.
+    The response is that of `jaw_force_response`; at the instant of a step: what follows it.
     """
     force = np.zeros((len(response.rates), len(time_s)))
     rates = response.rates[:, :, None]

@@ -23,19 +23,7 @@ _WHOLE = 1 - 1e-9
 
 
 def nuisance_basis(time_s: Array, *, offset: bool, drift: bool) -> Array:
-    """Return orthonormal functions of time that span offset and drift.
-
-    Parameters
-    ----------
-    time_s : (n_times,)
-        Sampling times.
-    offset, drift
-        True if the instrument may have it.
-
-    Returns
-    -------
-    (n_functions, n_times)
-    """
+    """Return orthonormal functions of time, (n_functions, n_times), that span offset and drift."""
     functions = [np.ones_like(time_s)] * offset + [time_s] * drift
     if not functions:
         return np.zeros((0, len(time_s)))

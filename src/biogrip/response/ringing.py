@@ -91,10 +91,7 @@ def ringing_responses(
 def compute_responses(modes: Modes, torque: TorqueHistory, time_s: Array) -> Array:
     """Compute responses of modes to a protocol, and their derivatives by the log-parameters.
 
-    Returns
-    -------
-    (n, 1 + n_parameters, n_times)
-        Real parts: d(w g) = dw g + w dr dg/dr.
+    Real parts, (n, 1 + n_parameters, n_times): d(w g) = dw g + w dr dg/dr.
     """
     n, count, m = modes.rate_slopes.shape
     drives = modes.weights.shape[1]

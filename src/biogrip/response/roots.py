@@ -38,17 +38,10 @@ _SWEEPS = 80
 
 
 def real_quadratic_roots(coefficients: Array) -> Array:
-    """Compute the roots of a + b s + c s^2 that are known to be real and negative.
+    """Compute the roots, (n, 2), of a + b s + c s^2 that are known to be real and negative.
 
-    Parameters
-    ----------
-    coefficients : (n, 3)
-        Positive, in ascending powers.
-
-    Returns
-    -------
-    (n, 2)
-        The fast root first; never closer together than `SMALLEST_GAP`.
+    Coefficients are positive, (n, 3). The fast root comes first; the two are never closer together
+    than `SMALLEST_GAP`.
 
     References
     ----------
@@ -64,15 +57,8 @@ def real_quadratic_roots(coefficients: Array) -> Array:
 def roots(coefficients: Array) -> ComplexArray:
     """Compute the roots of polynomials with positive coefficients (Ehrlich-Aberth iteration).
 
-    Parameters
-    ----------
-    coefficients : (n, degree + 1)
-        Positive, in ascending powers.
-
-    Returns
-    -------
-    (n, degree)
-        Roots, pairwise at least `SMALLEST_GAP` apart.
+    Coefficients are in ascending powers, (n, degree + 1); roots, (n, degree), are pairwise at least
+    `SMALLEST_GAP` apart.
     """
     degree = coefficients.shape[1] - 1
     radii = _newton_polygon_radii(coefficients)
@@ -98,10 +84,6 @@ def find_zeros(
     between : (n, n_points, n_points), optional
         Differences of the points' origins, if each point is counted from an origin of its own:
         they are added to differences of points.
-
-    Returns
-    -------
-    (n, n_points)
     """
     off_diagonal = ~np.eye(z.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):

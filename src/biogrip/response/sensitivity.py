@@ -104,10 +104,7 @@ def rotations_and_sensitivities(
 ) -> Array:
     """Compute what `rotation_and_sensitivity` does for many samples, (n, n_parameters).
 
-    Returns
-    -------
-    (n, 1 + n_parameters, n_times)
-        First the rotation in rad, then its derivatives.
+    First the rotation in rad, then its derivatives: (n, 1 + n_parameters, n_times).
     """
     rows = linear_responses(gripper, model, torque, time_s, parameters, inertia=inertia)
     if nonlinear:
@@ -129,12 +126,8 @@ def corrections(
 ) -> Correction:
     """Compute nonlinear minus linear rotation of samples and of slightly changed samples.
 
-    Arguments are those of `ringing_responses`.
-
-    Returns
-    -------
-    Correction
-        That of n (1 + 2 n_parameters) samples, see `differences`; without `slopes`, of n.
+    Arguments are those of `ringing_responses`. It is that of n (1 + 2 n_parameters) samples, see
+    `differences`; without `slopes`, of n.
     """
     around = _around(parameters, _STEP, slopes=slopes)
     return correction(gripper, model.network(around), torque, COARSE)
@@ -143,11 +136,8 @@ def corrections(
 def differences(values: Array, step: float = _STEP) -> Array:
     """Turn values of `corrections`, (n, 1 + 2 n_parameters, ...), into values and derivatives.
 
-    The derivatives are central differences with `step` in the log-parameters.
-
-    Returns
-    -------
-    (n, 1 + n_parameters, ...)
+    The derivatives are central differences with `step` in the log-parameters:
+    (n, 1 + n_parameters, ...).
     """
     slopes = (values[:, 1::2] - values[:, 2::2]) / (2 * step)
     return np.concatenate((values[:, :1], slopes), axis=1)

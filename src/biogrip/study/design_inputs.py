@@ -16,14 +16,9 @@ from biogrip.study.study import Case
 
 
 def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInputs:
-    """Return the inputs of an experimental design for a case.
+    """Return the inputs of an experimental design for a case that has a block `design`.
 
-    Parameters
-    ----------
-    case
-        A case that has a block `design`.
-    earlier
-        Results of earlier traces; their posterior samples then replace the plausible parameters.
+    Posterior samples of earlier traces replace the plausible parameters.
 
     Raises
     ------

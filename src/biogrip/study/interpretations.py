@@ -23,18 +23,7 @@ class InterpretationBlock(Block):
 def read_blocks(
     interpretations: Mapping[str, InterpretationBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """Yield the config block of every simulated case under every interpretation, as plain data.
-
-    Parameters
-    ----------
-    interpretations, cases
-        Blocks of a study's config.
-
-    Yields
-    ------
-    tuple
-        Name of the interpretation, name of the case, and the block.
-    """
+    """Yield each interpretation, simulated case and the case's block under it, as plain data."""
     for interpretation, block in interpretations.items():
         for name, case in cases.items():
             if not case.recorded:

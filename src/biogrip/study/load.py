@@ -33,14 +33,12 @@ def load_study(
     *,
     for_workflow: bool = True,
 ) -> Study:
-    """Check and type a merged config.
+    """Check and type a merged config; the files it came from give the line numbers in messages.
 
     Parameters
     ----------
-    config
-        The merged config.
-    files
-        The files it came from, for line numbers in messages.
+    config, files
+        The merged config, and its files.
     command_line
         Top-level keys that were set on the command line.
     for_workflow

@@ -34,14 +34,7 @@ _LONGEST = 40
 
 
 def checked(kind: Callable[..., T], block: Any) -> tuple[T | None, list[Problem]]:
-    """Build a config block, or find what is not allowed in it.
-
-    Parameters
-    ----------
-    kind
-        Class of the block.
-    block
-        Plain keys and values from a config file.
+    """Build a config block from plain keys and values, or find what is not allowed in it.
 
     Returns
     -------

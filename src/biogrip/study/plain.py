@@ -18,16 +18,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def built(kind: Callable[..., T], block: Any, *, check: bool = False) -> T:
-    """Return the object that a plain block describes.
-
-    Parameters
-    ----------
-    kind
-        Class of the block.
-    block
-        Plain keys and values.
-    check
-        If true, find conflicts between keys, too.
+    """Return the object that a plain block describes; if asked, find conflicts between keys, too.
 
     Raises
     ------

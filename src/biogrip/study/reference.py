@@ -33,13 +33,7 @@ def documented() -> dict[str, Any]:
 
 
 def reference(config: Path) -> str:
-    """Return Markdown tables of all keys: meaning, unit, default, allowed values.
-
-    Parameters
-    ----------
-    config
-        YAML file of the default study.
-    """
+    """Return Markdown tables of all keys: meaning, unit, default in a file, allowed values."""
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
     general: list[_Row] = []
     sections: list[str] = []

@@ -41,14 +41,9 @@ class ConfigFiles:
 
 
 def read_places(files: Sequence[str | Path], command_line: Iterable[Hashable] = ()) -> ConfigFiles:
-    """Read the line numbers of all keys.
+    """Read the line numbers of all keys in YAML files, the later merged over the earlier.
 
-    Parameters
-    ----------
-    files
-        YAML files, the later merged over the earlier.
-    command_line
-        Top-level keys set on the command line, which override all files.
+    Top-level keys set on the command line override all files.
 
     Raises
     ------

@@ -25,18 +25,7 @@ _LONGEST_NAME = 200
 def sweep_problems(
     blocks: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[Problem]:
-    """Find sweeps that conflict with the cases or have too many points.
-
-    Parameters
-    ----------
-    blocks, cases
-        Sweeps and cases of a study.
-
-    Yields
-    ------
-    tuple
-        Path of the key, and a message: what was found and what is allowed.
-    """
+    """Find sweeps that conflict with the cases or have too many points."""
     problems = [
         (("sweeps", name, *path), text)
         for name, block in blocks.items()
@@ -55,14 +44,9 @@ def sweep_problems(
 
 
 def placed(by_name: Mapping[str, tuple[Sweep, Point]], problem: Problem) -> Problem:
-    """Return a problem of a point's case as a problem of the sweep value that causes it.
+    """Return a problem of a point's case, ``cases`` and its name leading the path, as the sweep's.
 
-    Parameters
-    ----------
-    by_name
-        Problem whose path starts with ``cases`` and the name of a point.
-    problem
-        Its path starts with ``cases`` and the name of a point.
+    It is one of the value that causes it.
     """
     (_, name, *rest), text = problem
     key = ".".join(map(str, rest))

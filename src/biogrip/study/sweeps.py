@@ -172,15 +172,7 @@ def list_points(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
 def point_blocks(
     sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
 ) -> dict[str, dict[str, Any]]:
-    """Return the config block of every point's case by name, as plain data.
-
-    Parameters
-    ----------
-    sweeps
-        Checked sweeps, see `biogrip.study.sweep_checks.sweep_problems`.
-    cases
-        Cases of the study.
-    """
+    """Return the config block of every point's case by name, as plain data, for checked sweeps."""
     found = {}
     blocks = {name: plain(case) for name, case in cases.items()} if sweeps else {}
     for _, point in list_points(sweeps):

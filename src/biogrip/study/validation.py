@@ -30,12 +30,7 @@ def checked_study(
 ) -> StudyConfig:
     """Validate a complete config and build its blocks; cases must have all blocks.
 
-    Parameters
-    ----------
-    config, files
-        The merged config, and the line numbers of its keys.
-    for_workflow
-        If true, refuse paths of traces that Snakemake would read as wildcards.
+    For a workflow, paths of traces are refused that Snakemake would read as wildcards.
 
     Raises
     ------

@@ -50,12 +50,7 @@ def shown_path(file: Path) -> str:
 
 
 def compose(file: Path) -> yaml.Node | None:
-    """Parse the document in a file to a tree of nodes, with aliases not expanded.
-
-    Returns
-    -------
-    yaml.Node or None
-        Root of the tree; None if the file is empty.
+    """Parse the document in a file to a tree of nodes, with aliases not expanded; None if empty.
 
     Raises
     ------

@@ -52,14 +52,12 @@ def draw_corner(
     truth: Mapping[str, float],
     title: str,
 ) -> Figure:
-    """Draw posterior samples as a corner plot.
+    """Draw posterior samples, (n, n_parameters) in SI units, as a corner plot.
 
     Parameters
     ----------
-    parameters
-        Parameters that were sampled.
-    values : (n, n_parameters)
-        Samples, SI units.
+    parameters, values
+        Parameters that were sampled, and the samples.
     posterior
         Summary of the posterior, see `posterior_data`.
     truth

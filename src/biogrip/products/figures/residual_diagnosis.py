@@ -13,13 +13,7 @@ _TWO_SIDED = 1.96
 
 
 def draw_residuals(fit: Fit) -> Figure:
-    """Draw standardised residuals over time, their autocorrelation and their quantiles.
-
-    Parameters
-    ----------
-    fit
-        A trace and its fit.
-    """
+    """Draw standardised residuals over time, their autocorrelation and their quantiles."""
     residual = fit.measured_rad - fit.fitted_rad
     scaled = residual / np.std(residual)
     drawn = figure(PAGE_IN, 2.4)

@@ -49,19 +49,7 @@ class TypicalFit(Fit):
 def typical_fit(
     problem: CaseProblem, method: str, identifications: Path, measurements: list[Path]
 ) -> TypicalFit:
-    """Return the trace of the typical seed and its fit.
-
-    Parameters
-    ----------
-    problem
-        Assumptions of the identification.
-    method
-        Method that identified it.
-    identifications
-        Identifications of the case, CSV.
-    measurements
-        Its noisy traces, Parquet, named after their batch of seeds.
-    """
+    """Return the trace of the typical seed and its fit, from files of a case."""
     found = read_identifications(identifications, method)
     shown = typical(found)
     seed = int(shown["seed"])
@@ -74,19 +62,7 @@ def typical_fit(
 def fit_of(
     problem: CaseProblem, parameters: Mapping[str, float], recorded: Measurements, seed: int
 ) -> Fit:
-    """Return a trace, and the response of given parameters with nuisance terms fitted.
-
-    Parameters
-    ----------
-    problem
-        Assumptions of the identification.
-    parameters
-        Values by name, SI units.
-    recorded
-        Noisy traces.
-    seed
-        Seed of the trace.
-    """
+    """Return the trace of a seed, and the response of parameters with nuisance terms fitted."""
     network = problem.model.sample(parameters)
     simulated = simulated_rotation(
         problem.gripper, network, problem.torque, recorded.time_s, nonlinear=problem.nonlinear
@@ -117,18 +93,7 @@ def typical_in_words(found: pd.DataFrame) -> str:
 def read_history(
     path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
 ) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of one more.
-
-    Parameters
-    ----------
-    path
-        Histories of a case, Parquet.
-    method
-        Method of identification.
-    shown
-        The additional seed.
-    values
-        Columns to read beside seed and generation.
+    """Read one method's histories of the seeds drawn individually and of the one shown, Parquet.
 
     Raises
     ------

@@ -9,18 +9,7 @@ from biogrip.errors import BiogripError
 
 
 def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object, checking for required keys.
-
-    Parameters
-    ----------
-    path
-        The file.
-    kind
-        Content of the file, for messages.
-    keys
-        Required keys.
-    lacking
-        Message if one is missing.
+    """Read a JSON object of some kind, with a message if one of the required keys is lacking.
 
     Raises
     ------

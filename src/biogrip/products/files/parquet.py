@@ -30,16 +30,9 @@ def table_of(columns: Mapping[str, NDArray[Any] | str], rows: int) -> Table:
 
 
 def write_tables(path: Path, tables: Sequence[Table], *, dictionary: bool = True) -> None:
-    """Write tables with equal columns to one file, one after another.
+    """Write tables of `table_of` with equal columns to one file, one after another.
 
-    Parameters
-    ----------
-    path
-        The file.
-    tables
-        Tables made by `table_of`.
-    dictionary
-        If true, use dictionary encoding, which pays for repeated values, not for noise.
+    Dictionary encoding pays for repeated values, not for noise.
     """
     with atomic_write(path) as scratch:
         pq.write_table(pa.concat_tables(tables), scratch, use_dictionary=dictionary)

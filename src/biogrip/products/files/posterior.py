@@ -86,16 +86,7 @@ def read_posterior(path: Path) -> dict[str, Any]:
 
 
 def thinned(log_parameters: Array) -> Array:
-    """Return some thousand samples, evenly spaced over the steps of all walkers.
-
-    Parameters
-    ----------
-    log_parameters : (n_steps, n_walkers, n_parameters)
-
-    Returns
-    -------
-    (n, n_parameters)
-    """
+    """Return some thousand samples, (n, n_parameters), evenly spaced over all walkers' steps."""
     steps, walkers, size = log_parameters.shape
     every = -(-steps * walkers // _MOST_ROWS)
     return log_parameters[::every].reshape(-1, size)

@@ -32,13 +32,7 @@ def judged_in_full(seed: int) -> bool:
 
 
 def refitted(likelihood: Likelihood, missed: np.ndarray, confidence: float) -> Likelihood | None:
-    """Fit again, started at parameters whose chi^2 is below that of the optimum.
-
-    Returns
-    -------
-    Likelihood or None
-        Likelihood at the new optimum; None if chi^2 did not fall.
-    """
+    """Fit again, started at parameters of a chi^2 below the optimum's; None if it did not fall."""
     fit = fit_from([likelihood.problem], missed)
     misfit_rad = float(fit.misfit_rad[0])
     if likelihood.increase(misfit_rad) > -MISSED:

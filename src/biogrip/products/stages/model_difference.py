@@ -46,18 +46,10 @@ def _rows(study: Study) -> Iterator[tuple[str, ...]]:
 def difference_over_peak(
     gripper: Gripper, network: Network, torque: TorqueHistory, factors: Array
 ) -> Array:
-    """Return the largest difference of the models as a share of the nonlinear peak rotation.
+    """Return the largest difference of the models as a share of the nonlinear peak rotation, (n,).
 
-    Parameters
-    ----------
-    gripper, network, torque
-        The arms, n samples, the protocol.
-    factors : (n,)
-        Factors of the torque, one per sample.
-
-    Returns
-    -------
-    (n,), NaN where the torque closes the arms beyond the model's validity.
+    Factors of the torque are one per sample, (n,). NaN where the torque closes the arms beyond the
+    model's validity.
     """
     time_s = _times(torque)
     found = correction(gripper, network, torque, FINE, factors)

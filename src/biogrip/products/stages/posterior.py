@@ -76,10 +76,8 @@ def posterior_of_trace(
 
     Parameters
     ----------
-    case
-        The case.
-    case_problem
-        Assumptions of the identification, with a calibrated gripper if the case uses one.
+    case, case_problem
+        The case, and its assumptions with a calibrated gripper if it uses one.
     pose
         Function that returns the trace's fit problem for a sample model.
     limits
