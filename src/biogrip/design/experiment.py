@@ -59,10 +59,7 @@ class DesignInputs:
     def bounds(self, information: Array) -> Array:
         """Return `relative_bounds` without the prior on parameters that are out of reach.
 
-        Parameters
-        ----------
-        information : (n, n_parameters, n_parameters)
-            Fisher information, including `before`.
+        The information includes `before`.
         """
         found = relative_bounds(information)
         apart = list(self.out_of_reach)
@@ -106,18 +103,10 @@ def compute_information(sensitivity: Array) -> Array:
 
 
 def relative_bounds(information: Array) -> Array:
-    """Compute the Cramer-Rao bounds of log-parameters, none of them fixed.
+    """Compute the Cramer-Rao bounds of log-parameters, (n, n_parameters), none of them fixed.
 
-    Parameters
-    ----------
-    information : (n, n_parameters, n_parameters)
-        Fisher information.
-
-    Returns
-    -------
-    (n, n_parameters)
-        Standard deviations; infinite where the information on a parameter, or on a combination
-        with it, is lost in rounding.
+    Standard deviations; infinite where the information on a parameter, or on a combination with it,
+    is lost in rounding.
     """
     length = np.sqrt(np.diagonal(information, axis1=1, axis2=2))
     bounds = np.full(length.shape, np.inf)

@@ -15,16 +15,9 @@ def ramps(shares: Array, limits: Limits) -> Waveform:
 
     A cycle rises to its high level, stays, falls to its low level, and stays. The torque never
     jumps: no ramp is shorter than the shortest stretch, which is also the duration of the last
-    ramp, to the hold.
-
-    Parameters
-    ----------
-    shares : (SHARES,)
-        As in `steps`, the duty shared between rise with high level and fall with low one; then
-        the share of the rise in the first of these, and of the fall in the second (nearly one:
-        all of it, a triangle).
-    limits
-        Limits of the torque's stretches.
+    ramp, to the hold. The numbers are as in `steps`, the duty shared between rise with high level
+    and fall with low one; then the share of the rise in the first of these, and of the fall in the
+    second (nearly one: all of it, a triangle).
     """
     rise, fall = (min(1.0, share / 0.9) for share in shares[9:])
     unit = limits.shortest_s

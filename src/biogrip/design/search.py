@@ -42,15 +42,7 @@ class Torque:
 
 
 class TorqueSearch:
-    """Objective of the search: torques of a family, rated with their best sampling.
-
-    Parameters
-    ----------
-    inputs
-        Design problem.
-    shape
-        Family of torques.
-    """
+    """Objective of the search: torques of a family, rated with their best sampling."""
 
     def __init__(self, inputs: DesignInputs, shape: Shape) -> None:
         self._inputs, self._shape = inputs, shape
@@ -106,16 +98,8 @@ def best_torques(
 ) -> list[Torque]:
     """Search for the torques with the lowest typical relative bounds; the best comes first.
 
-    Parameters
-    ----------
-    inputs
-        Design problem.
-    tried
-        Approximate number of torques to try, as many of each shape.
-    rng
-        The only source of randomness.
-    progress
-        Called with the number tried, and the lowest typical relative bound.
+    About as many are tried as asked for, equally many of each shape. The callback gets the number
+    tried, and the lowest typical relative bound.
 
     Raises
     ------

@@ -19,18 +19,11 @@ def sinusoids(shares: Array, limits: Limits) -> Waveform:
     """Convert numbers between 0 and 1 to sinusoids on held torques, and a hold until the end.
 
     Periods grow or shrink by the same factor from one sinusoid to the next, as in a chirp; held
-    torques and amplitudes change linearly. A torque stays between zero and the largest.
-
-    Parameters
-    ----------
-    shares : (SHARES,)
-        Number of sinusoids, logarithmically; length of the train, likewise; period of the first
-        and the last one, likewise, from eight readings at the fastest to the train's length; how
-        their durations grow with their periods, from not at all to as much; held torque of the
-        first and the last one; amplitudes there, as shares of the largest possible; torque of the
-        hold.
-    limits
-        Limits of the torque's stretches.
+    torques and amplitudes change linearly. A torque stays between zero and the largest. The numbers
+    are that of sinusoids, logarithmically; length of the train, likewise; period of the first and
+    the last one, likewise, from eight readings at the fastest to the train's length; how their
+    durations grow with their periods, from not at all to as much; held torque of the first and the
+    last one; amplitudes there, as shares of the largest possible; torque of the hold.
     """
     length, period_0, period_1, growing, mean_0, mean_1, swing_0, swing_1, last = shares[1:]
     unit, slot = limits.shortest_s, limits.slot_s

@@ -15,18 +15,11 @@ SHARES = 9
 def steps(shares: Array, limits: Limits) -> Waveform:
     """Convert numbers between 0 and 1 to a train of cycles, and a hold until the end.
 
-    A cycle is a high level and a low one. Both change linearly over the train, cycles become
-    longer or shorter by the same factor.
-
-    Parameters
-    ----------
-    shares : (SHARES,)
-        Number of cycles, logarithmically; length of the train, likewise; factor from the first
-        cycle to the last, likewise; share of the high level in a cycle (nearly one: all of it);
-        high level at the beginning and the end; low level there, as a share of the high one;
-        torque of the hold.
-    limits
-        Limits of the torque's stretches.
+    A cycle is a high level and a low one. Both change linearly over the train, cycles become longer
+    or shorter by the same factor. The numbers are that of cycles, logarithmically; length of the
+    train, likewise; factor from the first cycle to the last, likewise; share of the high level in a
+    cycle (nearly one: all of it); high level at the beginning and the end; low level there, as a
+    share of the high one; torque of the hold.
     """
     count = how_many(shares[0], (limits.most_steps - 1) // 2)
     whole = limits.longest_s - limits.shortest_s
@@ -45,20 +38,8 @@ def cycles(
 ) -> tuple[Array, Array, Array]:
     """Divide a train into cycles, each with one part at its high and one at its low level.
 
-    Parameters
-    ----------
-    shares : (7,)
-        As in `steps`, from the length to the low level.
-    count
-        Number of cycles.
-    shortest_s, longest_s
-        Shortest and longest duration of the train.
-
-    Returns
-    -------
-    durations_s : (n_cycles, 2)
-    high, low : (n_cycles,)
-        Levels.
+    The shares, (7,), are those of `steps`, from the length to the low level. Returns durations,
+    (n_cycles, 2), and high and low levels, (n_cycles,) each.
     """
     length, stretch, duty, high_0, high_1, low_0, low_1 = shares
     along = np.linspace(0.0, 1.0, count) if count > 1 else np.zeros(1)

@@ -56,16 +56,7 @@ def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins
 def periodic_time_bins(slots: int, period: int, parts: int, growth: float) -> TimeBins:
     """Divide the slots of a sinusoidal torque into cells that repeat in successive periods.
 
-    Parameters
-    ----------
-    slots
-        Number of slots.
-    period
-        Number of slots in a period.
-    parts
-        Number of cells in a period.
-    growth
-        Factor by which the number of periods grows over which cells repeat.
+    Each period has some parts; the number of periods over which cells repeat grows by a factor.
     """
     part = max(1, period // parts)
     begun = time_bins(min(slots, period), growth, part)

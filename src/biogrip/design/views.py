@@ -96,15 +96,7 @@ class Views:
 
 
 class Moving:
-    """Responses of samples to a torque.
-
-    Parameters
-    ----------
-    views
-        Modes of the samples.
-    waveform
-        The torque in N m.
-    """
+    """Responses of samples to a torque in N m."""
 
     def __init__(self, views: Views, waveform: Waveform) -> None:
         self._views, self._waveform = views, waveform
@@ -157,14 +149,9 @@ class Moving:
         """Jaw force at the end of each step, (n, n_steps)."""
 
     def respond(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
-        """Compute the responses after some steps.
+        """Compute the responses after steps of some indices, at times since each.
 
-        Parameters
-        ----------
-        steps : (n_seen,)
-            Indices of the steps.
-        elapsed_s : (n_times,)
-            Times since each; by default those of all views.
+        By default the times are those of all views.
         """
         views = self._views
         functions = views.functions

@@ -26,17 +26,8 @@ def plan_within_reach(
 ) -> tuple[DesignInputs, Plan]:
     """Design an experiment, removing parameters from the criterion that no torque determines.
 
-    Parameters
-    ----------
-    inputs, tried, rng, progress
-        As in `best_torques`.
-
-    Returns
-    -------
-    inputs
-        Design problem with the remaining parameters.
-    plan
-        Experiment in which all parameters asked for have a bound.
+    Arguments are those of `best_torques`. Returns the design problem with the remaining parameters,
+    and the experiment, in which all parameters asked for have a bound.
 
     Raises
     ------

@@ -58,16 +58,8 @@ def draw_ornstein_uhlenbeck(
 ) -> Array:
     """Draw a sum of independent Ornstein-Uhlenbeck processes, exactly, at any times, (n_times,).
 
-    From reading to reading, each is an AR(1) process [1]_.
-
-    Parameters
-    ----------
-    time_s : (n_times,)
-        Ascending times.
-    weights, rates_per_s : (n_processes,)
-        Variance of each, and the inverse of its relaxation time.
-    rng
-        Random generator.
+    From reading to reading, each is an AR(1) process [1]_. Weights are the variance of each, rates
+    the inverse of its relaxation time, (n_processes,).
 
     References
     ----------

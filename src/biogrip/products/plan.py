@@ -31,12 +31,8 @@ class Plan:
     def batches(self, stage: str, case: str, method: str = "") -> list[Batch]:
         """Return the batches of a case's seeds in a stage, keeping those that have results.
 
-        Parameters
-        ----------
-        stage
-            Folder of the results: ``identifications``, ``coverage`` or ``selection``.
-        case, method
-            Name of the case; for identifications also the method.
+        The stage is the folder of the results, ``identifications`` (of a method), ``coverage`` or
+        ``selection``.
         """
         folder = (stage, case, method) if method else (stage, case)
         # Cached: existing files are listed once per plan.

@@ -10,13 +10,7 @@ from biogrip.study.study import Case, Study
 
 
 class Used:
-    """Read-only view of a study or a case, with the attributes that a product declares.
-
-    Parameters
-    ----------
-    values
-        Values of the attributes by name.
-    """
+    """Read-only view of a study or a case, with the attributes that a product declares."""
 
     def __init__(self, values: Mapping[str, object]) -> None:
         vars(self).update(values)

@@ -38,12 +38,8 @@ _DECAYED = 40.0
 class DecayTable:
     """Sums of decaying exponentials at any rate from 0 to -infinity.
 
-    Parameters
-    ----------
-    function
-        Of rates of shape (n,), returns the sums, shape (n_sums, n).
-    longest, shortest
-        Largest t_i, and smallest t_i above zero.
+    They are given by a function of rates, (n,), to (n_sums, n), with the largest t_i and the
+    smallest above zero.
     """
 
     def __init__(self, function: Callable[[Array], Array], longest: float, shortest: float) -> None:

@@ -56,15 +56,7 @@ def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Arra
 
 
 def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> float:
-    """Compute the norm of the change of a trace by inertia, relative to the rotation's RMS.
-
-    Parameters
-    ----------
-    gripper, torque
-        Arms and protocol.
-    time_s : (n_samples,)
-        Ascending sampling times.
-    """
+    """Compute the norm of the change of a trace by inertia, relative to the rotation's RMS."""
     ringing = time_s[while_ringing(gripper, torque, time_s)]
     if not len(ringing):
         return 0.0

@@ -61,12 +61,7 @@ class Impedance:
 class Arms:
     """Impedance of both arms as seen from the sample between them.
 
-    Parameters
-    ----------
-    gripper
-        Its arms may differ.
-    alike
-        True if they are equal, and driven alike.
+    The arms may differ; they are alike if they are equal, and driven alike.
     """
 
     def __init__(self, gripper: Gripper, *, alike: bool) -> None:
@@ -161,16 +156,8 @@ def modes_of_many(
 ) -> tuple[Array, NDArray[Any], NDArray[Any]]:
     """Compute step responses of both arms, or of the jaw force: constants, rates and weights.
 
-    Parameters
-    ----------
-    gripper, network
-        Arms, and n samples of more than `MOST_BRANCHES` branches.
-    symmetric
-        True if both arms are driven alike; determines the drives.
-    inertia
-        True to include the inertia of the arms.
-    force
-        True to compute the jaw force, in N, instead of the arms' rotations.
+    Arguments are those of `step_response`, with n samples of more than `MOST_BRANCHES` branches;
+    with `force`, the jaw force in N takes the place of the arms' rotations.
 
     Returns
     -------

@@ -27,16 +27,8 @@ _ASIDE = 1 + 1e-3j
 class Ringing:
     """Modes of arms with inertia on n samples with any number of branches.
 
-    Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero.
-
-    Parameters
-    ----------
-    gripper, network
-        Arms and samples.
-    zeros
-        Rates without inertia.
-    alike
-        True if both arms are equal, and driven alike.
+    Points are at -origin + beyond, (n, n_points): the origin is the rate of a branch, or zero. The
+    zeros are the rates without inertia; arms are alike if they are equal, and driven alike.
     """
 
     def __init__(self, gripper: Gripper, network: Network, zeros: Zeros, *, alike: bool) -> None:

@@ -120,12 +120,8 @@ class SeriesMisfit:
     def of_each(self, parameters: Array, traces: IntArray) -> Array:
         """Compute the misfits in rad of populations, each to one trace, (n_populations, n).
 
-        Parameters
-        ----------
-        parameters : (n_populations, n, n_parameters)
-            Sample parameters in the model's order, SI units.
-        traces : (n_populations,)
-            Indices of the traces.
+        Populations are (n_populations, n, n_parameters), in the model's order and SI units; traces
+        are given by their indices, (n_populations,).
         """
         populations, size = parameters.shape[:2]
         some = max(1, _AT_ONCE // size)

@@ -83,16 +83,7 @@ def compute_polynomials(
 ) -> Polynomials:
     """Compute the transfer functions of samples, and their derivatives.
 
-    Parameters
-    ----------
-    gripper
-        Its arms may differ.
-    network, count
-        From `complex_step_network`; a count of zero gives no derivatives.
-    symmetric
-        True if both arms are driven alike; determines the drives.
-    inertia
-        True to include the inertia of the arms.
+    Network and count are those of `complex_step_network`; a count of zero gives no derivatives.
     """
     numerators, denominator = transfer_functions(
         gripper, network, symmetric=symmetric, inertia=inertia
@@ -129,18 +120,9 @@ def modes_at(polynomials: Polynomials, rates: NDArray[Any]) -> Modes:
 def compute_modes(
     gripper: Gripper, model: SampleModel, parameters: Array, *, symmetric: bool, slopes: bool = True
 ) -> Modes:
-    """Compute the modes of samples without inertia, all of them real.
+    """Compute the modes of samples, (n, n_parameters), without inertia, all of them real.
 
-    Parameters
-    ----------
-    gripper, model
-        Arms and sample model of the simulation.
-    parameters : (n, n_parameters)
-        All positive.
-    symmetric
-        True if both arms are driven alike; determines the drives.
-    slopes
-        True to compute derivatives; otherwise n_parameters is zero.
+    All parameters are positive. Without `slopes` there are no derivatives: n_parameters is zero.
     """
     network, count = complex_step_network(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:

@@ -13,16 +13,7 @@ from biogrip.response.roots import real_quadratic_roots
 
 
 def two_modes(arm: Arm, lever_m: float, network: Network) -> tuple[Array, Array, Array]:
-    """Compute the response of an arm to a unit step of both torques.
-
-    Parameters
-    ----------
-    arm
-        Either of the equal arms.
-    lever_m
-        Lever of both arms.
-    network
-        n samples with one branch each.
+    """Compute the response of either of two equal arms to a unit step of both torques.
 
     Returns
     -------

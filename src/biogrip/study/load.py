@@ -35,14 +35,8 @@ def load_study(
 ) -> Study:
     """Check and type a merged config; the files it came from give the line numbers in messages.
 
-    Parameters
-    ----------
-    config, files
-        The merged config, and its files.
-    command_line
-        Top-level keys that were set on the command line.
-    for_workflow
-        If true, refuse paths of traces that Snakemake would read as wildcards.
+    Some top-level keys may be of the command line. For a workflow, paths of traces are refused that
+    Snakemake would read as wildcards.
 
     Raises
     ------

@@ -21,15 +21,7 @@ _MOST_COUNTED = 2**53
 
 
 class Schema:
-    """Values that a config key may have.
-
-    Parameters
-    ----------
-    node
-        Part of a JSON Schema.
-    defs
-        Definitions that it refers to.
-    """
+    """Values that a config key may have: a part of a JSON Schema, with what it refers to."""
 
     def __init__(self, node: Mapping[str, Any], defs: Mapping[str, Any]) -> None:
         said = dict(node)

@@ -54,16 +54,7 @@ def draw_corner(
 ) -> Figure:
     """Draw posterior samples, (n, n_parameters) in SI units, as a corner plot.
 
-    Parameters
-    ----------
-    parameters, values
-        Parameters that were sampled, and the samples.
-    posterior
-        Summary of the posterior, see `posterior_data`.
-    truth
-        True values by name, as far as known.
-    title
-        Title of the legend; may be empty.
+    The posterior is a summary of `posterior_data`; true values count as far as they are known.
     """
     count = len(parameters)
     width = COLUMN_IN if count <= _MOST_IN_COLUMN else PAGE_IN

@@ -91,18 +91,10 @@ def as_it_was(cell: Any) -> Any:
 def read_frame(
     path: Path, what: str, columns: Sequence[str], words: Sequence[str] = ()
 ) -> "pd.DataFrame":
-    """Read rows that have at least the given columns.
+    """Read rows of a CSV file that have at least the given columns.
 
-    Parameters
-    ----------
-    path
-        The CSV file.
-    what
-        Content of the file, for messages.
-    columns
-        Required columns.
-    words
-        Columns to read as text even if they look like numbers.
+    Columns of words are read as text even if they look like numbers; `what` says in messages what
+    the file holds.
 
     Raises
     ------

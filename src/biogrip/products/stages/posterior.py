@@ -74,23 +74,9 @@ def posterior_of_trace(
 ) -> tuple[dict[str, Any], Array]:
     """Sample the posterior of a trace, and compute the evidence of other models.
 
-    Parameters
-    ----------
-    case, case_problem
-        The case, and its assumptions with a calibrated gripper if it uses one.
-    pose
-        Function that returns the trace's fit problem for a sample model.
-    limits
-        Limits of its profile likelihoods.
-    progress
-        Callback for progress.
-
-    Returns
-    -------
-    data
-        Summary of the posterior.
-    log_parameters : (n, n_parameters)
-        Some thousand samples.
+    A function returns the trace's fit problem for a sample model; the limits are those of its
+    profile likelihoods. Returns the summary of the posterior, and some thousand samples of the
+    log-parameters, (n, n_parameters).
     """
     from biogrip.identifiability.marginals import compute_marginals
     from biogrip.identifiability.quantities import parameters_and_sum
