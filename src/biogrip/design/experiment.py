@@ -56,6 +56,11 @@ class DesignInputs:
     out_of_reach: tuple[int, ...] = ()
     """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
 
+    def sensitivities(self, torque: TorqueHistory, time_s: Array) -> Array:
+        """Compute sensitivities with inertia over the noise, (n, n_parameters, n_times)."""
+        rows = ringing_responses(self.gripper, self.model, torque, time_s, self.parameters)
+        return rows[:, 1:] / self.noise_rad
+
     def bounds(self, information: Array) -> Array:
         """Return `relative_bounds` without the prior on parameters that are out of reach.
 
@@ -66,35 +71,6 @@ class DesignInputs:
         sensitivity = found[:, apart] ** -2 - NO_BOUND**-2
         found[:, apart] = np.maximum(sensitivity, _NOTHING) ** -0.5
         return found
-
-
-def compute_sensitivities(
-    gripper: Gripper,
-    model: SampleModel,
-    torque: TorqueHistory,
-    time_s: Array,
-    parameters: Array,
-    noise_rad: float,
-) -> Array:
-    """Compute sensitivities to the log-parameters, with inertia, in units of the noise.
-
-    Parameters
-    ----------
-    gripper, model, torque
-        Arms, sample model and protocol of the simulation.
-    time_s : (n_times,)
-        Ascending sampling times.
-    parameters : (n, n_parameters)
-        Parameters of the samples.
-    noise_rad
-        Standard deviation of the noise.
-
-    Returns
-    -------
-    (n, n_parameters, n_times)
-    """
-    rows = ringing_responses(gripper, model, torque, time_s, parameters)
-    return rows[:, 1:] / noise_rad
 
 
 def compute_information(sensitivity: Array) -> Array:

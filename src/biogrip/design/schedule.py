@@ -7,7 +7,7 @@ import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.design.bursts import make_bursts, whole
-from biogrip.design.experiment import DesignInputs, compute_information, compute_sensitivities
+from biogrip.design.experiment import DesignInputs, compute_information
 from biogrip.design.few_bins import in_few_bins
 from biogrip.design.sampling import best_sampling
 from biogrip.design.search import Torque
@@ -108,7 +108,7 @@ def sampling_problem(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Samplin
     order = np.argsort(middle, kind="stable")
     sensitivity = np.empty((*inputs.parameters.shape, len(middle)))
     times_s = middle[order] / inputs.fastest_Hz
-    sensitivity[..., order] = _compute_sensitivities(inputs, torque_history(phases), times_s)
+    sensitivity[..., order] = inputs.sensitivities(torque_history(phases), times_s)
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
     return SamplingProblem(each, starts, sensitivity, capacity)
 
@@ -137,7 +137,7 @@ def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
     counts = whole(few, capacity)
     bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
     history = torque_history(phases)
-    rows = _compute_sensitivities(inputs, history, Sampling(bursts=bursts).over(history.end_s))
+    rows = inputs.sensitivities(history, Sampling(bursts=bursts).over(history.end_s))
     information = compute_information(rows) + inputs.before
     return Plan(phases, bursts, information, best.gap)
 
@@ -174,9 +174,3 @@ def _swings(period_s: float, duration_s: float) -> Array:
 def _late(each: Sequence[TimeBins]) -> Array:
     """Return the relative positions of cells within their steps, from 0 to 1."""
     return np.concatenate([np.arange(len(own.first)) / len(own.first) for own in each])
-
-
-def _compute_sensitivities(inputs: DesignInputs, history: TorqueHistory, time_s: Array) -> Array:
-    return compute_sensitivities(
-        inputs.gripper, inputs.model, history, time_s, inputs.parameters, inputs.noise_rad
-    )

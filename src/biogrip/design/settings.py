@@ -7,7 +7,6 @@ from typing import Annotated
 from pydantic import Field
 
 from biogrip.design.criteria import CRITERIA, OVER
-from biogrip.design.sequence_settings import SequenceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.keys import Block, Distinct, OneOf, Problem
 
@@ -17,6 +16,16 @@ _SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
 _Ends = Annotated[
     tuple[Annotated[float, Field(gt=0, le=1e12)], ...], Field(min_length=2, max_length=2)
 ]
+
+
+@dataclass(frozen=True)
+class SequenceSettings(Block):
+    """Simulated sequences of experiments on cells, which count those needed, see docs/design.md."""
+
+    cells: Annotated[int, Field(ge=2, le=10_000)]
+    """Cells, drawn uniformly in the logarithms within `design.ranges`."""
+    experiments: Annotated[int, Field(ge=2, le=20)]
+    """Experiments with each, by every strategy."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,12 +8,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.design.earlier_traces import Earlier
-from biogrip.design.experiment import (
-    NO_BOUND,
-    DesignInputs,
-    compute_information,
-    compute_sensitivities,
-)
+from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
 from biogrip.design.schedule import Plan, forces
 from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.protocol import Phase, torque_history
@@ -75,14 +70,7 @@ def designed(
         make_design_inputs(case, earlier), block.candidates, rng, progress
     )
     history = torque_history(case.phases)
-    sensitivity = compute_sensitivities(
-        inputs.gripper,
-        inputs.model,
-        history,
-        case.sampling.over(history.end_s),
-        inputs.parameters,
-        inputs.noise_rad,
-    )
+    sensitivity = inputs.sensitivities(history, case.sampling.over(history.end_s))
     before = inputs.bounds(compute_information(sensitivity) + inputs.before)
     network = inputs.model.network(inputs.parameters)
     time_s, force_N = forces(inputs.gripper, network, plan.phases)

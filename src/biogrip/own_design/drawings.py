@@ -33,8 +33,7 @@ def draw_experiment(found: Designed) -> Figure:
     for row, force in enumerate(found.force_N):
         lower.plot(found.force_time_s, 1e6 * force, lw=0.6, color=_COLOURS[row % len(_COLOURS)])
     lower.axhline(0, color=BLACK, lw=0.6)
-    lower.set_ylabel("jaw force (µN)")
-    lower.set_xlabel("time (s)")
+    lower.set(ylabel="jaw force (µN)", xlabel="time (s)")
     drawn.align_ylabels()
     return drawn
 
@@ -75,8 +74,7 @@ def draw_sensitivities(found: Designed) -> Figure:
         period_s = _period_s(phase)
         if period_s is None:
             shown = after = np.geomspace(0.3 / inputs.fastest_Hz, phase.duration_s, _AFTER)
-            axes.set_xscale("log")
-            axes.set_xlabel("time since the step (s)")
+            axes.set(xscale="log", xlabel="time since the step (s)")
         else:
             shown = np.linspace(0.0, 1.0, _AFTER)
             after = (shown + phase.duration_s // period_s - 1) * period_s

@@ -51,10 +51,7 @@ def draw(study: Study) -> Figure:
             ha="right" if v > 0.5 * grid[-1] else "left",
             fontsize=7,
         )
-    curve.set_xlim(0, grid[-1])
-    curve.set_ylim(0)
-    curve.set_xlabel("voltage (V)")
-    curve.set_ylabel("torque (nN m)")
+    curve.set(xlim=(0, grid[-1]), ylim=0, xlabel="voltage (V)", ylabel="torque (nN m)")
     panel(curve, "c", "torque, eq. (9)")
     return drawn
 

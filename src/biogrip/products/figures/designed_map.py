@@ -62,8 +62,7 @@ def _map(axes: Axes, percent: Array) -> QuadMesh:
     )
     if shown.min() < 100 * WELL < shown.max():
         axes.contour(_STIFFNESSES, _DAMPINGS, shown, [100 * WELL], colors="black", linewidths=1.2)
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     return mesh
 
 

@@ -75,8 +75,7 @@ def _difference(axes: Axes, case: Case) -> None:
     difference = correction(gripper, network, torque, FINE).at(time_s)[0]
     axes.plot(time_s, 1e3 * difference, color=BLUE)
     axes.axhline(0, color=TARGET, linewidth=0.6)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("nonlinear - linear rotation (mrad)")
+    axes.set(xlabel="time (s)", ylabel="nonlinear - linear rotation (mrad)")
     bottom, top = axes.get_ylim()
     # Leave room for text above the curve.
     axes.set_ylim(bottom, top + 0.08 * (top - bottom))

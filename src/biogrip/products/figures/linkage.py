@@ -79,8 +79,7 @@ def _linkage(axes: Axes, gripper: Gripper) -> None:
         fontsize=7,
     )
     axes.annotate(rf"$\hat\theta_2$ = {angle:g}°", (0, -0.18), ha="center", fontsize=7)
-    axes.set_xlim(a[0] - 0.75, d[0] + 0.75)
-    axes.set_ylim(-0.25, middle + 0.2)
+    axes.set(xlim=(a[0] - 0.75, d[0] + 0.75), ylim=(-0.25, middle + 0.2))
     axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
 
@@ -146,8 +145,7 @@ def _tips(axes: Axes, gripper: Gripper, rotation_rad: float) -> None:
     axes.annotate("$x$", (start[0] + 50, start[1]), va="center", fontsize=7)
     axes.plot([-30, 70], [b_y - 150, b_y - 150], color=BLACK, linewidth=1.5)
     axes.annotate("100 µm", (20, b_y - 158), ha="center", va="top", fontsize=7)
-    axes.set_xlim(-160, 160)
-    axes.set_ylim(b_y - 185, b_y + 165)
+    axes.set(xlim=(-160, 160), ylim=(b_y - 185, b_y + 165))
     axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
     axes.legend(loc="upper center", ncols=1)
@@ -182,8 +180,7 @@ def _networks(axes: Axes) -> None:
                 spring(axes, 0.2, 4.8, y, "$k_p$")
             else:
                 damper(axes, 0.2, 4.8, y, "$c_p$")
-    axes.set_xlim(-0.2, 5.2)
-    axes.set_ylim(-0.5, 5.2)
+    axes.set(xlim=(-0.2, 5.2), ylim=(-0.5, 5.2))
     axes.set_axis_off()
 
 

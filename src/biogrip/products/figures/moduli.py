@@ -101,8 +101,7 @@ def _moduli(
     truth = _modulus(model.sample(case.truth.parameters), omega)[0]
     axes.plot(omega, truth.real, color=BLACK, label="truth, $G'$")
     axes.plot(omega, truth.imag, "--", color=BLACK, label="truth, $G''$")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
+    axes.set(xscale="log", yscale="log")
     largest = float(np.max(np.abs(truth)))
     axes.set_ylim(1e-5 * largest, 5 * largest)
     axes.set_xlim(omega[0], omega[-1])
@@ -117,8 +116,7 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
     ):
         axes.plot(time_s, row, linewidth=width, label=parameter.symbol, **style)
     axes.axhspan(-1, 1, color=SHADE, linewidth=0, zorder=0)
-    axes.set_xlim(time_s[0], time_s[-1])
-    axes.set_xlabel("time (s)")
+    axes.set(xlim=(time_s[0], time_s[-1]), xlabel="time (s)")
     if not np.any(np.isfinite(relative)):
         axes.text(0.5, 0.5, "no noise", ha="center", transform=axes.transAxes)
     axes.legend(ncols=2, columnspacing=0.8, handlelength=1)

@@ -44,8 +44,7 @@ def nomenclature(axes: Axes) -> None:
         va="center",
         fontsize=7.5,
     )
-    axes.set_xlim(-base - 0.25, base + 0.75)
-    axes.set_ylim(-0.2, top + 0.25)
+    axes.set(xlim=(-base - 0.25, base + 0.75), ylim=(-0.2, top + 0.25))
     axes.set_aspect("equal", anchor="N")
     axes.set_axis_off()
 

@@ -32,8 +32,7 @@ def _over_time(axes: Axes, time_s: Array, scaled: Array) -> None:
     axes.fill_between(middles, np.negative(reach), reach, color=SHADE, linewidth=0)
     axes.plot(middles, [float(np.mean(scaled[block])) for block in blocks], color=FITTED)
     axes.axhline(0, color=TARGET, linewidth=0.6)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel("residual (standard deviations)")
+    axes.set(xlabel="time (s)", ylabel="residual (standard deviations)")
     panel(axes, "a", "and its mean over a while")
 
 
@@ -47,8 +46,7 @@ def _correlation(axes: Axes, scaled: Array) -> None:
     axes.axhspan(*(sign * _TWO_SIDED / np.sqrt(len(scaled)) for sign in (-1, 1)), color=SHADE)
     axes.vlines(lags, 0, sums[lags] / sums[0], color=FITTED, linewidth=1.2)
     axes.axhline(0, color=TARGET, linewidth=0.6)
-    axes.set_xlabel("lag (samples)")
-    axes.set_ylabel("autocorrelation")
+    axes.set(xlabel="lag (samples)", ylabel="autocorrelation")
     panel(axes, "b", "shaded: of white noise")
 
 
@@ -59,6 +57,5 @@ def _quantiles(axes: Axes, scaled: Array) -> None:
     expected = ndtri(shares)
     axes.plot(expected, expected, color=TARGET, linewidth=0.6)
     axes.plot(expected, np.quantile(scaled, shares), ".", color=FITTED, markersize=2.5)
-    axes.set_xlabel("normal quantile")
-    axes.set_ylabel("residual quantile")
+    axes.set(xlabel="normal quantile", ylabel="residual quantile")
     panel(axes, "c", "line: normal")

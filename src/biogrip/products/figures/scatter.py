@@ -121,8 +121,7 @@ def _quantity(
         axes.minorticks_off()
     else:
         axes.yaxis.set_major_locator(MaxNLocator(5))
-    axes.set_ylim(bottom, top)
-    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set(ylim=(bottom, top), xlim=(-0.6, len(names) - 0.4))
     axes.set_xticks([])
 
 

@@ -44,8 +44,7 @@ def draw(study: Study) -> Figure:
         upper.plot([], [], "--", color=BLUE, linewidth=1, label="right arm")
         upper.legend()
     upper.set_ylabel("torque (nN m)")
-    lower.set_ylabel("voltage (V)")
-    lower.set_xlabel("time (s)")
+    lower.set(ylabel="voltage (V)", xlabel="time (s)")
     drawn.align_ylabels()
     return drawn
 

@@ -42,8 +42,7 @@ def draw(case: Case, identifications: Path) -> Figure:
         axes.axhline(tolerance, linestyle="--", label="global optimum", **line),
         axes.axhline(near, linestyle=":", label=words, **line),
     ]
-    axes.set_yscale("log")
-    axes.set_ylim(_LOWEST / 2, 5 * max(near, float(increase.max())))
+    axes.set(yscale="log", ylim=(_LOWEST / 2, 5 * max(near, float(increase.max()))))
     ticks = [tick for tick in 10.0 ** np.arange(-3, 7) if tick < axes.get_ylim()[1]]
     axes.set_yticks(ticks, [f"≤{_LOWEST:g}", *(f"{tick:g}" for tick in ticks[1:])])
     axes.minorticks_off()

@@ -1,9 +1,12 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
+from collections.abc import Callable
+
 from biogrip.experiment.sample import SINGLE_BRANCH
+from biogrip.products.product import Product
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Column, Table
-from biogrip.products.uses import from_study, marked
+from biogrip.products.uses import Uses, from_study, marked
 from biogrip.study.study import Study
 
 _SOURCE = Column("source", "Source")
@@ -15,58 +18,28 @@ _LEGEND = (
 
 def gripper(study: Study) -> Table:
     """Table 1: parameters of the gripper."""
-    block, keys = study.gripper, study.reconstructed
+    block = study.gripper
+    angle = block.reference_angle_deg
     rows = [
-        _row(
-            keys,
-            "gripper.arm_length_m",
-            "l",
-            "arm length",
-            block.arm_length_m,
-            "m",
-        ),
-        _row(
-            keys,
-            "gripper.reference_angle_deg",
-            "hat-theta_2",
-            "reference angle, left",
-            block.reference_angle_deg,
-            "deg",
-        ),
-        _row(
-            keys,
-            "gripper.reference_angle_deg",
-            "hat-theta_4",
-            "reference angle, right",
-            180 - block.reference_angle_deg,
-            "deg",
-        ),
+        ("arm_length_m", "l", "arm length", block.arm_length_m, "m"),
+        ("reference_angle_deg", "hat-theta_2", "reference angle, left", angle, "deg"),
+        ("reference_angle_deg", "hat-theta_4", "reference angle, right", 180 - angle, "deg"),
     ]
     for key, symbol, meaning, unit in (
         ("inertia_kgm2", "I", "moment of inertia", "kg m2"),
         ("damping_Nms_per_rad", "c", "damping", "N m s/rad"),
         ("stiffness_Nm_per_rad", "k", "stiffness", "N m/rad"),
     ):
-        for arm, index in (("left", 2), ("right", 4)):
-            path, value = f"gripper.{arm}.{key}", getattr(getattr(block, arm), key)
-            rows.append(
-                _row(
-                    keys,
-                    path,
-                    f"{symbol}_{index}",
-                    f"{meaning}, {arm}",
-                    value,
-                    unit,
-                )
-            )
-    return _quantities("Table 1. Parameters of the gripper.", rows)
+        for name, arm, index in (("left", block.left, 2), ("right", block.right, 4)):
+            row = f"{symbol}_{index}", f"{meaning}, {name}", getattr(arm, key), unit
+            rows.append((f"{name}.{key}", *row))
+    return _quantities(study, "gripper", "Table 1. Parameters of the gripper.", rows)
 
 
 def actuator(study: Study) -> Table:
     """Table 2: geometry of the comb drive."""
-    block, keys = study.actuator, study.reconstructed
     rows = [
-        _row(keys, f"actuator.{key}", symbol, meaning, getattr(block, key), unit)
+        (key, symbol, meaning, getattr(study.actuator, key), unit)
         for key, symbol, meaning, unit in (
             ("thickness_m", "h", "thickness of the device layer", "m"),
             ("finger_width_m", "d", "finger width", "m"),
@@ -78,7 +51,8 @@ def actuator(study: Study) -> Table:
             ("first_radius_m", "r_0", "radius of the first finger", "m"),
         )
     ]
-    return _quantities("Table 2. Geometric parameters of the comb-drive actuator.", rows)
+    caption = "Table 2. Geometric parameters of the comb-drive actuator."
+    return _quantities(study, "actuator", caption, rows)
 
 
 def gene_ranges(study: Study) -> Table:
@@ -121,23 +95,15 @@ def parameter_ranges(study: Study) -> Table:
     return Table(caption, columns, rows)
 
 
-def _row(
-    keys: tuple[str, ...],
-    key: str,
-    symbol: str,
-    meaning: str,
-    value: float,
-    unit: str,
-) -> tuple[str, str, float, str, str]:
-    return symbol, meaning, value, unit, _source(keys, key)
-
-
 def _source(keys: tuple[str, ...], key: str) -> str:
     found = any(key == name or key.startswith(f"{name}.") for name in keys)
     return "reconstructed" if found else "stated"
 
 
-def _quantities(caption: str, rows: list[tuple[str, str, float, str, str]]) -> Table:
+def _quantities(
+    study: Study, block: str, caption: str, rows: list[tuple[str, str, str, float, str]]
+) -> Table:
+    """Return a table of keys of a block with symbol, meaning, value and unit."""
     columns = (
         Column("symbol", "Symbol"),
         Column("meaning", "Meaning"),
@@ -145,45 +111,24 @@ def _quantities(caption: str, rows: list[tuple[str, str, float, str, str]]) -> T
         Column("unit", "Unit"),
         _SOURCE,
     )
-    caption += _LEGEND
-    return Table(caption, columns, rows)
+    sourced = [(*row[1:], _source(study.reconstructed, f"{block}.{row[0]}")) for row in rows]
+    return Table(caption + _LEGEND, columns, sourced)
 
 
-_CAPTION = (
-    "From the study's configuration. Values marked as reconstructed are not given by the paper."
-)
+def _input(make: Callable[[Study], Table], name: str, number: int, uses: Uses) -> Product:
+    caption = (
+        f"Table {number} of the paper. From the study's configuration. Values marked as "
+        "reconstructed are not given by the paper."
+    )
+    item = f"input: {name.replace('_', ' ')}"
+    return table(make, name=name, item=item, caption=caption, uses=uses, rule="tables")
+
 
 INPUTS = (
-    table(
-        gripper,
-        name="gripper",
-        item="input: gripper",
-        caption=f"Table 1 of the paper. {_CAPTION}",
-        uses=from_study("gripper", reconstructed=marked("gripper")),
-        rule="tables",
+    _input(gripper, "gripper", 1, from_study("gripper", reconstructed=marked("gripper"))),
+    _input(actuator, "actuator", 2, from_study("actuator", reconstructed=marked("actuator"))),
+    _input(
+        gene_ranges, "gene_ranges", 3, from_study("ranges", reconstructed=marked("search_range"))
     ),
-    table(
-        actuator,
-        name="actuator",
-        item="input: actuator",
-        caption=f"Table 2 of the paper. {_CAPTION}",
-        uses=from_study("actuator", reconstructed=marked("actuator")),
-        rule="tables",
-    ),
-    table(
-        gene_ranges,
-        name="gene_ranges",
-        item="input: gene ranges",
-        caption=f"Table 3 of the paper. {_CAPTION}",
-        uses=from_study("ranges", reconstructed=marked("search_range")),
-        rule="tables",
-    ),
-    table(
-        parameter_ranges,
-        name="parameter_ranges",
-        item="input: parameter ranges",
-        caption=f"Table 4 of the paper. {_CAPTION}",
-        uses=from_study("ranges"),
-        rule="tables",
-    ),
+    _input(parameter_ranges, "parameter_ranges", 4, from_study("ranges")),
 )
