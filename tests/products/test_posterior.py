@@ -16,8 +16,7 @@ from biogrip.products.stages.judgement import JUDGED
 from biogrip.products.stages.measurement import MEASUREMENT
 from biogrip.products.stages.posterior import SAMPLED
 from biogrip.products.stages.target import TARGET
-from biogrip.products.tables.posterior import POSTERIOR_TABLE
-from biogrip.products.tables.posterior_models import POSTERIOR_MODELS
+from biogrip.products.tables.posterior import POSTERIOR_MODELS, POSTERIOR_TABLE
 from biogrip.study.study import Study
 from tests.helpers.default import plan_of, study_of
 

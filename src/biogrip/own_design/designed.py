@@ -44,19 +44,11 @@ def designed(
     progress: Callable[[int, float], None],
     earlier: Earlier | None = None,
 ) -> Designed:
-    """Design the experiment of a case.
+    """Design the experiment of a case with a block `design`.
 
-    Parameters
-    ----------
-    case
-        Case with a block `design`.
-    study_seed
-        Seed of the random search.
-    progress
-        Callback with the number of torques tried and the lowest typical relative bound.
-    earlier
-        Information from earlier traces. All bounds then include it, the first ones assuming that
-        the config's experiment is repeated.
+    The callback gets the number of torques tried and the lowest typical relative bound. With
+    information from earlier traces all bounds include it, the first ones assuming that the config's
+    experiment is repeated.
 
     Raises
     ------

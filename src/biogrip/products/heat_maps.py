@@ -87,13 +87,7 @@ def points_of_cases() -> Reads:
 
 
 def read_points(paths: list[Path], case: str) -> pd.DataFrame:
-    """Read the judged points of a case.
-
-    Raises
-    ------
-    BiogripError
-        If no file is the case's, or it is damaged.
-    """
+    """Read the judged points of a case."""
     for path in paths:
         if path.stem == case:
             return POINTS.read(path)

@@ -42,19 +42,9 @@ class Grip:
 def compute_grip(
     gripper: Gripper, network: Network, torque: TorqueHistory, *, nonlinear: bool
 ) -> Grip:
-    """Compute the extreme forces of the jaws on one sample, without inertia.
+    """Compute the extreme forces of the jaws on the first sample, without inertia.
 
-    Parameters
-    ----------
-    gripper, network, torque
-        Arms, samples and protocol of the simulation; the first sample of the network.
-    nonlinear
-        True to solve the nonlinear model.
-
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the nonlinear model describes.
+    By either model, as in `simulated_rotation`.
     """
     time_s = _instants(torque)
     force = jaw_force(gripper, network, torque, time_s, nonlinear=nonlinear, inertia=False)[0]

@@ -98,21 +98,8 @@ def jaw_force(
 ) -> Array:
     """Compute the jaws' force on the sample in N, positive while they press, (n, n_times).
 
-    Parameters
-    ----------
-    gripper, network, torque
-        Arms, samples and protocol of the simulation.
-    time_s : (n_times,)
-        Ascending times; at the instant of a step: what follows it.
-    nonlinear
-        True to solve corrected eqs. (1)-(3), False to solve the linear (4)-(6).
-    inertia
-        True to include the arms' inertia; without it, the force may jump.
-
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the nonlinear model describes.
+    By either model, as in `simulated_rotation`; at the instant of a step: what follows it. Without
+    inertia, the force may jump.
     """
     response = jaw_force_response(gripper, network, symmetric=torque.symmetric, inertia=inertia)
     force = linear_jaw_force(response, torque, time_s)

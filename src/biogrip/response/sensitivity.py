@@ -66,18 +66,7 @@ def rotation_and_sensitivity(
 ) -> tuple[Array, Array]:
     """Compute the rotation of the left arm, and its derivatives d phi / d log p.
 
-    Parameters
-    ----------
-    gripper, model, torque
-        Arms, sample model and protocol of the simulation.
-    time_s : (n_times,)
-        Ascending times.
-    parameters : (n_parameters,)
-        All positive.
-    nonlinear
-        True to solve corrected eqs. (1)-(3) instead of the linear model.
-    inertia
-        True to include the inertia of the arms.
+    By either model, as in `simulated_rotation`; all of the sample's parameters are positive.
 
     Returns
     -------

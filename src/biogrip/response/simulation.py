@@ -12,21 +12,10 @@ from biogrip.response.nonlinear import nonlinear_rotation
 def simulated_rotation(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array, *, nonlinear: bool
 ) -> Array:
-    """Simulate the closing rotation of the left arm in rad, with inertia, shape (n, n_times).
+    """Simulate the closing rotation of the left arm in rad, with inertia, (n, n_times).
 
-    Parameters
-    ----------
-    gripper, network, torque
-        Arms, samples and protocol of the simulation.
-    time_s : (n_times,)
-        Ascending times.
-    nonlinear
-        True to solve corrected eqs. (1)-(3), False to solve the linear (4)-(6).
-
-    Raises
-    ------
-    BiogripError
-        If the torque closes the arms beyond what the nonlinear model describes.
+    By the nonlinear model, corrected eqs. (1)-(3), which has the errors of `computed_correction`,
+    or the linear one, (4)-(6), at ascending times.
     """
     if nonlinear:
         return nonlinear_rotation(gripper, network, torque, time_s)

@@ -146,14 +146,9 @@ class _System:
 def unilateral_response(
     gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Array
 ) -> UnilateralResponse:
-    """Simulate one sample in unilateral contact with the jaws, without inertia.
+    """Simulate the first sample in unilateral contact with the jaws, without inertia.
 
-    Parameters
-    ----------
-    gripper, network, torque
-        Arms, samples and protocol of the simulation; the first sample of the network.
-    time_s : (n_times,)
-        Ascending times; at the instant of a step: what follows it.
+    Times ascend; at the instant of a step: what follows it.
 
     Raises
     ------

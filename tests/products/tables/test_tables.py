@@ -11,8 +11,7 @@ from biogrip.experiment.truth import Published, Truth
 from biogrip.products.catalogue import chosen
 from biogrip.products.files.identifications import columns
 from biogrip.products.files.rows import escape_formula
-from biogrip.products.tables.errors import errors
-from biogrip.products.tables.errors_of_case import ERRORS_OF_CASE, errors_of_case
+from biogrip.products.tables.errors_of_case import ERRORS_OF_CASE, errors, errors_of_case
 from biogrip.products.tables.layout import Column, Table, write
 from tests.helpers.default import seen
 from tests.helpers.places import ROOT

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.products.figures.declared import drawing
@@ -15,6 +16,8 @@ from biogrip.products.product import of_batches, the
 from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.uses import every, from_case
 from biogrip.study.study import Case
+
+_READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 
 
 def draw(
@@ -29,26 +32,31 @@ def draw(
     return draw_fit(fit, label, case.title, case.published.axis_rad)
 
 
+def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
+    """Draw a trace, its target and its fit over time; return factor and unit of the rotation."""
+    factor, unit = scale_of(fit.fitted_rad, "rad")
+    axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
+    kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
+    axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
+    if fit.target_rad is not None:
+        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
+    axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
+    axes.set_ylabel(f"closing rotation ({unit})")
+    return factor, unit
+
+
 def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
     """Draw a trace, its fit and the residuals, on an axis that includes the paper's limits."""
-    factor, unit = scale_of(fit.fitted_rad, "rad")
     drawn = figure(COLUMN_IN, 3.6)
     traces, residuals = drawn.subplots(2, 1, sharex=True, height_ratios=[2.4, 1])
-    style: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
-    traces.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **style)
-    kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
-    traces.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
-    if fit.target_rad is not None:
-        traces.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    traces.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
-    traces.set_ylabel(f"closing rotation ({unit})")
+    factor, unit = draw_traces(traces, fit, label)
     low, high = (end([*axis_rad, end(fit.measured_rad)]) for end in (np.min, np.max))
     margin = 0.02 * (high - low)
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
     traces.set_title(title)
     residual = factor * (fit.measured_rad - fit.fitted_rad)
-    residuals.plot(fit.time_s, residual, color=MEASURED, **style)
+    residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
     if fit.target_rad is not None:
         residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)

@@ -13,18 +13,17 @@ from biogrip.arrays import Array
 from biogrip.experiment.truth import Truth
 from biogrip.identify.success import near_noise, near_noise_words
 from biogrip.products.figures.declared import drawing
+from biogrip.products.figures.fit import draw_traces
 from biogrip.products.figures.results import (
     SHOWN_SEEDS,
     TypicalFit,
     first_seeds,
-    scale_of,
     seeds_in_words,
     typical_fit,
 )
 from biogrip.products.figures.style import (
     ALL_SEEDS,
     FITTED,
-    MEASURED,
     PAGE_IN,
     PAPER,
     TARGET,
@@ -90,29 +89,9 @@ def draw(
 
 
 def _fit(axes: Axes, case: Truth, fit: TypicalFit) -> None:
-    factor, unit = scale_of(fit.fitted_rad, "rad")
-    axes.plot(
-        fit.time_s,
-        factor * fit.measured_rad,
-        ".",
-        color=MEASURED,
-        markersize=1.2,
-        rasterized=True,
-    )
-    axes.plot([], [], ".", color=MEASURED, label="noisy measurement", markersize=4)
-    if fit.target_rad is not None:
-        axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
-    axes.plot(
-        fit.time_s,
-        factor * fit.fitted_rad,
-        "--",
-        color=FITTED,
-        label=f"typical fit (seed {fit.seed})",
-    )
+    factor, _ = draw_traces(axes, fit, f"typical fit (seed {fit.seed})")
     axes.set_ylim(top=1.55 * factor * fit.measured_rad.max())
-    axes.set_xlim(fit.time_s[0], fit.time_s[-1])
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"closing rotation ({unit})")
+    axes.set(xlim=(fit.time_s[0], fit.time_s[-1]), xlabel="time (s)")
     axes.legend(loc="upper right")
     panel(axes, "a", case.title)
 

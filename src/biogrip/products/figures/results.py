@@ -93,13 +93,7 @@ def typical_in_words(found: pd.DataFrame) -> str:
 def read_history(
     path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
 ) -> pd.DataFrame:
-    """Read one method's histories of the seeds drawn individually and of the one shown, Parquet.
-
-    Raises
-    ------
-    BiogripError
-        If the file cannot be read.
-    """
+    """Read one method's histories of the seeds drawn individually and of the one shown, Parquet."""
     columns = ["seed", "generation", *values]
     try:
         # Import of pandas' own Parquet reader would take a tenth of the memory.

@@ -94,13 +94,7 @@ def write_timings(path: Path, records: list[Record]) -> None:
 
 
 def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame":
-    """Read identifications by all methods or by one.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing or invalid, or has no row of the method.
-    """
+    """Read identifications by all methods or by one, of which there must be some."""
     frame = read_frame(path, "identifications", (*LEADING, *TRAILING))
     if method is None:
         return frame

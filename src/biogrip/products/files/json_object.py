@@ -9,13 +9,7 @@ from biogrip.errors import BiogripError
 
 
 def read_object(path: Path, kind: str, keys: Set[str], lacking: str) -> dict[str, Any]:
-    """Read a JSON object of some kind, with a message if one of the required keys is lacking.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing or invalid.
-    """
+    """Read a JSON object of some kind, with a message if one of the required keys is lacking."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:

@@ -39,13 +39,7 @@ def write_tables(path: Path, tables: Sequence[Table], *, dictionary: bool = True
 
 
 def column_names(path: Path) -> list[str]:
-    """Return the column names of a file.
-
-    Raises
-    ------
-    BiogripError
-        If it cannot be read.
-    """
+    """Return the column names of a file."""
     try:
         return list(pq.read_schema(path).names)
     except (OSError, ValueError) as error:
@@ -53,13 +47,7 @@ def column_names(path: Path) -> list[str]:
 
 
 def read_columns(path: Path, names: Sequence[str]) -> dict[str, NDArray[Any]]:
-    """Read columns of numbers.
-
-    Raises
-    ------
-    BiogripError
-        If it cannot be read, or lacks a column.
-    """
+    """Read columns of numbers."""
     try:
         with pq.ParquetFile(path) as file:
             missing = set(names) - set(file.schema_arrow.names)

@@ -74,13 +74,7 @@ def limits_in(verdicts: Mapping[str, Any]) -> Limits:
 
 
 def read_posterior(path: Path) -> dict[str, Any]:
-    """Read the summary of a posterior.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing or invalid.
-    """
+    """Read the summary of a posterior."""
     keys = {"quantities", "converged", "in_words"}
     return read_object(path, "a posterior", keys, "says nothing of a posterior")
 
@@ -105,12 +99,6 @@ def write_samples(
 
 
 def read_samples(path: Path, model: SampleModel) -> Array:
-    """Read samples written by `write_samples`, (n, n_parameters) in SI units.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing, damaged, or of another model.
-    """
+    """Read samples written by `write_samples`, (n, n_parameters) in SI units."""
     columns = read_columns(path, [p.column for p in model.parameters])
     return np.stack(list(columns.values()), axis=1)

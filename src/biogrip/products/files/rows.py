@@ -42,13 +42,7 @@ class RowFile:
         write_rows(path, self.columns, rows)
 
     def read(self, path: Path) -> "pd.DataFrame":
-        """Read all rows.
-
-        Raises
-        ------
-        BiogripError
-            If the file is missing, or is not of this kind.
-        """
+        """Read all rows."""
         return read_frame(path, self.what, self.columns, self.words)
 
 
@@ -95,11 +89,6 @@ def read_frame(
 
     Columns of words are read as text even if they look like numbers; `what` says in messages what
     the file holds.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing, is no CSV, or lacks a column.
     """
     import pandas as pd
 
@@ -116,13 +105,7 @@ def read_frame(
 
 
 def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str]]:
-    """Read the header and all rows as text.
-
-    Raises
-    ------
-    BiogripError
-        If the file cannot be read, or its header is not `columns`.
-    """
+    """Read the header, which may have to be given columns, and all rows as text."""
     try:
         with path.open(encoding="utf-8", newline="") as stream:
             rows = [[as_it_was(cell) for cell in row] for row in csv.reader(stream)]

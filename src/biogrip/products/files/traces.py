@@ -66,25 +66,13 @@ def as_written(rotation_rad: Array) -> Array:
 
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, torque and rotation of a target written by `write_target`.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing, is no target, or holds a number that is not finite.
-    """
+    """Read time, torque and rotation of a target written by `write_target`, all of them finite."""
     time_s, torque, rotation, _ = _target_columns(path)
     return time_s, torque, rotation
 
 
 def read_jaw_force(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, torque and jaw force of a target.
-
-    Raises
-    ------
-    BiogripError
-        Errors of `read_target`.
-    """
+    """Read time, torque and jaw force of a target."""
     time_s, torque, _, force = _target_columns(path)
     return time_s, torque, force
 
@@ -125,13 +113,7 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
 
 
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
-    """Read noisy traces of all or of given seeds.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing, damaged, or lacks a seed.
-    """
+    """Read noisy traces of all or of given seeds, which it must have."""
     present = column_names(path)
     kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
     names = present if seeds is None else [*kept, *(f"{_SEED}{seed}" for seed in seeds)]
@@ -142,24 +124,12 @@ def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurement
 
 
 def seeds_in(path: Path) -> list[int]:
-    """Return the seeds whose noisy traces are in a file of `write_measurements`.
-
-    Raises
-    ------
-    BiogripError
-        If it cannot be read.
-    """
+    """Return the seeds whose noisy traces are in a file of `write_measurements`."""
     return [int(name.removeprefix(_SEED)) for name in column_names(path) if name.startswith(_SEED)]
 
 
 def each_trace(path: Path) -> Iterator[Array]:
-    """Yield the noisy traces in a file, (n_samples,) each, reading some at once.
-
-    Raises
-    ------
-    BiogripError
-        If the file is damaged.
-    """
+    """Yield the noisy traces in a file, (n_samples,) each, reading some at once."""
     seeds = seeds_in(path)
     for start in range(0, len(seeds), _READ_AT_ONCE):
         yield from read_measurements(

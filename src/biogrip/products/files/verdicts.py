@@ -66,13 +66,7 @@ def exact_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, 
 
 
 def read_verdicts(path: Path) -> dict[str, Any]:
-    """Read a file of verdicts.
-
-    Raises
-    ------
-    BiogripError
-        If the file is missing or invalid.
-    """
+    """Read a file of verdicts."""
     return read_object(path, "verdicts", {"quantities", "trades", "notes"}, "holds no verdicts")
 
 

@@ -1,4 +1,4 @@
-"""Tables 5 to 7: target, the paper's identification and this study's."""
+"""Tables 5 to 7: target, the paper's identification and this study's; and all of them joined."""
 
 from pathlib import Path
 
@@ -10,11 +10,12 @@ from biogrip.experiment.sample import Parameter
 from biogrip.experiment.truth import Truth
 from biogrip.identify.success import near_noise, near_noise_words, typical
 from biogrip.products.files.identifications import PATH, read_identifications
-from biogrip.products.product import EVALUATION, the
+from biogrip.products.files.rows import read_rows
+from biogrip.products.product import EVALUATION, of_cases, the
 from biogrip.products.tables.declared import table
-from biogrip.products.tables.layout import Column, Table
-from biogrip.products.uses import every, from_case
-from biogrip.study.study import Case
+from biogrip.products.tables.layout import Cell, Column, Table
+from biogrip.products.uses import every, from_case, from_study
+from biogrip.study.study import Case, Study
 
 _COLUMNS = (
     Column("case", "Case"),
@@ -36,6 +37,8 @@ TYPICAL = (
     "Typical is the seed of median excess of the misfit over the noise in its trace; the lowest "
     "misfit would be that of the quietest trace."
 )
+
+_WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
 
 def table_columns(near_noise_tolerance: float) -> tuple[Column, ...]:
@@ -95,6 +98,30 @@ def error_percent(target: float | None, identified: Array) -> Array:
     return 100 * (target - identified) / target
 
 
+def errors(study: Study, tables: list[Path]) -> Table:
+    """Join the error tables of all cases, CSV."""
+    columns = table_columns(study.near_noise_tolerance)
+    names = [column.name for column in columns]
+    rows: list[tuple[Cell, ...]] = [
+        tuple(_cell(name, text) for name, text in zip(names, row, strict=True))
+        for path in tables
+        for row in read_rows(path, names)[1:]
+    ]
+    caption = (
+        f"Identification errors of all cases. {TYPICAL} Error = (target - identified) / target."
+    )
+    return Table(caption, columns, rows)
+
+
+def _cell(name: str, text: str) -> Cell:
+    if name in _WHOLE_NUMBERS:
+        return int(text)
+    try:
+        return float(text)
+    except ValueError:
+        return text or None
+
+
 def _paper(
     truth: Truth, quantity: list[Parameter], target: float | None
 ) -> tuple[float | None, str | float | None]:
@@ -108,7 +135,7 @@ def _paper(
     return value, float(error_percent(target, np.array([value]))[0])
 
 
-CAPTION = (
+_CAPTION = (
     "Target values, the values and errors that the paper prints, and those of this study: the seed "
     "of median excess of the misfit over the noise in its trace, median and 5 to 95 % over seeds, "
     "the median absolute error, and the share of seeds whose misfit is within the study's "
@@ -120,9 +147,17 @@ ERRORS_OF_CASE = table(
     errors_of_case,
     stem="results/tables/errors",
     item="errors",
-    caption=CAPTION,
+    caption=_CAPTION,
     uses=from_case("name truth study.shown study.near_noise_tolerance"),
     reads={"identifications": the(PATH)},
     cases=every,
     weight=EVALUATION,
+)
+
+ERRORS = table(
+    errors,
+    name="errors",
+    caption=_CAPTION,
+    uses=from_study("near_noise_tolerance"),
+    reads={"tables": of_cases(ERRORS_OF_CASE.writes["csv"], every)},
 )
