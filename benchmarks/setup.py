@@ -10,7 +10,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.experiment.noise import add_noise, rms
 from biogrip.experiment.protocol import TorqueHistory, sample_times, torque_history
-from biogrip.experiment.sample import SampleModel, model_named
+from biogrip.experiment.sample import Sample, SampleModel
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic import evolve_many
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -131,7 +131,7 @@ def problem(
     truth = np.array([chosen.parameters[name] for name in own.names])
     clean = rotation(step_response(gripper, own.network(truth)), steps, time_s)[0]
     trace = add_noise(clean, chosen.noise, np.random.default_rng(seed))
-    model = model_named(chosen.sample.name, branches)
+    model = Sample(chosen.sample.name, branches).model
     ranges = chosen.ranges
     genetic = chosen.method("genetic")
     assert isinstance(genetic, GeneticSettings)

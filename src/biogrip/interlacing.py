@@ -34,19 +34,13 @@ _FITS = 70_000
 
 @dataclass(frozen=True)
 class Zeros:
-    """Zeros of n functions, as distances from poles.
-
-    Parameters
-    ----------
-    pole : (n_zeros, n)
-        Pole that each zero is counted from.
-    beyond : (n_zeros, n)
-        Distance of the zero from that pole; for complex weights its derivative is the imaginary
-        part.
-    """
+    """Zeros of n functions, as distances from poles."""
 
     pole: Array
+    """Pole that each zero is counted from, (n_zeros, n)."""
     beyond: NDArray[Any]
+    """Distance of the zero from that pole; for complex weights its derivative is the imaginary
+    part."""
 
     @property
     def values(self) -> NDArray[Any]:
@@ -59,23 +53,11 @@ class Zeros:
 
 
 def interlaced_zeros(weights: NDArray[Any], poles: Array, level: NDArray[Any]) -> Zeros:
-    """Return the zeros of sum_j w_j / (x - p_j) - b.
+    """Return the zeros of sum_j w_j / (x - p_j) - b: each above its own pole and below the next.
 
-    The zeros of a function are bitwise independent of the other functions.
-
-    Parameters
-    ----------
-    weights : (n_poles, n)
-        Positive; an imaginary part, far smaller than the real one, carries a derivative.
-    poles : (n_poles, n)
-        Ascending and real.
-    level : (n,)
-        b, positive, or complex like the weights.
-
-    Returns
-    -------
-    Zeros
-        As many zeros as poles, each above its own pole and below the next.
+    The zeros of a function are bitwise independent of the other functions. Weights and poles are
+    (n_poles, n), levels (n,). Weights and levels are positive; an imaginary part, far smaller than
+    the real one, carries a derivative. Poles are ascending and real.
     """
     if not (np.iscomplexobj(weights) or np.iscomplexobj(level)):
         return _real_zeros(weights, poles, level)

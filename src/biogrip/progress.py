@@ -13,15 +13,8 @@ _CLEARED = "\r\x1b[K"
 class Progress:
     """Counter of the completed pieces of a job.
 
-    Parameters
-    ----------
-    what
-        Name of the job.
-    total
-        Number of pieces.
-    live
-        If true, show every phase on the terminal in a line that is cleared at the end. Not for
-        jobs that share a terminal.
+    If it is live, it shows every phase on the terminal in a line that is cleared at the end: not
+    for jobs that share a terminal.
     """
 
     def __init__(self, what: str, total: int, *, live: bool = False) -> None:

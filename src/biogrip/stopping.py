@@ -38,14 +38,9 @@ def uninterrupted() -> Iterator[None]:
 
 
 def end_at_once(number: int, line: str) -> None:
-    """Exit with a message, as if ended by a signal.
+    """Exit with a message after the command's name, as if ended by a signal.
 
-    Parameters
-    ----------
-    number
-        Number of the signal; the exit status is 128 plus it, as in a shell.
-    line
-        Message, printed after the name of the command.
+    The exit status is 128 plus the signal's number, as in a shell.
     """
     # Ignore further signals.
     for other in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from biogrip.experiment.maxwell_models import generalized_maxwell, liquid_drop
 from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
-from biogrip.experiment.sample import MODELS, Network, model_named, with_fixed
+from biogrip.experiment.sample import MODELS, Network, Sample, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, sample_polynomials, step_response
 
@@ -113,7 +113,7 @@ def test_a_model_is_the_network_that_its_drawing_shows(name: str) -> None:
 
 
 def test_more_branches_add_up() -> None:
-    model = model_named("generalized_maxwell", branches=3)
+    model = Sample("generalized_maxwell", branches=3).model
     assert model.names == ("k_1", "k_2", "k_3", "k_p", "c_1", "c_2", "c_3", "c_p")
     values = [1.0, 2.0, 3.0, 0.5, 10.0, 0.1, 700.0, 0.02]
     for s in 1j * np.geomspace(1e-4, 1e3, 15):

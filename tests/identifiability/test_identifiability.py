@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS, model_named
+from biogrip.experiment.sample import MODELS, Sample
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fisher import bound, covariance
 from biogrip.identifiability.likelihood import Likelihood, make_likelihood
@@ -87,7 +87,7 @@ def test_bounds_of_the_papers_cases(case: str, quantity: str, percent: tuple[flo
 
 @pytest.mark.parametrize("form", ["sum", "series", "time", "parameter"])
 def test_quantities_and_their_gradients(form: str) -> None:
-    model = model_named("burgers")
+    model = Sample("burgers").model
     x = np.log([3.0, 200.0, 2.0, 40.0])
     k_s, c_s, k_v, c_v = np.exp(x)
     springs, times = find_combinations(model, [0, 2]), find_combinations(model, [0, 3])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import integrate, stats
 
-from biogrip.experiment.sample import CANDIDATES, MODELS, model_named
+from biogrip.experiment.sample import CANDIDATES, MODELS, Sample
 from biogrip.identifiability.convergence import diagnose_convergence
 from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR, compute_marginals
 from biogrip.identifiability.mixture import FREEDOM, Mixture, fit_mixture
@@ -221,7 +221,7 @@ def test_priors_are_of_what_is_identified() -> None:
 
 def test_as_many_walkers_as_the_sampler_wants() -> None:
     """Twice the parameters: with fewer, emcee itself refuses to begin."""
-    model = model_named("generalized_maxwell", 5)
+    model = Sample("generalized_maxwell", 5).model
     least = 2 * len(model.names)
     (problem,) = PosteriorSettings(walkers=least - 1).problems_of(model, [])
     said = f"found {least - 1}, allowed are at least {least} to identify 12 parameters."

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.sample import MODELS, model_named, with_fixed
+from biogrip.experiment.sample import MODELS, Sample, with_fixed
 from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identifiability.crossings import Brackets, crossings
 from biogrip.identifiability.diagnosis import diagnose
@@ -57,7 +57,7 @@ def values(quantities: list[Quantity], which: IntArray, x: Array) -> Array:
     return np.array([quantities[q].log(point) for q, point in zip(which, x, strict=True)])
 
 
-BRANCHED = {branches: model_named("generalized_maxwell", branches) for branches in (1, 2, 3)}
+BRANCHED = {branches: Sample("generalized_maxwell", branches).model for branches in (1, 2, 3)}
 BURGERS = MODELS["burgers"]
 FORMS = {
     "one branch": (BRANCHED[1], find_combinations(BRANCHED[1], [0, 1, 2])),

@@ -5,7 +5,7 @@ import functools
 import numpy as np
 import pytest
 
-from biogrip.experiment.sample import SampleModel, model_named, with_fixed
+from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identifiability.constrained_fits import ConstrainedFits
 from biogrip.identifiability.likelihood import Likelihood, make_likelihood
 from biogrip.identifiability.limits import find_limits
@@ -21,7 +21,7 @@ from tests.helpers.default import STUDY, study_of
 from tests.helpers.problems import GRIPPER, TORQUE, case_problem, clean
 
 TIMES = clean("endothelial_cell")[0]
-TWO = model_named("generalized_maxwell", 2)
+TWO = Sample("generalized_maxwell", 2).model
 # A fast and a slow branch, which the traces tell apart.
 SAMPLE = {"k_1": 30.0, "k_2": 10.0, "k_p": 12.3, "c_1": 150.0, "c_2": 600.0, "c_p": 0.01}
 
@@ -47,7 +47,7 @@ def assert_in_order(model: SampleModel, parameters: np.ndarray) -> None:
 
 @pytest.mark.parametrize("branches", [2, 3, 4])
 def test_least_squares_counts_branches_as_they_relax(branches: int) -> None:
-    model = model_named("generalized_maxwell", branches)
+    model = Sample("generalized_maxwell", branches).model
     dampers = np.geomspace(3.0, 3e3, branches)[::-1]
     truth = dict(zip(model.names, (*np.ones(branches + 1), *dampers, 0.1), strict=True))
     found = identified("least_squares", problems(model, truth, 8, 1e-3))

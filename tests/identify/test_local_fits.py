@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS, model_named
+from biogrip.experiment.sample import MODELS, Sample
 from biogrip.groups.replicates import joint_problem
 from biogrip.identify import genetic_refined, least_squares
 from biogrip.identify.answer import Identification
@@ -103,7 +103,7 @@ def test_a_trace_without_noise_gives_every_model_back(name: str) -> None:
     if branches is None:
         model, truth = MODELS[name], np.array(MODEL_PARAMETERS[name])
     else:
-        model = model_named("generalized_maxwell", branches)
+        model = Sample("generalized_maxwell", branches).model
         dampers = np.geomspace(3.0, 3e3, branches)
         truth = np.concatenate((np.ones(branches + 1), dampers, [0.1]))
     times = clean("endothelial_cell")[0]

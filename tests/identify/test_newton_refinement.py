@@ -7,7 +7,7 @@ import pytest
 
 from biogrip import library
 from biogrip.arrays import Array, IntArray
-from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.experiment.sample import MODELS, Sample, SampleModel
 from biogrip.identify import newton_refinement
 from biogrip.identify.levenberg_marquardt import Minima, minimize
 from biogrip.identify.local_fits import FINE, PRIOR_WIDTH, LocalFits
@@ -29,7 +29,7 @@ from tests.helpers.responses import LOG_RANGES
 MODELS_SETTLED = {
     "burgers": MODELS["burgers"],
     "zener_kelvin": MODELS["zener_kelvin"],
-    "two branches": model_named("generalized_maxwell", 2),
+    "two branches": Sample("generalized_maxwell", 2).model,
 }
 TIMES = np.linspace(0.0, 400.0, 201)
 

@@ -8,7 +8,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
+from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
 from biogrip.identify import genetic, genetic_refined
 from biogrip.identify.answer import Identification
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -40,7 +40,7 @@ RANGES = {
 MAXWELL = MODELS["generalized_maxwell"]
 MODELS_SEARCHED = {
     **{name: MODELS[name] for name in ("generalized_maxwell", "liquid_drop", "damper", "burgers")},
-    "two branches": model_named("generalized_maxwell", 2),
+    "two branches": Sample("generalized_maxwell", 2).model,
     "k_p known": with_fixed(MAXWELL, {"k_p": 12.3}),
 }
 
@@ -208,7 +208,7 @@ def test_the_best_in_order(words: int, size: int) -> None:
 
 @pytest.mark.parametrize("branches", [1, 2, 5])
 def test_codes_stand_for_chromosomes(branches: int, gripper: Gripper, steps: TorqueHistory) -> None:
-    (problem,) = case_problem(gripper, steps, 1, model_named("generalized_maxwell", branches))
+    (problem,) = case_problem(gripper, steps, 1, Sample("generalized_maxwell", branches).model)
     genome = problem.genome
     chromosomes = genome.draw(400, rng(0))
     codes = genome.code(chromosomes)

@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
-from biogrip.experiment.sample import MODELS, model_named
+from biogrip.experiment.sample import MODELS, Sample
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import ringing_s
@@ -65,7 +65,7 @@ def test_least_squares_sees_no_difference(
 def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:
     torque, time_s = torque_history(PROTOCOLS["steps"]), TIMES["uniform"]
     condensed = condensed_of(torque, time_s)
-    model, x = model_named("generalized_maxwell", 2), np.log([5.0, 0.2, 1.0, 9.0, 99.0, 0.5])
+    model, x = Sample("generalized_maxwell", 2).model, np.log([5.0, 0.2, 1.0, 9.0, 99.0, 0.5])
     empty = Residuals(gripper, model, torque, time_s, np.zeros(len(time_s)), condensed)
     clean, _ = empty(x)
     exact = Residuals(gripper, model, torque, time_s, clean, condensed)

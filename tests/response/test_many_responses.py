@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
-from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.experiment.sample import MODELS, Sample, SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
@@ -14,7 +14,7 @@ from biogrip.response.sensitivity import rotation_and_sensitivity
 from tests.helpers.responses import MODEL_PARAMETERS, PROTOCOLS, log_range
 from tests.helpers.responses import SAMPLING_TIMES as TIMES
 
-MANY_BRANCHES = {branches: model_named("generalized_maxwell", branches) for branches in (2, 3, 4)}
+MANY_BRANCHES = {branches: Sample("generalized_maxwell", branches).model for branches in (2, 3, 4)}
 
 
 def case_problem(

@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array, ComplexArray
 from biogrip.experiment.protocol import TorqueHistory, hold, torque_history
-from biogrip.experiment.sample import MODELS, SampleModel, model_named
+from biogrip.experiment.sample import MODELS, Sample, SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.inertia import ringing_s, while_ringing
 from biogrip.response.linear import poles, rotation, step_response, transfer_functions
@@ -85,7 +85,7 @@ def test_every_model_and_protocol(
     request: pytest.FixtureRequest, arms: str, name: str, protocol: str
 ) -> None:
     """Against what targets are made with, and differences of it."""
-    gripper, model = request.getfixturevalue(arms), model_named(name)
+    gripper, model = request.getfixturevalue(arms), Sample(name).model
     torque, sample = torque_history(PROTOCOLS[protocol]), np.array(MODEL_PARAMETERS[name])
     times = np.sort(np.concatenate([start + AFTER for start in (*torque.time_s, 300.0)]))
     phi, slopes = rotation_and_sensitivity(gripper, model, torque, times, sample, inertia=True)
@@ -207,7 +207,7 @@ def test_no_pole_counts_twice_in_a_chain_of_close_ones(gripper: Gripper) -> None
     """A third pole is close to two that are closer still, and is not one of them."""
     springs = [0.001695449432135559, 0.001695449432135559, 0.0016074925290405196]
     dampers = [0.001100299656249389, 0.001100299656249389, 0.0010955884267022612]
-    model = model_named("generalized_maxwell", 3)
+    model = Sample("generalized_maxwell", 3).model
     sample = np.array([*springs, 0.0007309809396061109, *dampers, 0.024581999807570486])
     times, torque = np.linspace(0.0, 6.0, 600), torque_history((hold(3.0, 1e-9), hold(3.0, 2e-10)))
     phi, _ = rotation_and_sensitivity(gripper, model, torque, times, sample, inertia=True)

@@ -5,7 +5,7 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, torque_history
-from biogrip.experiment.sample import MODELS, SampleModel, model_named, with_fixed
+from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
 from biogrip.instrument.gripper import Gripper
 from biogrip.response import residuals as of_residuals
 from biogrip.response import sensitivity
@@ -81,12 +81,12 @@ def test_against_differences(
     request: pytest.FixtureRequest, arms: str, name: str, protocol: str
 ) -> None:
     """Every model, equal and unequal arms, every kind of load."""
-    model = model_named(name)
+    model = Sample(name).model
     _check(request.getfixturevalue(arms), model, protocol, np.array(MODEL_PARAMETERS[name]))
 
 
 def test_two_branches_and_a_known_parameter(gripper: Gripper) -> None:
-    two = model_named("generalized_maxwell", 2)
+    two = Sample("generalized_maxwell", 2).model
     _check(gripper, two, "steps", np.array([5.0, 0.2, 1.0, 9.0, 99.0, 0.5]))
     known = with_fixed(MODELS["burgers"], {"c_s": 200.0})
     _check(gripper, known, "steps", np.array([3.0, 2.0, 40.0]))

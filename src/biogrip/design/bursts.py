@@ -26,16 +26,9 @@ def whole(samples: Array, capacity: Array) -> IntArray:
 def make_bursts(
     each: Sequence[TimeBins], starts: IntArray, counts: IntArray, fastest_Hz: float
 ) -> tuple[Burst, ...]:
-    """Convert readings of cells after steps to bursts; successive full cells share a burst.
+    """Convert readings of cells, (n_cells,), to bursts; successive full cells share a burst.
 
-    Parameters
-    ----------
-    each, starts : (n_steps,)
-        Cells after each step, and slots at which steps begin.
-    counts : (n_cells,)
-        Numbers of readings in all cells.
-    fastest_Hz
-        Number of slots per second.
+    There are cells after each step, which begins at a slot, and `fastest_Hz` slots per second.
     """
     runs: list[_Run] = []
     place = 0

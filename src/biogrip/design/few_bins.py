@@ -22,25 +22,10 @@ _AS_GOOD = 1e-3
 def in_few_bins(
     sensitivity: Array, samples: Array, capacity: Array, cost: Array, before: Array | float = 0.0
 ) -> Array:
-    """Distribute readings over few cells, with the same information.
+    """Distribute readings over few cells, (n_cells,), with the same sum and information.
 
-    Parameters
-    ----------
-    sensitivity : (n, n_parameters, n_cells)
-        Sensitivities in units of the noise.
-    samples : (n_cells,)
-        Given numbers of readings in cells.
-    capacity : (n_cells,)
-        Largest number of readings in each cell.
-    cost : (n_cells,)
-        Cost of a reading in each cell.
-    before : (n or 1, n_parameters, n_parameters)
-        Information from earlier experiments.
-
-    Returns
-    -------
-    (n_cells,)
-        Numbers of readings with the same sum; those given if the linear program fails.
+    Sensitivities, capacity and information before are those of `best_sampling`; each cell has a
+    given number of readings and a cost. Those given are returned if the linear program fails.
     """
     from scipy.optimize import linprog
 

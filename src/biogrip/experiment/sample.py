@@ -22,16 +22,6 @@ from biogrip.experiment.sample_model import SampleModel as SampleModel
 from biogrip.experiment.sample_model import with_fixed as with_fixed
 
 
-def model_named(name: str, branches: int = 1) -> SampleModel:
-    """Return a model by name, the generalized one with a number of Maxwell branches."""
-    model = MODELS[name]
-    if branches == 1:
-        return model
-    if model.branched is None:
-        raise ValueError(f"{name} has no number of branches")
-    return model.branched(branches)
-
-
 @dataclass(frozen=True)
 class Sample:
     """Name of a sample's constitutive model, and its number of branches."""
@@ -44,7 +34,12 @@ class Sample:
     @property
     def model(self) -> SampleModel:
         """The constitutive model."""
-        return model_named(self.name, self.branches)
+        model = MODELS[self.name]
+        if self.branches == 1:
+            return model
+        if model.branched is None:
+            raise ValueError(f"{self.name} has no number of branches")
+        return model.branched(self.branches)
 
     @property
     def candidate(self) -> str:

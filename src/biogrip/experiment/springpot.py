@@ -77,14 +77,10 @@ class Ladder:
 
 
 def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:
-    """Return the springs and dampers that represent springpots V (s t_0)^alpha.
+    """Return the springs and dampers that represent n springpots V (s t_0)^alpha.
 
-    Parameters
-    ----------
-    modulus_N_per_m : (n,)
-        V, the modulus at 1 rad/s.
-    exponent : (n,)
-        alpha, between 0 and 1. Both may be complex: the result is an analytic function.
+    V is the modulus at 1 rad/s, alpha between 0 and 1. Both may be complex: the result is an
+    analytic function.
     """
     # At 0 and 1, where tails would be infinite, the next exponent gives the same response.
     exponent = np.where(exponent == 0, _ROUNDING, exponent)

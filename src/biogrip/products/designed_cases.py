@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.design.experiment import Experiment, compute_information, relative_bounds
 from biogrip.experiment.protocol import torque_history
 from biogrip.response.ringing import ringing_responses
@@ -34,8 +34,8 @@ def bounds(case: Case, experiment: Experiment, parameters: Array) -> Array:
     torque = torque_history(phases)
     times = sampling.over(torque.end_s)
     found = []
-    for start in range(0, len(parameters), _AT_ONCE):
-        some = parameters[start : start + _AT_ONCE]
-        sensitivity = ringing_responses(case.gripper, case.searched, torque, times, some)[:, 1:]
-        found.append(relative_bounds(compute_information(sensitivity) / case.design.noise_rad**2))
+    for some in parts(len(parameters), _AT_ONCE):
+        rows = ringing_responses(case.gripper, case.searched, torque, times, parameters[some])
+        information = compute_information(rows[:, 1:])
+        found.append(relative_bounds(information / case.design.noise_rad**2))
     return np.concatenate(found)

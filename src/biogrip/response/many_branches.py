@@ -190,15 +190,9 @@ def modes_with_slopes(
 ) -> tuple[Array, Array, Array, Array]:
     """Compute rates and weights of the left arm, with derivatives by the log-parameters.
 
-    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow.
-
-    Parameters
-    ----------
-    gripper, symmetric
-        As in `modes_of_many`.
-    complex_step_network
-        n samples, and after them the same with each of `count` parameters tilted into the
-        complex plane by the share `tilt`.
+    With H(x; p) = 0 at a rate, dx = (sum_j dK_j/(x - r_j) + ...) / (S/x^2); S and N follow. The
+    network has n samples, and after them the same with each of `count` parameters tilted into the
+    complex plane by the share `tilt`.
 
     Returns
     -------

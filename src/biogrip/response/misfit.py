@@ -26,13 +26,9 @@ def make_misfit(
 ) -> Misfit:
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
 
-    Parameters
-    ----------
-    residuals
-        Residuals of the trace; their misfit serves any protocol, sampling and noise.
-    gripper, torque, time_s, rotation_rad
-        Arguments of `residuals`. `SeriesMisfit` is used for torque steps, sampled uniformly
-        from the start on, with the linear model without inertia, in white noise alone.
+    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for torque
+    steps, sampled uniformly from the start on, with the linear model without inertia, in white
+    noise alone.
     """
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])

@@ -108,13 +108,7 @@ class SeriesMisfit:
         return DecayTable(self.exact_projections, self._samples, shortest)
 
     def __call__(self, parameters: Array) -> Array:
-        """Compute the misfit in rad of each individual, (n,), to the only or first trace.
-
-        Parameters
-        ----------
-        parameters : (n, n_parameters)
-            Sample parameters in the model's order, SI units.
-        """
+        """Compute misfits in rad, (n,), of parameters, (n, n_parameters), to the first trace."""
         return self.of_each(parameters[None], np.zeros(1, dtype=np.int64))[0]
 
     def of_each(self, parameters: Array, traces: IntArray) -> Array:

@@ -70,13 +70,7 @@ class ModeRows:
             self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
 
     def __call__(self, modes: Modes) -> Array:
-        """Return rows of responses and their derivatives, (n, 1 + n_parameters, n_rows) in rad.
-
-        Parameters
-        ----------
-        modes
-            Poles and weights of n samples, with derivatives.
-        """
+        """Return rows of responses with derivatives, (n, 1 + n_parameters, n_rows) in rad."""
         count, parameters, n_modes = modes.rate_slopes.shape
         scaled = -self._end_s * modes.rates
         u = np.log1p(scaled) / _WIDTH

@@ -17,16 +17,9 @@ def drawing(
 ) -> Product:
     """Declare a figure of the study, or of each of its cases or sweeps.
 
-    Parameters
-    ----------
-    draw
-        Function that draws the figure from what it uses and, by keyword, from the files of `reads`.
-    name
-        Name of the product; by default that of its module.
-    file
-        Name of the file, if it differs from `name`.
-    declared
-        What else `biogrip.products.declared.shown` takes.
+    A function draws it from what it uses and, by keyword, the files of `reads`. Its name is by
+    default that of its module, and that of the file the same. What else can be declared is said by
+    `biogrip.products.declared.shown`.
     """
 
     @wraps(draw)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, parts
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.products.files.parquet import column_names, read_columns, table_of, write_tables
@@ -131,10 +131,8 @@ def seeds_in(path: Path) -> list[int]:
 def each_trace(path: Path) -> Iterator[Array]:
     """Yield the noisy traces in a file, (n_samples,) each, reading some at once."""
     seeds = seeds_in(path)
-    for start in range(0, len(seeds), _READ_AT_ONCE):
-        yield from read_measurements(
-            path, seeds[start : start + _READ_AT_ONCE]
-        ).rotation_rad.values()
+    for some in parts(len(seeds), _READ_AT_ONCE):
+        yield from read_measurements(path, seeds[some]).rotation_rad.values()
 
 
 def write_single_trace(path: Path, time_s: Array, rotation_rad: Array) -> None:

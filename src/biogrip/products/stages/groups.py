@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 
+from biogrip.arrays import parts
+
 _JOINT = 63
 
 
 def groups(seeds: Sequence[int], times: int = 1) -> Iterator[Sequence[int]]:
-    """Yield the seeds of a batch in groups; results do not depend on the grouping."""
-    count = times * _JOINT
-    for first in range(0, len(seeds), count):
-        yield seeds[first : first + count]
+    """Return the seeds of a batch in groups; results do not depend on the grouping."""
+    return (seeds[some] for some in parts(len(seeds), times * _JOINT))

@@ -13,8 +13,7 @@ from biogrip.identify.answer import Identification
 from biogrip.identify.genetic import identify_many
 from biogrip.products.files.interpretations import INTERPRETATIONS
 from biogrip.products.files.traces import TARGETS, read_target
-from biogrip.products.plan import Plan, Wildcards
-from biogrip.products.product import Product, Weight, the
+from biogrip.products.product import Product, Weight, the, wildcards_of
 from biogrip.products.stages.groups import groups
 from biogrip.products.uses import from_case, using
 from biogrip.progress import Progress
@@ -78,16 +77,12 @@ def read_cases(study: Study) -> list[str]:
     return [name for name in names if set(study.case(name).sample.model.names) <= ours]
 
 
-def _jobs(plan: Plan) -> list[Wildcards]:
-    return [{"case": name} for name in read_cases(plan.study)]
-
-
 READ = Product(
     "interpretations_of_case",
     {"rows": INTERPRETATIONS.path},
     read,
     from_case("name seeds study.study_seed", interpretations=_interpretations),
-    _jobs,
+    lambda plan: wildcards_of(read_cases(plan.study)),
     message="Identifying {case} under every interpretation of the paper",
     reads={"target": the(TARGETS)},
     weight=Weight(120, 1000),

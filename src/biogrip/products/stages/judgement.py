@@ -59,15 +59,7 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     said = diagnosis_data(diagnosis, notes_on_fit(fit))
-    data = {
-        "case": case.name,
-        "model": case_problem.model.name,
-        "confidence": case.confidence,
-        **said,
-        "noise_model": fit.noise_data(),
-        "valley": valley,
-    }
-    write_text(verdicts, json.dumps(data, indent=1) + "\n")
+    _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
@@ -107,13 +99,12 @@ def expect(case: Case, target: Path, calibrated: list[Path], verdicts: Path) -> 
     diagnosis = diagnose(
         problem, case_problem.searched, found, confidence=case.confidence, noise_rad=noise_rad
     )
-    data = {
-        "case": case.name,
-        "model": case_problem.model.name,
-        "confidence": case.confidence,
-        **diagnosis_data(diagnosis),
-    }
-    write_text(verdicts, json.dumps(data, indent=1) + "\n")
+    _write(verdicts, case, diagnosis_data(diagnosis))
+
+
+def _write(verdicts: Path, case: Case, said: dict[str, Any]) -> None:
+    head = {"case": case.name, "model": case.problem.model.name, "confidence": case.confidence}
+    write_text(verdicts, json.dumps(head | said, indent=1) + "\n")
 
 
 JUDGED = Product(

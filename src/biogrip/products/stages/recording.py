@@ -7,7 +7,7 @@ from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
-from biogrip.products.product import Product, Reads
+from biogrip.products.product import Product, Reads, wildcards_of
 from biogrip.products.uses import from_case
 from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
@@ -86,7 +86,7 @@ RECORDING = Product(
     {"measurements": MEASUREMENTS.replace("{batch}", "seeds_0-0")},
     record,
     from_case("gripper problem columns"),
-    lambda plan: [{"case": case} for case in plan.study.recorded],
+    lambda plan: wildcards_of(plan.study.recorded),
     message="Reading the recorded trace of {case}",
     reads={"recorded": Reads(lambda plan, job: [plan.study.case(job["case"]).file], one=True)},
 )

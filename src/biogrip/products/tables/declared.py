@@ -15,16 +15,9 @@ def table(
 ) -> Product:
     """Declare a table of the study, or of each of its cases or sweeps.
 
-    Parameters
-    ----------
-    make
-        Function that makes the table from what it uses and, by keyword, the files of `reads`.
-    name
-        Name of the product; by default that of its module.
-    stem
-        Path without suffix, if it is not ``results/tables/`` and the name.
-    declared
-        What else `biogrip.products.declared.shown` takes.
+    A function makes it from what it uses and, by keyword, the files of `reads`. Its name is by
+    default that of its module, and its path without suffix the name in ``results/tables/``. What
+    else can be declared is said by `biogrip.products.declared.shown`.
     """
 
     @wraps(make)

@@ -30,8 +30,12 @@ _COLUMNS = (
     Column("remark", "Remark"),
 )
 
-# Section 3: torque in N m, voltage in V as the paper rounds it.
-_PRINTED_VOLTAGES = ((1.6e-9, "about 17"), (0.32e-9, "about 7"))
+# Section 3: torque in N m, voltage in V as the paper rounds it, and a remark.
+_PRINTED_VOLTAGES = (
+    (1.6e-9, "about 17", "eq. (9) with Table 2"),
+    (0.32e-9, "about 7", "eq. (9) with Table 2"),
+    (1.6e-6, "about 17", "section 3 prints 1.6 uN m without the factor 1e-3"),
+)
 _PRINTED_GENE_VALUES = "9 or 12"
 
 
@@ -57,12 +61,9 @@ def evidence(
 def _actuator_rows(study: Study) -> list[tuple[Cell, ...]]:
     comb = study.actuator
     rows: list[tuple[Cell, ...]] = []
-    for torque, printed in _PRINTED_VOLTAGES:
+    for torque, printed, remark in _PRINTED_VOLTAGES:
         volts = float(actuator.voltage(comb, torque))
-        rows.append((f"voltage for {torque:g} N m", "V", printed, volts, "eq. (9) with Table 2"))
-    volts = float(actuator.voltage(comb, 1.6e-6))
-    remark = "section 3 prints 1.6 uN m without the factor 1e-3"
-    rows.append(("voltage for 1.6e-06 N m", "V", "about 17", volts, remark))
+        rows.append((f"voltage for {torque:g} N m", "V", printed, volts, remark))
     remark = "has to be less than the arm length"
     rows.append(("outer radius of the comb", "mm", None, 1e3 * comb.outer_radius_m, remark))
     return rows
@@ -73,30 +74,14 @@ def _gripper_rows(study: Study) -> list[tuple[Cell, ...]]:
     comb = study.actuator
     stroke = gripper.left.stiffness_Nm_per_rad * math.radians(comb.stroke_deg)
     volts = float(actuator.voltage(comb, stroke))
-    return [
-        ("arm length", "mm", None, 1e3 * gripper.arm_length_m, "from the config"),
-        (
-            "natural frequency of the free arm",
-            "Hz",
-            None,
-            gripper.left.natural_frequency_Hz,
-            "from the config",
-        ),
-        (
-            "quality factor of the free arm",
-            "",
-            None,
-            gripper.left.quality_factor,
-            "from the config",
-        ),
-        (
-            "voltage for the full stroke, no sample",
-            "V",
-            None,
-            volts,
-            "from the config's k_2",
-        ),
-    ]
+    arm = gripper.left
+    rows = (
+        ("arm length", "mm", 1e3 * gripper.arm_length_m, "config"),
+        ("natural frequency of the free arm", "Hz", arm.natural_frequency_Hz, "config"),
+        ("quality factor of the free arm", "", arm.quality_factor, "config"),
+        ("voltage for the full stroke, no sample", "V", volts, "config's k_2"),
+    )
+    return [(name, unit, None, value, f"from the {source}") for name, unit, value, source in rows]
 
 
 def _gene_rows(study: Study) -> list[tuple[Cell, ...]]:
@@ -135,21 +120,10 @@ def _axis_rows(case: Truth, traces: list[Path]) -> list[tuple[Cell, ...]]:
     remark = (
         f"median of {counted(len(extremes), 'noisy trace')}; the paper's is the end of its axis"
     )
+    ends = zip(("smallest", "largest"), axis, (low, high), strict=True)
     return [
-        (
-            f"{case.title}: smallest sample",
-            "mrad",
-            f"{1e3 * axis[0]:g}",
-            low,
-            remark,
-        ),
-        (
-            f"{case.title}: largest sample",
-            "mrad",
-            f"{1e3 * axis[1]:g}",
-            high,
-            remark,
-        ),
+        (f"{case.title}: {end} sample", "mrad", f"{1e3 * printed:g}", ours, remark)
+        for end, printed, ours in ends
     ]
 
 
