@@ -55,16 +55,10 @@ class _Factors:
 
 
 class Views:
-    """Modes of plausible samples, prepared for responses to many torques.
+    """Modes of plausible samples with inertia, prepared for responses to many torques.
 
-    Parameters
-    ----------
-    gripper, model
-        Arms and sample model of the simulation, with inertia; both arms are driven alike.
-    parameters : (n, n_parameters)
-        Parameters of the plausible samples.
-    elapsed_s : (n_times,)
-        Default times after a step at which responses are computed.
+    Both arms are driven alike. Responses are computed at times after a step, by default those given
+    here, (n_times,).
     """
 
     def __init__(

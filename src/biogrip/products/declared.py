@@ -29,20 +29,9 @@ def shown(
 ) -> Product:
     """Declare a product that the report shows: one of the study, or of each case or sweep.
 
-    Parameters
-    ----------
-    make
-        See `Product`, as are others of these names.
-    category, item, caption
-        Place and caption in the report.
-    kinds, path
-        Suffixes of its files, and their path without suffix; the case or sweep is appended.
-    cases
-        Names of the cases that have one; if not given, there is one for the study.
-    sweeps
-        True if there is one for each sweep.
-    when
-        Condition for a study to have it.
+    Arguments are those of `Product`, but for its files: they have the suffixes `kinds` after a
+    path, to which the case or sweep is appended. Without `cases` and `sweeps` there is one for the
+    study, in any case only where a study meets the condition `when`.
     """
     what = name.removesuffix("_of_case").removesuffix("_figure")
     whose = "{case}" if cases else "{sweep}" if sweeps else ""

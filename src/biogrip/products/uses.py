@@ -28,13 +28,9 @@ class Used:
 def using(names: str = "", **computed: Callable[[Any], object]) -> Callable[[Any], Any]:
     """Return a function that makes the view of a study or a case.
 
-    Parameters
-    ----------
-    names
-        Names of the attributes, separated by spaces, with dots for parts of them, e.g. ``"title
-        study.study_seed"``; a part of a mapping is an item.
-    computed
-        Attributes that are less than those of the whole, as functions of it.
+    Names of attributes are separated by spaces, with dots for parts of them, e.g. ``"title
+    study.study_seed"``; a part of a mapping is an item. Computed ones are less than those of the
+    whole, as functions of it.
     """
     parts: dict[str, list[str]] = {}
     for name in names.split():

@@ -67,12 +67,8 @@ def smooth_pieces(torque: TorqueHistory) -> list[tuple[float, float, Forcing]]:
 class Modes:
     """Modes of a system of springs and dampers.
 
-    Parameters
-    ----------
-    springs : (n_springs, n_states)
-        G: extension of each spring, times the root of its stiffness, by the states.
-    dampers : (n_states, n_states)
-        L, lower triangular.
+    Of the springs G is given, (n_springs, n_states): the extension of each, times the root of its
+    stiffness, by the states; of the dampers L, (n_states, n_states), lower triangular.
     """
 
     def __init__(self, springs: Array, dampers: Array) -> None:

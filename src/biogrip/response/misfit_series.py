@@ -36,14 +36,8 @@ _CLOSED_FORM = 2
 class SeriesMisfit:
     """RMS difference between the model's rotation and uniformly sampled traces.
 
-    Parameters
-    ----------
-    gripper, model, torque
-        Arms, sample model and protocol, of torque steps; the linear model without inertia.
-    interval_s
-        Sampling interval; the first sample is at t = 0.
-    rotation_rad : (n_samples,) or (n_traces, n_samples)
-        The measured closing rotation of the left arm.
+    For torque steps, by the linear model without inertia; the first sample is at t = 0. Traces of
+    the left arm are (n_samples,) or (n_traces, n_samples).
     """
 
     def __init__(

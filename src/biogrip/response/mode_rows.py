@@ -39,16 +39,8 @@ _TO_POWERS = np.linalg.inv(np.vander(_SHORT_NODES, increasing=True))
 class ModeRows:
     """Computes condensed rows of the responses of many samples, with their derivatives.
 
-    Parameters
-    ----------
-    torque
-        The protocol.
-    time_s : (n_times,)
-        Ascending times at which responses are evaluated.
-    to_rows : (n_times, n_rows)
-        Matrix that turns values there, multiplied from their right, into rows.
-    shortest_s
-        Shortest of these times after a change of torque.
+    A matrix, (n_times, n_rows), turns values at ascending times, multiplied from their right, into
+    rows; `shortest_s` is the shortest of these times after a change of torque.
     """
 
     def __init__(

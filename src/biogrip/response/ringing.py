@@ -123,17 +123,8 @@ def ringing_modes(
 ) -> Iterator[tuple[IntArray, tuple[Modes, ...]]]:
     """Yield modes with inertia, grouping samples with equal numbers of complex modes.
 
-    Parameters
-    ----------
-    gripper, model, parameters, symmetric, slopes
-        As in `compute_modes`.
-
-    Yields
-    ------
-    rows : (n_rows,)
-        Indices of the samples.
-    modes
-        Real modes, and complex modes of whose responses the real part is meant.
+    Arguments are those of `compute_modes`. With the indices of samples, (n_rows,), come their real
+    modes, and complex modes of whose responses the real part is meant.
     """
     network, count = complex_step_network(model, parameters, slopes=slopes)
     polynomials = compute_polynomials(gripper, network, count, symmetric=symmetric, inertia=True)
