@@ -58,22 +58,11 @@ def estimate_from_traces(
 ) -> Earlier:
     """Fit a trace, or several at once, and draw plausible samples from the likelihood.
 
-    Parameters
-    ----------
-    problem
-        One trace, or several of `biogrip.groups.replicates.joint_problem`.
-    noise_rad
-        Standard deviation of the noise, the same in all of them.
-    identify
-        Function that finds the global optimum.
-    within : (n_parameters,) each
-        Lowest and highest logarithms of parameters that are badly determined.
-    drawn
-        Number of samples; fewer are returned if too few draws are kept.
-    rng
-        Random generator of the draws.
-    before
-        Information of all but the last trace; the fit starts from its samples, too.
+    Several are a problem of `biogrip.groups.replicates.joint_problem`; the noise is the same in
+    all. A function identifies the global optimum. Parameters that are badly determined are drawn
+    within their lowest and highest logarithms, (n_parameters,) each. Fewer samples are returned
+    than asked for if too few draws are kept. From the samples of earlier information, which is that
+    of all but the last trace, the fit starts, too.
     """
     found = identify(problem)
     if before is not None:

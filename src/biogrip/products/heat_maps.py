@@ -21,17 +21,10 @@ from biogrip.study.sweeps import Axis
 class ShownAxis:
     """An axis of a sweep as it is shown."""
 
-    label: str
-    """Title, with the unit."""
+    title: str
+    """Title with the unit, marked if the paper does not give the values."""
     values: Mapping[str, str]
     """Values as shown, by their text in files."""
-    reconstructed: bool
-    """True if the paper does not give the values."""
-
-    @property
-    def title(self) -> str:
-        """Title, marked if the paper does not give the values."""
-        return f"{self.label}, reconstructed" if self.reconstructed else self.label
 
 
 @dataclass(frozen=True)
@@ -69,21 +62,17 @@ def heat_maps(study: Study, job: Wildcards) -> HeatMaps:
 
 def _shown(study: Study, axis: Axis) -> ShownAxis:
     keys = {key for value in axis.values for key in value.overrides}
-    return ShownAxis(
-        axis.label,
-        {value.text: value.shown for value in axis.values},
-        any(study.is_reconstructed(key) for key in keys),
-    )
+    title = axis.label + ", reconstructed" * any(map(study.is_reconstructed, keys))
+    return ShownAxis(title, {value.text: value.shown for value in axis.values})
 
 
-def points_of_cases() -> Reads:
-    """Return the input files with judged points, one per case of the job's sweep."""
-    return Reads(
-        lambda plan, job: [
-            POINTS.path.format(sweep=job["sweep"], case=case)
-            for case in plan.study.sweeps[job["sweep"]].cases
-        ]
-    )
+POINTS_OF_CASES = Reads(
+    lambda plan, job: [
+        POINTS.path.format(sweep=job["sweep"], case=case)
+        for case in plan.study.sweeps[job["sweep"]].cases
+    ]
+)
+"""The input files with judged points, one per case of the job's sweep."""
 
 
 def read_points(paths: list[Path], case: str) -> pd.DataFrame:

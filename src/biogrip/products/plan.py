@@ -64,8 +64,8 @@ class Plan:
     def batch_of_seed(self, pattern: str, case: str, seed: int) -> str:
         """Return a path pattern filled in with the batch that holds a seed."""
         batches = self.batches("identifications", case, self.study.shown)
-        found = [batch for batch in batches if batch.first <= seed <= batch.last]
-        batch = found[0] if found else Batch(seed, seed)
+        holding = (batch for batch in batches if batch.first <= seed <= batch.last)
+        batch = next(holding, Batch(seed, seed))
         return pattern.format(case=case, batch=batch.name)
 
     def batch_jobs(self, stage: str, cases: Iterable[str]) -> list[Wildcards]:

@@ -55,18 +55,9 @@ class _Piece:
 class DenseSamples:
     """Rows with the products of all readings, for any smooth functions of time.
 
-    Parameters
-    ----------
-    torque
-        The protocol; functions are smooth between its changes.
-    time_s : (n_samples,)
-        Ascending sampling times.
-    further_edges_s : (n_edges,)
-        Further times at which functions may be less smooth.
-    ringing_s
-        Time after a change of the torque in which functions are not smooth.
-    dense
-        True if nodes may replace readings; otherwise each reading is a node.
+    Functions are smooth between changes of the torque, but for `ringing_s` after each, and may be
+    less so at further edges, (n_edges,). Sampling times, (n_samples,), ascend. Only if `dense` may
+    nodes replace readings; otherwise each reading is a node.
     """
 
     def __init__(

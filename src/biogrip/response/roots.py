@@ -75,15 +75,9 @@ def find_zeros(
 ) -> ComplexArray:
     """Move points onto the zeros of functions, all zeros of each at once (Ehrlich-Aberth).
 
-    Parameters
-    ----------
-    z : (n, n_points)
-        Starts; for each function as many as it has zeros.
-    newton_step
-        Function divided by its derivative at such points.
-    between : (n, n_points, n_points), optional
-        Differences of the points' origins, if each point is counted from an origin of its own:
-        they are added to differences of points.
+    Starts are (n, n_points), for each function as many as it has zeros; a Newton step is the
+    function divided by its derivative. If each point is counted from an origin of its own, the
+    differences of origins, (n, n_points, n_points), are added to differences of points.
     """
     off_diagonal = ~np.eye(z.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -15,10 +15,10 @@ from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import PAGE_IN, figure, panel
 from biogrip.products.heat_maps import (
     CAPTION,
+    POINTS_OF_CASES,
     HeatMaps,
     headlines_of,
     heat_maps,
-    points_of_cases,
     read_points,
 )
 
@@ -156,6 +156,6 @@ ROBUSTNESS_FIGURE = drawing(
     file="robustness",
     caption=CAPTION,
     uses=heat_maps,
-    reads={"points": points_of_cases()},
+    reads={"points": POINTS_OF_CASES},
     sweeps=True,
 )

@@ -5,10 +5,10 @@ from pathlib import Path
 from biogrip.identify.success import near_noise_words
 from biogrip.products.heat_maps import (
     CAPTION,
+    POINTS_OF_CASES,
     HeatMaps,
     headlines_of,
     heat_maps,
-    points_of_cases,
     read_points,
 )
 from biogrip.products.tables.declared import table
@@ -80,6 +80,6 @@ ROBUSTNESS = table(
     item="robustness: {sweep}",
     caption=CAPTION,
     uses=heat_maps,
-    reads={"points": points_of_cases()},
+    reads={"points": POINTS_OF_CASES},
     sweeps=True,
 )
