@@ -254,13 +254,13 @@ def test_a_digest_refuses_what_it_does_not_know(value: object) -> None:
 
 def test_a_name_can_be_declared_once_only(monkeypatch: pytest.MonkeyPatch) -> None:
     from biogrip.products.figures import fit
-    from biogrip.products.tables import errors
+    from biogrip.products.tables import errors_of_case
 
     def draw() -> None:
         """Draw nothing."""
 
     draw.__module__ = fit.__name__
-    second = replace(errors.ERRORS, make=draw)
+    second = replace(errors_of_case.ERRORS, make=draw)
     monkeypatch.setattr(fit, "SECOND", second, raising=False)
     with pytest.raises(BiogripError, match=r"declares errors a second time"):
         products.__wrapped__()

@@ -116,12 +116,15 @@ def _quantities(
 
 
 def _input(make: Callable[[Study], Table], name: str, number: int, uses: Uses) -> Product:
-    caption = (
-        f"Table {number} of the paper. From the study's configuration. Values marked as "
-        "reconstructed are not given by the paper."
+    return table(
+        make,
+        name=name,
+        item=f"input: {name.replace('_', ' ')}",
+        caption=f"Table {number} of the paper. From the study's configuration. Values marked as "
+        "reconstructed are not given by the paper.",
+        uses=uses,
+        rule="tables",
     )
-    item = f"input: {name.replace('_', ' ')}"
-    return table(make, name=name, item=item, caption=caption, uses=uses, rule="tables")
 
 
 INPUTS = (
