@@ -74,13 +74,13 @@ def write_page(designs: Iterable[Designed], page: Path) -> None:
     template = Path(__file__).with_name("designed.html.j2").read_text(encoding="utf-8")
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        designs=[_compute_sensitivities(found) for found in designs],
+        designs=[_describe(found) for found in designs],
         written_by=f"{WRITTEN_BY} {__version__}",
     )
     write_text(page, text)
 
 
-def _compute_sensitivities(found: Designed) -> dict[str, Any]:
+def _describe(found: Designed) -> dict[str, Any]:
     plan, inputs = found.plan, found.inputs
     with styled():
         figures = [(title, embedded(drawn)) for title, drawn in drawings(found)]
