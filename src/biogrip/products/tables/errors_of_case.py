@@ -38,6 +38,7 @@ TYPICAL = (
     "misfit would be that of the quietest trace."
 )
 
+_STEM = "results/tables/errors"
 _WHOLE_NUMBERS = {"typical_seed", "seeds"}
 
 
@@ -143,21 +144,21 @@ _CAPTION = (
     "against each other, only the row c + c_p is determined."
 )
 
+ERRORS = table(
+    errors,
+    name="errors",
+    caption=_CAPTION,
+    uses=from_study("near_noise_tolerance"),
+    reads={"tables": of_cases(_STEM + "_{case}.csv", every)},
+)
+
 ERRORS_OF_CASE = table(
     errors_of_case,
-    stem="results/tables/errors",
+    stem=_STEM,
     item="errors",
     caption=_CAPTION,
     uses=from_case("name truth study.shown study.near_noise_tolerance"),
     reads={"identifications": the(PATH)},
     cases=every,
     weight=EVALUATION,
-)
-
-ERRORS = table(
-    errors,
-    name="errors",
-    caption=_CAPTION,
-    uses=from_study("near_noise_tolerance"),
-    reads={"tables": of_cases(ERRORS_OF_CASE.writes["csv"], every)},
 )
