@@ -4,6 +4,7 @@ PYTHON ?= python3
 JOBS ?= 2
 BIN := .venv/bin
 READY := .venv/.installed
+TEST_READY := .venv/.installed-tests
 # The libraries that benchmarks compare with stay out of the study's environment.
 BENCH_BIN := .venv-bench/bin
 BENCH_READY := .venv-bench/.installed
@@ -15,8 +16,15 @@ FIELD_READY := .venv-field/.installed
 SITE_BIN := .venv-site/bin
 SITE_READY := .venv-site/.installed
 
-LOCK := uv pip compile --universal --fork-strategy fewest --python-version 3.11 \
+LOCK := $(BIN)/uv pip compile --universal --fork-strategy fewest --python-version 3.11 \
   --generate-hashes --no-header --no-annotate --quiet
+
+# $(call locked,ENVIRONMENT,LOCKS): pip brings uv by a small lock, and uv all else, much faster.
+locked = $(1)/bin/python -m pip install --quiet --require-hashes -r requirements-install.lock && \
+  $(1)/bin/python -m uv pip install --quiet --python $(1)/bin/python --compile-bytecode --require-hashes \
+  $(addprefix -r ,$(2))
+ourselves = $(1)/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 
 # What runs in minutes: all but the tests that start Snakemake again and again. test_results.py runs
 # a small study from its targets to its report.
@@ -29,15 +37,15 @@ study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
 
 # One worker more than there are processors: some wait for the programs that they have started.
-test: $(READY)
+test: $(TEST_READY)
 	$(BIN)/python -m pytest -n $$(($(JOBS) + 1)) --dist worksteal
 
 # A small study and the quick tests, weekly and before a release: with the oldest versions that
 # pyproject.toml allows, and with whichever other Pythons there are, at least one.
 test-lowest:
 	$(PYTHON) -m venv --clear .venv-lowest
-	.venv-lowest/bin/python -m pip install --quiet --require-hashes -r requirements-lowest.lock
-	.venv-lowest/bin/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(call locked,.venv-lowest,requirements-lowest.lock)
+	$(call ourselves,.venv-lowest)
 	.venv-lowest/bin/ruff check .
 	.venv-lowest/bin/ruff format --check .
 	.venv-lowest/bin/snakefmt --check Snakefile workflow
@@ -48,8 +56,8 @@ test-pythons:
 	for version in 3.12 3.13; do \
 	  python$$version --version || { echo "test-pythons: skipped Python $$version, which is not there" >&2; continue; }; \
 	  python$$version -m venv --clear .venv-$$version && \
-	  .venv-$$version/bin/python -m pip install --quiet --require-hashes -r requirements.lock && \
-	  .venv-$$version/bin/python -m pip install --quiet --no-deps --no-build-isolation -e . && \
+	  $(call locked,.venv-$$version,requirements.lock requirements-dev.lock) && \
+	  $(call ourselves,.venv-$$version) && \
 	  .venv-$$version/bin/python -m pytest -q -n $(JOBS) $(QUICK) || exit 1; \
 	  ran="$$ran $$version"; \
 	done; \
@@ -70,14 +78,14 @@ publish: $(READY)
 publish-overlays: $(READY)
 	overlays=$$($(BIN)/snakemake --list-rules | grep ^publish_) && $(BIN)/snakemake -j$(JOBS) $$overlays
 
-lint: $(READY)
+lint: $(TEST_READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-format: $(READY)
+format: $(TEST_READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
@@ -94,7 +102,7 @@ report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
 
 # Config keys described from their classes, and a JSON Schema for editors; the tests fail if this is forgotten.
-docs: $(READY)
+docs: $(TEST_READY)
 	$(BIN)/python -m tests.generated_docs
 
 # A link or an anchor that leads nowhere is an error; not with --quiet, which counts no warnings.
@@ -102,17 +110,20 @@ site: $(SITE_READY)
 	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
 
 # The pictures that figures are compared with; look at what has changed before committing them.
-pinned: $(READY)
+pinned: $(TEST_READY)
 	$(BIN)/python -m pytest -q tests/products/figures/test_pinned.py --pin
 
-# Needs uv. The other locks hold only what running on Slurm, and benchmarks, add to the first, of
-# which they may need what is there for PyPy only.
-lock:
-	$(LOCK) pyproject.toml --extra dev --output-file requirements.lock
-	for extra in slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
-	  $(LOCK) pyproject.toml --extra $${extra%%:*} --constraints requirements.lock --output-file $${extra#*:} \
-	    $$(sed -n "/'pypy'/! s/^\([^ ]*\)==.*/--no-emit-package \1/p" requirements.lock) || exit 1; \
+# The second lock holds only what tests add to the first, and the next two what running on Slurm,
+# and benchmarks, add to both, of which they may need what is there for PyPy only.
+lock: $(READY)
+	$(LOCK) pyproject.toml --output-file requirements.lock
+	for extra in dev:requirements-dev.lock slurm:requirements-slurm.lock bench:benchmarks/requirements.lock; do \
+	  locks=requirements.lock; test $${extra%%:*} = dev || locks="$$locks requirements-dev.lock"; \
+	  $(LOCK) pyproject.toml --extra $${extra%%:*} $$(printf -- '--constraints %s ' $$locks) --output-file $${extra#*:} \
+	    $$(sed -n "/'pypy'/! s/^\([^ ]*\)==.*/--no-emit-package \1/p" $$locks) || exit 1; \
 	done
+	$(LOCK) --group install --constraints requirements.lock --constraints requirements-dev.lock \
+	  --output-file requirements-install.lock
 	$(subst 3.11,3.12,$(LOCK)) pyproject.toml benchmarks/field/requirements.in \
 	  --output-file benchmarks/field/requirements.lock
 	$(LOCK) --group docs --output-file docs/requirements.lock
@@ -123,24 +134,30 @@ clean:
 	test ! -x $(BIN)/biogrip || $(BIN)/biogrip clean
 	rm -rf .venv .venv-bench .venv-field .venv-site .venv-lowest .venv-3.12 .venv-3.13 .snakemake report.html site
 
-$(READY): requirements.lock pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install --quiet --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
-	touch $(READY)
+$(READY): requirements-install.lock requirements.lock pyproject.toml
+	@echo "Installing the $(call counted,requirements.lock) packages of requirements.lock into .venv: 0.9 GB, 20 to 60 seconds"
+	@test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	@$(call locked,.venv,requirements.lock)
+	@$(call ourselves,.venv)
+	@touch $(READY)
 
-$(BENCH_READY): requirements.lock benchmarks/requirements.lock pyproject.toml
+$(TEST_READY): $(READY) requirements-dev.lock
+	@echo "Installing the $(call counted,requirements-dev.lock) packages of requirements-dev.lock, too: 0.4 GB, 10 to 30 seconds"
+	@$(call locked,.venv,requirements.lock requirements-dev.lock)
+	@touch $(TEST_READY)
+
+$(BENCH_READY): requirements-install.lock requirements.lock requirements-dev.lock benchmarks/requirements.lock pyproject.toml
 	test -x $(BENCH_BIN)/python || $(PYTHON) -m venv .venv-bench
-	$(BENCH_BIN)/python -m pip install --quiet --require-hashes -r requirements.lock -r benchmarks/requirements.lock
-	$(BENCH_BIN)/python -m pip install --quiet --no-deps --no-build-isolation -e .
+	$(call locked,.venv-bench,requirements.lock requirements-dev.lock benchmarks/requirements.lock)
+	$(call ourselves,.venv-bench)
 	touch $(BENCH_READY)
 
-$(FIELD_READY): benchmarks/field/requirements.lock
+$(FIELD_READY): requirements-install.lock benchmarks/field/requirements.lock
 	test -x $(FIELD_BIN)/python || $(FIELD_PYTHON) -m venv .venv-field
-	$(FIELD_BIN)/python -m pip install --quiet --require-hashes -r benchmarks/field/requirements.lock
+	$(call locked,.venv-field,benchmarks/field/requirements.lock)
 	touch $(FIELD_READY)
 
-$(SITE_READY): docs/requirements.lock
+$(SITE_READY): requirements-install.lock docs/requirements.lock
 	test -x $(SITE_BIN)/python || $(PYTHON) -m venv .venv-site
-	$(SITE_BIN)/python -m pip install --quiet --require-hashes -r docs/requirements.lock
+	$(call locked,.venv-site,docs/requirements.lock)
 	touch $(SITE_READY)

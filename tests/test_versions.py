@@ -58,11 +58,54 @@ def test_locks_hold_hashes_and_no_addresses(lock: Path) -> None:
 
 
 def test_nothing_is_installed_that_is_not_locked() -> None:
-    installed = re.findall(r"pip install (.*)", (ROOT / "Makefile").read_text(encoding="utf-8"))
-    ourselves = "--no-deps --no-build-isolation -e ."
-    others = [arguments for arguments in installed if ourselves not in arguments]
-    assert len(others) > 3
-    assert [arguments for arguments in others if "--require-hashes -r " not in arguments] == []
+    """By pip only what brings uv and builds ourselves; by uv only what locks hold."""
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8").replace("\\\n", "")
+    installed = re.findall(r"(\w+) pip install ([^&\n]*)|-m pip install ([^&\n]*)", makefile)
+    by_uv = [arguments for program, arguments, _ in installed if program == "uv"]
+    by_pip = [" ".join(arguments.split()) for _, _, arguments in installed if arguments]
+    assert by_pip == [
+        "--quiet --require-hashes -r requirements-install.lock",
+        "--quiet --no-deps --no-build-isolation -e .",
+    ]
+    assert [arguments for arguments in by_uv if "--require-hashes" not in arguments] == []
+    assert len(by_uv) == len(installed) - 2 == 1
+    locks = re.findall(r"^\t.*\$\(call locked,[^,]+,([^)]+)\)", makefile, re.MULTILINE)
+    assert {lock for group in locks for lock in group.split()} == {
+        str(lock.relative_to(ROOT))
+        for lock in LOCKS
+        if lock.name not in ("requirements-install.lock", "requirements-slurm.lock")
+    }
+
+
+def pinned_in(*names: str) -> dict[str, set[str]]:
+    """The versions that locks name, by library."""
+    found = defaultdict(set)
+    for name in names:
+        for line in (ROOT / name).read_text(encoding="utf-8").splitlines():
+            if pin := PINNED.match(line):
+                found[pin[1]].add(pin[2])
+    return found
+
+
+def test_what_tests_need_is_locked_beside_what_a_study_needs() -> None:
+    """Neither holds what the other does, and none installs in its own version."""
+    study, dev = pinned_in("requirements.lock"), pinned_in("requirements-dev.lock")
+    assert {"numpy", "snakemake"} <= set(study)
+    assert {"pytest", "mypy", "playwright"} <= set(dev)
+    assert set(study) & set(dev) == set()
+    both = {**study, **dev}
+    installing = pinned_in("requirements-install.lock")
+    assert {"uv", "hatchling", "editables"} <= set(installing)
+    assert {name: both[name] for name in installing if name in both} == {
+        name: versions for name, versions in installing.items() if name in both
+    }
+
+
+def test_the_readme_counts_the_packages_that_are_installed() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    study, dev = pinned_in("requirements.lock"), pinned_in("requirements-dev.lock")
+    assert f"installs {len(study)} locked packages" in readme
+    assert f"installs {len(dev)} more, " in readme
 
 
 # In place of a Python: makes environments with itself in them, and has nothing to say.
