@@ -79,7 +79,11 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     text = "run a study"
-    more = "Config files (*.yaml) are laid over the default study; the rest goes to Snakemake."
+    more = (
+        "Config files (*.yaml) are laid over the default study; the rest goes to Snakemake. A "
+        "terminal shows one line per finished job, with --verbose all that Snakemake prints; "
+        ".snakemake/log has it anyway."
+    )
     run = commands.add_parser(
         "run",
         help=text,

@@ -1,10 +1,14 @@
 """Progress of long jobs, printed every few seconds, and warnings."""
 
+import os
 import sys
 import time
 from typing import Self
 
 from biogrip.terminal import visible, visible_lines
+
+QUIET = "BIOGRIP_QUIET"
+"""Environment variable; if set, jobs print warnings but no progress."""
 
 _EVERY_S = 5.0
 _CLEARED = "\r\x1b[K"
@@ -54,7 +58,7 @@ class Progress:
         said = f"{self._what}: {self._done} of {self._total} done{self._phase}{more}"
         if self._live:
             print(f"{_CLEARED}{said}", end="", file=sys.stderr, flush=True)
-        elif now - self._said >= _EVERY_S:
+        elif now - self._said >= _EVERY_S and QUIET not in os.environ:
             self._said = now
             # To standard output, so that it does not fill the job's log.
             print(said, flush=True)

@@ -132,7 +132,7 @@ def test_a_killed_run_continues_with_the_same_command(tiny: Path, tmp_path: Path
     alone = snakemake(tmp_path, ERRORS, config=TINY)
     assert alone.status == 1
     assert "--unlock" in alone.output
-    run = biogrip_run(tmp_path, ERRORS, config=TINY)
+    run = biogrip_run(tmp_path, ERRORS, "--quiet", "host", config=TINY)
     assert run.status == 0, run.output
     # Of four, one was there, but may not have been written down.
     assert 0 < run.jobs("identification") <= 4

@@ -63,7 +63,7 @@ def test_a_target_alone_is_made_again(tiny: Path, tmp_path: Path) -> None:
     shutil.copytree(tiny, folder, ignore=shutil.ignore_patterns(".snakemake"))
     target = "results/targets/liquid_drop_2.csv"
     before = (folder / target).read_bytes()
-    run = biogrip_run(folder, target, config=config)
+    run = biogrip_run(folder, target, "--quiet", "host", config=config)
     assert run.all_jobs() == {"target": 1}
     assert (folder / target).read_bytes() != before
     assert "Nothing to be done" in biogrip_run(folder, target, config=config).output

@@ -16,6 +16,7 @@ from typing import Any
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
+from biogrip.running import job_lines
 from biogrip.running.locks import is_locked, is_locked_by_dead
 from biogrip.running.manifest import Manifest
 from biogrip.running.provenance import Provenance
@@ -55,7 +56,8 @@ def prepared(arguments: Sequence[str]) -> list[str]:
     Returns
     -------
     list of str
-        Arguments of Snakemake, by which it makes outdated results again.
+        Arguments of Snakemake, by which it makes outdated results again, and prints one line per
+        job unless they ask for other output.
 
     Raises
     ------
@@ -86,8 +88,9 @@ def prepared(arguments: Sequence[str]) -> list[str]:
         needed = needed_for(map(os.path.normpath, options.targets), rules)
         stale = [file for file in made_otherwise(rules, RESULTS) if file in needed]
     done = True
-    again = [*(options.forcerun or ()), *stale]
-    return ["--forcerun", *again, *arguments] if stale else [*arguments]
+    again = ["--forcerun", *(options.forcerun or ()), *stale] if stale else []
+    own = options.dryrun or options.verbose or options.logger or options.quiet is not None
+    return [*([] if own else ["--logger", job_lines.NAME]), *again, *arguments]
 
 
 def look(rules: Sequence[ProductRule], results: Path) -> None:

@@ -63,9 +63,6 @@ def _run(arguments: Sequence[str], signals: "_Signals") -> int:
     command += ["--snakefile", str(snakefile()), *rest[:cut]]
     if not known.cores and not known.profile:
         command += ["--cores", "all"]
-    if not known.dry_run and known.quiet is None:
-        # By default hide reasons, which list every missing file; the log has them.
-        command += ["--quiet", "host", "reason"]
     if configs:
         command += ["--configfile", *map(str, configs)]
     status = signals.supervise([*command, *rest[cut:]])
@@ -114,7 +111,6 @@ def _known(rest: list[str]) -> argparse.Namespace:
     parser.add_argument("-d", "--directory")
     parser.add_argument("-c", "--cores", "-j", "--jobs", nargs="?", const="all")
     parser.add_argument("--profile", "--workflow-profile")
-    parser.add_argument("-q", "--quiet", nargs="*")
     known, _ = parser.parse_known_args(rest)
     return known
 

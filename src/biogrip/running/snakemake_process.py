@@ -5,10 +5,12 @@ Snakemake shows a traceback, or ignores the signal, if it is interrupted while i
 
 import atexit
 import gc
+import io
 import os
 import signal
 import sys
 import time
+from contextlib import nullcontext, redirect_stderr
 from pathlib import Path
 from types import FrameType
 
@@ -28,15 +30,26 @@ def main() -> None:
     for number in (signal.SIGINT, signal.SIGALRM):
         signal.signal(number, _stop)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
-    from snakemake.cli import main as snakemake
+    from snakemake import cli
+    from snakemake.exceptions import print_exception
 
-    from biogrip.running.preparation import prepared
+    from biogrip.running import preparation
+    from biogrip.running.job_lines import register
     from biogrip.running.wholeness import message_only
 
     sys.argv[0] = "snakemake"
+    register()
     with message_only():
-        sys.argv[1:] = prepared(sys.argv[1:])
-    snakemake()
+        sys.argv[1:] = preparation.prepared(sys.argv[1:])
+    # What has been checked can be parsed; that would only print the name of the profile.
+    with redirect_stderr(io.StringIO()) if preparation.done else nullcontext():
+        parser, options = cli.parse_args(sys.argv[1:])
+    try:
+        status = 0 if cli.args_to_api(options, parser) else 1
+    except Exception as error:
+        print_exception(error)
+        status = 1
+    sys.exit(status)
 
 
 def _stop(_: int, frame: FrameType | None) -> None:
