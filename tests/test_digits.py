@@ -22,7 +22,7 @@ def test_notes_on_one_of_something_are_sentences() -> None:
     assert note == "Left out for want of a number: 1 row of 801."
     residual = np.random.default_rng(3).standard_normal(60)
     residual[30] = 30.0
-    said = " ".join(doubts_about_noise(residual))
+    said = " ".join(doubts_about_noise(residual, np.ones(60)))
     assert "from the samples around: 1 outlier, as of Gaussian noise only once in" in said
 
 

@@ -120,3 +120,19 @@ def test_what_is_declared_is_not_suspected(tmp_path: Path) -> None:
         wanted = IdentifyOptions(file, "liquid_drop", declared, few)
         notes = identify_trace(wanted, tmp_path / "t.json").data["notes"]
         assert any("--offset --drift" in note["text"] for note in notes) == (not declared.drift)
+
+
+def test_under_a_constant_torque_a_drift_is_not_told_from_flow(tmp_path: Path) -> None:
+    """A drop that flows, read as one that does not, is not said to drift."""
+    held = tmp_path / "held.yaml"
+    held.write_text("protocol: {phases: [{duration_s: 200.0, torque_Nm: 1.6e-9}]}\n")
+    file = written(tmp_path / "t.csv", trace(0, 0 * DRIFT))
+    rows = file.read_text().splitlines()
+    file.write_text("\n".join(rows[: 1 + np.count_nonzero(TIMES <= 200)]) + "\n")
+    found = identify_trace(
+        IdentifyOptions(file, "kelvin_voigt", UNDECLARED, held), tmp_path / "t.json"
+    )
+    (said,) = [note["text"] for note in found.data["notes"] if "χ² falls" in note["text"]]
+    assert "the instrument drifts, or the sample flows" in said
+    assert "--drift" not in said
+    assert "would be" not in said

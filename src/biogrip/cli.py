@@ -230,8 +230,10 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
     command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
     command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
-    command.add_argument("--offset", action="store_true", help="fit an offset along")
-    command.add_argument("--drift", action="store_true", help="fit a linear drift along")
+    for name, what in (("--offset", "an offset"), ("--drift", "a linear drift")):
+        command.add_argument(
+            name, action=argparse.BooleanOptionalAction, help=f"fit {what} along, or not"
+        )
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:

@@ -22,6 +22,7 @@ from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import identify_from
+from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
 from biogrip.own_traces.second_opinion import fall_of
@@ -128,8 +129,10 @@ def seen(kind: Kind, seed: int) -> Seen:
     ignored = _likelihood(plain, find(plain))
     more = replace(case_problem, offset=True, drift=True).of(time_s, trace)
     fall = fall_of(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
-    doubts = list(doubts_about_noise(plain.residuals(ignored.best)[0]))
-    assumed = replace(case_problem, coloured=True)
+    residual = plain.residuals.left(ignored.best)
+    growth = compute_growth(residual, plain.residuals.rotation(ignored.best))
+    doubts = list(doubts_about_noise(residual, growth))
+    assumed = replace(case_problem, coloured=True, offset=True, drift=True)
     if kind.gripper:
         known = {
             "stiffness_Nm_per_rad": kind.gripper * case_problem.gripper.left.stiffness_Nm_per_rad

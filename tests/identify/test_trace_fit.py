@@ -129,7 +129,7 @@ def test_an_uncertain_gripper_is_one_more_parameter_with_a_prior() -> None:
 def test_noise_is_found_and_said() -> None:
     noise = Noise("gaussian", 0.02, "peak", ar1=AR1(0.5, 5.0), drift=Drift(2.0))
     noise = replace(noise, outliers=Outliers(0.01, 30.0))
-    case_problem = replace(POSED, coloured=True)
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
     fit = trace_fit(case_problem, TIMES, noisy(noise), find)
     assert fit.noise_model is not None
     assert fit.noise_model.ar1 + fit.noise_model.flicker == pytest.approx(0.5, abs=0.25)
@@ -147,7 +147,7 @@ def test_noise_is_found_and_said() -> None:
 
 def test_a_drift_changes_nothing_of_what_is_found() -> None:
     """It is fitted along whether it is there or not, so the same noise gives the same limits."""
-    case_problem = replace(POSED, coloured=True)
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
     steady = Noise("gaussian", 0.02, "peak")
     drift = 3 * 0.02 * CLEAN.max() * TIMES / TIMES[-1]
     one, other = (
@@ -158,8 +158,38 @@ def test_a_drift_changes_nothing_of_what_is_found() -> None:
     np.testing.assert_allclose(first @ first.T, second @ second.T, rtol=1e-2, atol=1e-18)
 
 
+def test_noise_that_grows_with_the_rotation_leaves_good_samples_in() -> None:
+    """Three spikes are struck, each of fifteen times the noise of its sample."""
+    case_problem = replace(POSED, coloured=True, offset=True, drift=True)
+    trace = noisy(Noise("gaussian", 0.05, "signal"))
+    spikes = [200, 500, 700]
+    spiked = trace.copy()
+    spiked[spikes] += 15 * 0.05 * CLEAN[spikes]
+    assert not trace_fit(case_problem, TIMES, trace, find).outliers.any()
+    fit = trace_fit(case_problem, TIMES, spiked, find)
+    np.testing.assert_array_equal(np.flatnonzero(fit.outliers), spikes)
+    assert fit.noise_model is not None
+    assert fit.noise_model.proportional > 0.9
+    assert "that grows with the rotation" in fit.notes()[0]
+    assert fit.noise_data()["proportional"] > 0.9  # type: ignore[index, operator]
+
+
+@pytest.mark.parametrize(
+    ("offset", "said"),
+    [
+        (True, "an offset of the instrument is fitted along, and the intervals allow"),
+        (False, "; the intervals allow for all of it"),
+    ],
+)
+def test_a_drift_is_fitted_only_where_it_is_wanted(offset: bool, said: str) -> None:
+    case_problem = replace(POSED, coloured=True, offset=offset)
+    fit = trace_fit(case_problem, TIMES, noisy(Noise("gaussian", 0.02, "peak")), find)
+    assert fit.problem.residuals.free == len(TIMES) - offset
+    assert said in fit.notes()[0]
+
+
 def test_too_many_samples_for_a_colour_are_refused() -> None:
-    case_problem: CaseProblem = replace(POSED, coloured=True)
+    case_problem: CaseProblem = replace(POSED, coloured=True, offset=True, drift=True)
     times = np.linspace(0, 400, MOST_SAMPLES + 1)
     with pytest.raises(BiogripError, match="allowed are at most 50000 with a coloured"):
         trace_fit(case_problem, times, times, find)

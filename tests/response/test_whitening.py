@@ -9,20 +9,22 @@ from biogrip.experiment.noise_parts import flicker_rates
 from biogrip.experiment.protocol import sample_times
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis, with_uncertain, without
-from biogrip.response.whitening import NoiseModel, Whitening
+from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
 from tests.helpers.problems import MODEL, SAMPLES, TORQUE, posed_for
 
 UNEVEN = np.cumsum(np.random.default_rng(3).exponential(1.0, 300))
 COLOURS = [NoiseModel(0.3, 5.0, 0.2), NoiseModel(0.999, 0.2, 0.0), NoiseModel(1e-5, 100.0, 0.9)]
 
 
-def correlation(time_s: Array, noise_model: NoiseModel) -> Array:
+def correlation(time_s: Array, noise_model: NoiseModel, growing: Array | None = None) -> Array:
     """The matrix as it is defined."""
+    grown = np.ones(len(time_s)) if growing is None else growing**2 / np.mean(growing**2)
     apart = np.abs(np.subtract.outer(time_s, time_s))
     rates = flicker_rates(time_s)
     flicker = np.mean([np.exp(-rate * apart) for rate in rates], axis=0)
     matrix: Array = (
         noise_model.white * np.eye(len(time_s))
+        + noise_model.proportional * np.diag(grown)
         + noise_model.ar1 * np.exp(-apart / noise_model.time_s)
         + noise_model.flicker * flicker
     )
@@ -46,6 +48,24 @@ def test_noise_of_the_colour_becomes_white(noise_model: NoiseModel) -> None:
     root = cholesky(correlation(UNEVEN, noise_model), lower=True)
     white = Whitening(UNEVEN, noise_model, np.zeros((0, 300)))(root.T)
     np.testing.assert_allclose(white.T @ white, np.eye(300), atol=1e-8)
+
+
+def test_noise_that_grows_becomes_as_white() -> None:
+    noise_model, growing = NoiseModel(0.2, 5.0, 0.1, 0.6), np.linspace(-3.0, 0.5, 300) ** 3
+    matrix = correlation(UNEVEN, noise_model, growing)
+    whitening = Whitening(UNEVEN, noise_model, np.zeros((0, 300)), growing=growing)
+    white = whitening(cholesky(matrix, lower=True).T)
+    np.testing.assert_allclose(white.T @ white, np.eye(300), atol=1e-8)
+    assert whitening.log_determinant == pytest.approx(np.linalg.slogdet(matrix)[1], rel=1e-10)
+    assert np.mean(np.diagonal(matrix)) == pytest.approx(1.0)
+
+
+def test_given_deviations_divide() -> None:
+    rng = np.random.default_rng(5)
+    deviations, rows = rng.uniform(0.1, 9.0, 300), rng.standard_normal((2, 300))
+    white = Whitening(UNEVEN, WEIGHTED, np.zeros((0, 300)), growing=deviations)(rows)
+    expected = rows / deviations * np.sqrt(np.mean(deviations**2))
+    np.testing.assert_allclose(white, expected, rtol=1e-12)
 
 
 def test_nuisance_and_what_is_uncertain_are_parts_of_the_noise() -> None:

@@ -274,3 +274,9 @@ def test_a_coloured_noise_model_has_every_identification_fit_an_offset_and_a_dri
     study = study_of(f"measurement: {{rate_Hz: 1.0, noise_model: {noise_model}}}")
     found = {(case.problem.offset, case.problem.drift) for case in study.cases.values()}
     assert found == {(along, along)}
+
+
+def test_a_drift_that_is_refused_is_not_fitted() -> None:
+    study = study_of("measurement: {rate_Hz: 1.0, noise_model: coloured, drift: false}")
+    found = {(case.problem.offset, case.problem.drift) for case in study.cases.values()}
+    assert found == {(True, False)}

@@ -78,6 +78,10 @@ class JointResiduals(Residuals):
         """Return residuals only, trace after trace, (n_samples,) in rad."""
         return self._side_by_side([part.left(log_parameters) for part in self._parts])
 
+    def rotation(self, log_parameters: Array) -> Array:
+        """Return the simulated rotation, trace after trace, (n_samples,) in rad."""
+        return self._side_by_side([part.rotation(log_parameters) for part in self._parts])
+
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the noise's correlation, of the trace that has least."""

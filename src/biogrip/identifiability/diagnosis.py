@@ -14,9 +14,11 @@ from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, f
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
+from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.response.grip import Grip
+from biogrip.response.residuals import estimate_noise
 
 # A misfit larger than the scatter of neighbouring readings by this factor is not noise.
 _TOO_MUCH = 1.2
@@ -142,7 +144,8 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
         return
     residual = residuals.left(likelihood.best)
-    doubts = list(doubts_about_noise(residual))
+    growth = compute_growth(residual, residuals.rotation(likelihood.best))
+    doubts = list(doubts_about_noise(residual, growth))
     yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
         yield Note(
@@ -157,7 +160,10 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
             "fit leaves: its value, or its unit, is not the right one.",
         )
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
-    scale, bulk = residuals.noise_scale_rad, residual[~outliers_of(residual)]
+    scale, even = residuals.noise_scale_rad, residual / growth
+    if np.ptp(growth):
+        scale = max(scale, estimate_noise(even))
+    bulk = even[~outliers_of(even)]
     bulk_rad = float(np.sqrt(np.mean(bulk**2)))
     if bulk_rad > _TOO_MUCH * scale:
         yield Note(

@@ -17,14 +17,25 @@ _CORRELATED = 5.0
 _STRETCHES, _SHORTEST = 20, 5
 
 
-def doubts_about_noise(residual: Array) -> Iterator[str]:
+def doubts_about_noise(residual: Array, growth: Array) -> Iterator[str]:
     """Yield a sentence for each test of white noise that the residuals of a fit fail.
 
     Parameters
     ----------
     residual : (n_samples,)
         Residuals of the fit.
+    growth : (n_samples,)
+        Growth of the noise with the rotation, see `compute_growth`. All other tests are of what
+        it leaves.
     """
+    if np.ptp(growth):
+        low, high = np.quantile(growth, (0.05, 0.95))
+        yield (
+            f"The noise grows with the rotation: it is {high / low:.2g} times as large for the "
+            "largest tenth of the rotations as for the smallest, and neither the weights of the "
+            "readings nor the intervals allow for that."
+        )
+        residual = residual / growth
     correlation = float(np.dot(residual[1:], residual[:-1]) / np.dot(residual, residual))
     chance = uneven(residual)
     if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):

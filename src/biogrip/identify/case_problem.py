@@ -164,7 +164,13 @@ class CaseProblem:
         return nuisance_basis(time_s, offset=self.offset, drift=self.drift)
 
     def in_noise(
-        self, time_s: Array, noise_model: NoiseModel | None, uncertain: Array, *, inertia: bool
+        self,
+        time_s: Array,
+        noise_model: NoiseModel | None,
+        uncertain: Array,
+        *,
+        inertia: bool,
+        growing: Array | None = None,
     ) -> Condensed:
         """Condense the readings for autocorrelated noise or an uncertain gripper.
 
@@ -178,10 +184,12 @@ class CaseProblem:
             Functions added with a random amplitude, see `with_uncertain`.
         inertia
             True to include the inertia of the arms.
+        growing : (n_samples,), optional
+            Rotation that noise grows with, see `Whitening`.
         """
         nuisance, whitening = self.nuisance(time_s), None
         if noise_model is not None:
-            whitening = Whitening(time_s, noise_model, nuisance, uncertain)
+            whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)
 
     def _condense(

@@ -24,6 +24,8 @@ _LEAST, _MOST = -9.0, 7.0
 # The likelihood has several maxima. Grid of log odds, and of places between the shortest and the
 # longest time; starts are the best points with more ar1, and with more 1/f noise.
 _ODDS, _PLACES = (_LEAST, -4.0, -1.0, 2.0, 6.0), (0.15, 0.35, 0.6, 0.85)
+# Of white noise, the logarithm of odds of a part that grows with the rotation; starts, bounds.
+_GROWING, _ALL_GROWS = (0.0, 5.0, 10.0), (_LEAST, 20.0)
 _STEP, _CONVERGED = 1e-4, 1e-9
 # Step of finite differences.
 _APART = 0.1
@@ -42,14 +44,19 @@ class NoiseModelLikelihood:
         Residuals of the fit.
     directions : (n_directions, n_samples)
         Directions that the fit absorbs: derivatives by the parameters, and nuisance functions.
+    growing : (n_samples,), optional
+        Rotation that a part of the white noise grows with; by default none does.
     """
 
-    def __init__(self, time_s: Array, residual: Array, directions: Array) -> None:
-        self._time_s, self._residual = time_s, residual
+    def __init__(
+        self, time_s: Array, residual: Array, directions: Array, growing: Array | None = None
+    ) -> None:
+        self._time_s, self._residual, self._growing = time_s, residual, growing
         self._reached = _independent(directions)
         shortest, longest = float(np.diff(time_s).min()), float(time_s[-1] - time_s[0])
         times = float(np.log(shortest / 2)), float(np.log(longest))
         self._bounds = [(_LEAST, _MOST), times, (_LEAST, _MOST)]
+        self._bounds += [_ALL_GROWS] if growing is not None else []
 
     def best(self, near: NoiseModel | None = None) -> NoiseModel:
         """Return the noise model of highest likelihood, starting from `near` if it is given."""
@@ -90,7 +97,7 @@ class NoiseModelLikelihood:
         """
 
         def variances(x: Array) -> Array:
-            white = Whitening(self._time_s, _noise_model(x), nuisance)(sensitivity)
+            white = self._whitening(x, nuisance)(sensitivity)
             # Every parameter has a prior standard deviation of 1, as in `Likelihood.deviation`.
             inverse = np.linalg.inv(white @ white.T + np.eye(len(white)))
             return np.log(np.diagonal(inverse)) + 2 * self._log_scale(x)
@@ -131,36 +138,47 @@ class NoiseModelLikelihood:
 
     def _parts(self, x: Array) -> tuple[float, float, float]:
         """Return a sum of squares, and log determinants of absorbed directions and of all noise."""
-        whitening = Whitening(self._time_s, _noise_model(x), np.zeros((0, len(self._time_s))))
+        whitening = self._whitening(x, np.zeros((0, len(self._time_s))))
         white = whitening(np.vstack((self._reached, self._residual)))
         basis, triangle = np.linalg.qr(white[:-1].T)
         left = white[-1] - basis @ (basis.T @ white[-1])
         of_reached = 2 * float(np.sum(np.log(np.abs(np.diagonal(triangle)))))
         return float(left @ left), of_reached, whitening.log_determinant
 
+    def _whitening(self, x: Array, nuisance: Array) -> Whitening:
+        return Whitening(self._time_s, _noise_model(x), nuisance, growing=self._growing)
+
     def _best_of_each(self) -> list[Array]:
         """Return the best points of a grid with more ar1, and with more 1/f noise."""
         shortest, longest = self._bounds[1]
         tried = [
-            np.array([ar1, shortest + place * (longest - shortest), flicker])
+            np.array([ar1, shortest + place * (longest - shortest), flicker, *growing])
             for ar1 in _ODDS
             for place in (_PLACES if ar1 > _LEAST else _PLACES[:1])
             for flicker in _ODDS
+            for growing in ([()] if self._growing is None else [(odds,) for odds in _GROWING])
         ]
         sides = [x for x in tried if x[0] > x[2]], [x for x in tried if x[0] <= x[2]]
         return [min(side, key=self._deviance) for side in sides]
 
 
 def _logarithms(noise_model: NoiseModel) -> Array:
-    odds = np.array([noise_model.ar1, noise_model.flicker]) / noise_model.white
-    return np.array([np.log(odds[0]), np.log(noise_model.time_s), np.log(odds[1])])
+    independent = noise_model.white + noise_model.proportional
+    odds = np.array([noise_model.ar1, noise_model.flicker]) / independent
+    logarithms = [np.log(odds[0]), np.log(noise_model.time_s), np.log(odds[1])]
+    if noise_model.proportional:
+        logarithms.append(np.log(noise_model.proportional / noise_model.white))
+    return np.array(logarithms)
 
 
 def _noise_model(x: Array) -> NoiseModel:
-    """Return the noise model of two log odds and the logarithm of a time."""
+    """Return the noise model of log odds and the logarithm of a time."""
     ar1, flicker = np.exp(x[0]), np.exp(x[2])
     whole = 1 + ar1 + flicker
-    return NoiseModel(float(ar1 / whole), float(np.exp(x[1])), float(flicker / whole))
+    growing = 1 / (1 + np.exp(-x[3])) / whole if len(x) > 3 else 0.0
+    return NoiseModel(
+        float(ar1 / whole), float(np.exp(x[1])), float(flicker / whole), float(growing)
+    )
 
 
 def _independent(directions: Array) -> Array:

@@ -7,9 +7,11 @@ from biogrip.arrays import Array, BoolArray
 FAR = 4.5
 """Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""
 
-# Width of the running median that follows slow noise, and MAD of the normal distribution.
+GAUSSIAN = 0.6744897501960817
+"""Median absolute deviation of a normal distribution, in standard deviations."""
+
+# Width of the running median that follows slow noise.
 _AROUND = 11
-_GAUSSIAN = 0.6744897501960817
 
 
 def outliers_of(residual: Array) -> BoolArray:
@@ -18,7 +20,7 @@ def outliers_of(residual: Array) -> BoolArray:
     Parameters
     ----------
     residual : (n_samples,)
-        Residuals of a fit.
+        Residuals of a fit, over the noise's standard deviation where that is not the same.
 
     Returns
     -------
@@ -31,12 +33,18 @@ def outliers_of(residual: Array) -> BoolArray:
     .. [1] F. R. Hampel, The influence curve and its role in robust estimation, Journal of the
        American Statistical Association 69 (1974), 383-393.
     """
-    from scipy.ndimage import median_filter
-
-    apart = np.abs(residual - median_filter(residual, _AROUND, mode="nearest"))
+    apart = measure_distances(residual)
     # One residual in eleven is that median itself.
     others = apart[apart > 0]
     if not len(others):
         return np.zeros(len(residual), dtype=bool)
-    found: BoolArray = apart > FAR * np.median(others) / _GAUSSIAN
+    found: BoolArray = apart > FAR * np.median(others) / GAUSSIAN
     return found
+
+
+def measure_distances(residual: Array) -> Array:
+    """Measure how far residuals are from the median of the eleven around, (n_samples,)."""
+    from scipy.ndimage import median_filter
+
+    apart: Array = np.abs(residual - median_filter(residual, _AROUND, mode="nearest"))
+    return apart

@@ -16,10 +16,12 @@ from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.multi_start import fit_from
+from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.identify.uncertain_gripper import gripper_functions
+from biogrip.response.flow import drift_is_flow
 from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
 
 _ROUNDS = 5
@@ -50,12 +52,15 @@ class TraceFit:
         Autocorrelation model of the noise; None if the noise was assumed to be white.
     outliers : (n_samples,)
         True for readings that were left out.
+    fitted_along
+        Terms of the instrument that were fitted along, in words.
     """
 
     problem: Problem
     found: Identification
     noise_model: NoiseModel | None
     outliers: BoolArray
+    fitted_along: str = ""
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return the estimated noise model as plain data; None if noise was assumed white."""
@@ -95,9 +100,11 @@ class TraceFit:
             )
         if noise_model.flicker >= _WORTH_SAYING:
             parts.append(f"{_percent(noise_model.flicker)} 1/f")
+        if noise_model.proportional >= _WORTH_SAYING:
+            parts.append(f"{_percent(noise_model.proportional)} that grows with the rotation")
         said = [
-            f"Noise model: of the variance {', '.join(parts)}; an offset and a drift of the "
-            "instrument are fitted along, and the intervals allow for all of it."
+            f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
+            "the intervals allow for all of it."
         ]
         if left_out:
             samples = counted(left_out, "sample")
@@ -110,8 +117,9 @@ def trace_fit(
 ) -> TraceFit:
     """Fit a trace and, if wanted, estimate the model of its noise.
 
-    With a coloured noise model, outliers are removed, an offset and a drift are fitted as
-    nuisance parameters, and the noise is a sum of white, Ornstein-Uhlenbeck and 1/f noise. The
+    With a coloured noise model, outliers are removed, and the noise is a sum of white,
+    Ornstein-Uhlenbeck and 1/f noise. If it grows with the rotation, so does a part of the white
+    noise: the parts whose readings depend on each other are of the instrument's zero. The
     effect of the gripper's uncertainty on the rotation is one more component of the noise.
 
     Parameters
@@ -140,7 +148,6 @@ def trace_fit(
                 f"found {len(time_s)} samples, allowed are at most {MOST_SAMPLES} with a coloured "
                 "noise model: average neighbouring samples."
             )
-        case_problem = replace(case_problem, offset=True, drift=True)
         kept, plain, found = _without_outliers(case_problem, time_s, rotation_rad, find)
     time_s, rotation_rad = time_s[kept], rotation_rad[kept]
     problem, found, noise_model = _in_turn(case_problem, time_s, rotation_rad, plain, found)
@@ -148,7 +155,17 @@ def trace_fit(
     other = find(problem)
     if np.float32(other.misfit_rad) < np.float32(found.misfit_rad):
         found = other
-    return TraceFit(problem, found, noise_model, ~kept)
+    return TraceFit(problem, found, noise_model, ~kept, _fitted_along(case_problem, time_s))
+
+
+def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
+    terms = ["an offset"] * case_problem.offset + ["a drift"] * case_problem.drift
+    if not terms:
+        return ""
+    or_flow = " (or the sample flows: under this torque both give the same line)"
+    doubt = or_flow if case_problem.drift and drift_is_flow(case_problem.torque, time_s) else ""
+    verb = "are" if len(terms) > 1 else "is"
+    return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"
 
 
 def _without_outliers(
@@ -158,7 +175,8 @@ def _without_outliers(
     for _ in range(_ROUNDS):
         plain = case_problem.of(time_s[kept], rotation_rad[kept])
         found = find(plain)
-        struck = outliers_of(plain.residuals(np.log(found.parameters))[0])
+        residual = plain.residuals.left(logs := np.log(found.parameters))
+        struck = outliers_of(residual / compute_growth(residual, plain.residuals.rotation(logs)))
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False
@@ -174,6 +192,9 @@ def _in_turn(
 ) -> tuple[Problem, Identification, NoiseModel | None]:
     """Estimate the noise from the residuals and fit again with it, until the fit converges."""
     problem, noise_model = plain, None
+    logs = np.log(found.parameters)
+    growth = compute_growth(plain.residuals.left(logs), plain.residuals.rotation(logs))
+    grows = case_problem.coloured and np.ptp(growth) > 0
     for _ in range(_ROUNDS):
         start = np.log(found.parameters)
         residual, sensitivity = plain.residuals(start)
@@ -182,13 +203,14 @@ def _in_turn(
         left = problem.residuals.free - len(found.parameters)
         noise_rad = case_problem.noise_rad or found.misfit_rad * np.sqrt(len(time_s) / left)
         before: NoiseModel | None = noise_model
+        growing = plain.residuals.rotation(start) if grows else None
         if case_problem.coloured:
             nuisance = case_problem.nuisance(time_s)
             directions = np.vstack((sensitivity, nuisance, uncertain))
-            likelihood = NoiseModelLikelihood(time_s, residual, directions)
+            likelihood = NoiseModelLikelihood(time_s, residual, directions, growing)
             noise_model = likelihood.best(near=before)
         condensed = case_problem.in_noise(
-            time_s, noise_model, uncertain / noise_rad, inertia=inertia
+            time_s, noise_model, uncertain / noise_rad, inertia=inertia, growing=growing
         )
         problem = case_problem.of(time_s, rotation_rad, condensed=condensed)
         found = found.at(fit := fit_from([problem], start))
@@ -205,7 +227,8 @@ def _in_turn(
 def _alike(one: NoiseModel | None, other: NoiseModel | None) -> bool:
     if one is None or other is None:
         return one is other
-    shares = abs(one.ar1 - other.ar1) + abs(one.flicker - other.flicker)
+    names = ("ar1", "flicker", "proportional")
+    shares = sum(abs(getattr(one, name) - getattr(other, name)) for name in names)
     times = min(one.ar1, other.ar1) * abs(np.log(one.time_s / other.time_s))
     return bool(shares + times < _CONVERGED)
 

@@ -78,8 +78,8 @@ def _make_problem(recorded: Recorded, read_as: ReadAs, noise_rad: float) -> Prob
     case_problem = replace(
         problem,
         noise_rad=noise_rad,
-        offset=problem.offset or read_as.offset,
-        drift=problem.drift or read_as.drift,
+        offset=problem.offset if read_as.offset is None else read_as.offset,
+        drift=problem.drift if read_as.drift is None else read_as.drift,
     )
     trace = read_as.read(recorded.file, recorded.case.gripper, case_problem)
     return case_problem.of(trace.time_s, trace.rotation_rad[0])

@@ -28,7 +28,7 @@ class ReadAs:
     noise_rad
         Standard deviation of the noise, if it is known.
     offset, drift
-        If true, fit a constant or a linear drift of the instrument along.
+        If true, fit a constant or a linear drift of the instrument along; if None, as by default.
     noise_model
         Noise model, ``white`` or ``coloured``.
     """
@@ -38,8 +38,8 @@ class ReadAs:
     time_unit: str | None = None
     rotation_unit: str | None = None
     noise_rad: float | None = None
-    offset: bool = False
-    drift: bool = False
+    offset: bool | None = None
+    drift: bool | None = None
     noise_model: str | None = None
 
     @property

@@ -14,6 +14,7 @@ from biogrip.identify.answer import Progress
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.multi_start import fit_from
 from biogrip.products.files.traces import Measurements
+from biogrip.response.flow import drift_is_flow
 from biogrip.study.study import Case, Study
 
 
@@ -38,11 +39,12 @@ def second_opinion(
     Returns
     -------
     list of Note
-        At most one. Empty if both terms are declared already, or the model is nonlinear.
+        At most one. Empty if both terms are declared already, if the model is nonlinear, or if the
+        noise model is coloured, which fits both unless they are refused.
     """
     case_problem = case.problem
     added = 2 - case_problem.offset - case_problem.drift
-    if not added or case_problem.nonlinear:
+    if not added or case_problem.nonlinear or case_problem.coloured:
         return []
     also = replace(case_problem, offset=True, drift=True)
     problem = also.of(recorded.time_s, recorded.rotation_rad[0])
@@ -69,13 +71,23 @@ def second_opinion(
         for before, after in zip(diagnosis.findings, other.findings, strict=True)
         if _differ(before, after)
     ]
-    text = (
-        "An offset and a drift of the instrument, fitted along, explain the trace far better "
-        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} "
-        f"traces): {'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, "
-        "identify the trace with --offset --drift. If the sample flows, it may be its flow: under "
-        "a constant torque a drift and a damper without a spring give the same line."
+    better = (
+        "explain the trace far better "
+        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
     )
+    if not case_problem.drift and drift_is_flow(case_problem.torque, recorded.time_s):
+        text = (
+            f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
+            "sample flows. Under this torque both give the same line, and the trace cannot tell "
+            "which it is: a torque that changes would."
+        )
+    else:
+        text = (
+            f"An offset and a drift of the instrument, fitted along, {better}: "
+            f"{'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, identify "
+            "the trace with --offset --drift. Or the sample flows: as long as the torque is "
+            "constant, a drift and a damper without a spring give the same line."
+        )
     return [Note(DOUBT if changed else HARMLESS, text)]
 
 

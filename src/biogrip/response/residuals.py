@@ -162,12 +162,15 @@ class Residuals:
 
     def left(self, log_parameters: Array) -> Array:
         """Return the residuals alone, (n_samples,) in rad."""
+        return self._condensed.cleared(self.rotation(log_parameters)) - self._rotation_rad
+
+    def rotation(self, log_parameters: Array) -> Array:
+        """Return the simulated rotation, neither cleared nor whitened, (n_samples,) in rad."""
         simulated = (
             self._simulated(log_parameters[None], self._time_s[some])[0, 0]
             for some in parts(self.samples, _SAMPLES_AT_ONCE)
         )
-        rotation = np.concatenate(list(simulated))
-        return self._condensed.cleared(rotation) - self._rotation_rad
+        return np.concatenate(list(simulated))
 
     @property
     def freedom(self) -> float:

@@ -2,7 +2,8 @@
 
 The autocorrelation is that of white noise plus exponentials of the time between two
 readings (Ornstein-Uhlenbeck processes): one of any relaxation time, and a geometric
-series of them for 1/f noise. The Cholesky factor L of its matrix C is computed, and
+series of them for 1/f noise. White noise may have a part that grows with the rotation.
+The Cholesky factor L of its matrix C is computed, and
 solved with, in linear time [1]_. Residuals r become L^-1 r, which are white and on
 average as large as r. Least squares of these are generalised least squares [2]_.
 
@@ -36,12 +37,19 @@ class NoiseModel:
     time_s: float
     """Its relaxation time."""
     flicker: float
-    """Share of noise with spectrum 1/f. The rest is white."""
+    """Share of noise with spectrum 1/f."""
+    proportional: float = 0.0
+    """Share of white noise whose standard deviation is proportional to the rotation, on average over
+    the readings. The rest is white noise that is the same everywhere."""
 
     @property
     def white(self) -> float:
-        """Share of white noise."""
-        return 1 - self.ar1 - self.flicker
+        """Share of white noise that is the same everywhere."""
+        return 1 - self.ar1 - self.flicker - self.proportional
+
+
+WEIGHTED = NoiseModel(ar1=0.0, time_s=1.0, flicker=0.0, proportional=1.0)
+"""Independent noise whose standard deviations are given."""
 
 
 class Whitening:
@@ -57,6 +65,8 @@ class Whitening:
         Functions that the instrument may have added, with any amplitude.
     uncertain : (n_functions, n_samples), optional
         Functions added with a random amplitude, see `with_uncertain`.
+    growing : (n_samples,), optional
+        Standard deviation of the proportional part up to a factor; required if there is one.
     """
 
     def __init__(
@@ -65,6 +75,7 @@ class Whitening:
         noise_model: NoiseModel,
         nuisance: Array,
         uncertain: Array | None = None,
+        growing: Array | None = None,
     ) -> None:
         # Imported here, for loading celerite takes a tenth of a second.
         from celerite2 import driver
@@ -80,12 +91,14 @@ class Whitening:
         ones = np.ones_like(self._left)
         # White noise keeps the matrix regular, however small its share.
         diagonal = np.full(len(time_s), 1.0)
+        if growing is not None:
+            diagonal += noise_model.proportional * (growing**2 / np.mean(growing**2) - 1)
         pivots, self._right = driver.factor(
             self._time_s, rates, diagonal, self._left, ones, np.empty_like(diagonal), ones.copy()
         )
         self._deviations = np.sqrt(pivots)
         self.log_determinant = float(np.sum(np.log(pivots)))
-        """Logarithm of the determinant of the correlation matrix."""
+        """Logarithm of the determinant of the covariance matrix, over the mean variance."""
         self.nuisance = self._white(nuisance, uncertain)
         """Whitened functions that are projected out, (n_functions, n_samples)."""
 

@@ -313,7 +313,7 @@ class CaseBlock(Shared):
 
     def _sampling_problems(self) -> Iterator[Problem]:
         measured, end = self.measurement, self.protocol.end_s
-        fitted_along = 2 if measured.coloured else measured.offset + measured.drift
+        fitted_along = measured.fits_offset + measured.fits_drift
         needed = len(self._searched) + fitted_along + 1
         if measured.bursts:
             yield from self._burst_problems(needed)

@@ -43,21 +43,33 @@ class MeasurementBlock(Block):
     noise_rad: Annotated[float | None, Field(ge=1e-15, le=10)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
-    offset: bool = False
-    """If true, fit a constant offset of the instrument along. By default false."""
-    drift: bool = False
-    """If true, fit a linear drift of the instrument along. By default false."""
+    offset: bool | None = None
+    """If true, fit a constant offset of the instrument along. By default only with a coloured noise
+    model."""
+    drift: bool | None = None
+    """If true, fit a linear drift of the instrument along. By default only with a coloured noise
+    model; false where the instrument is known not to drift, and the sample may flow."""
     noise_model: Annotated[str | None, OneOf(NOISE_MODELS)] = None
     """Model of the noise when a trace is judged. `white`: samples are independent; `coloured`:
-    noise may be autocorrelated (AR(1), 1/f), and outliers are left out, so that intervals are wider
-    and keep their coverage; every identification, judged or not, then fits an offset and a drift
-    along. By default white."""
+    noise may be autocorrelated (AR(1), 1/f) and grow with the rotation, and outliers are left out,
+    so that intervals are wider and keep their coverage; every identification, judged or not, then
+    fits an offset and a drift along, unless they are false. By default white."""
     noise: Noise
 
     @property
     def coloured(self) -> bool:
         """True if the noise model is more than white noise."""
         return self.noise_model == COLOURED
+
+    @property
+    def fits_offset(self) -> bool:
+        """True if a constant offset is fitted along."""
+        return self.coloured if self.offset is None else self.offset
+
+    @property
+    def fits_drift(self) -> bool:
+        """True if a linear drift is fitted along."""
+        return self.coloured if self.drift is None else self.drift
 
     @property
     def sampling(self) -> Sampling:

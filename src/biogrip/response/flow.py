@@ -1,0 +1,37 @@
+"""Flow of a sample, beside a drift of the instrument."""
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.response.linear import StepResponse, rotation
+from biogrip.response.nuisance import nuisance_basis, without
+
+# A lag of so many protocols is an integral of the torque.
+_LAG = 1e6
+# Share of a drift's variance that must be no flow: below it, lines differ by less than a tenth.
+_TELLING = 0.01
+
+
+def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
+    """Return True if a drift looks like the flow of a damper without a spring.
+
+    Under a constant torque both are the same line.
+
+    Parameters
+    ----------
+    torque
+        The protocol.
+    time_s : (n_samples,)
+        Sampling times.
+    """
+    drives = 1 if torque.symmetric else 2
+    static = np.eye(drives)[:, None, :]
+    lags = StepResponse(
+        static, np.full((drives, 1), -1 / (_LAG * torque.end_s)), -static[..., None]
+    )
+    constant = nuisance_basis(time_s, offset=True, drift=False)
+    flows = without(constant, _LAG * rotation(lags, torque, time_s))
+    drift = without(constant, time_s / torque.end_s)
+    basis = np.linalg.qr(flows.T)[0].T
+    return bool(np.sum(without(basis, drift) ** 2) < _TELLING * np.sum(drift**2))
