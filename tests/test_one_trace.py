@@ -243,6 +243,19 @@ def test_a_trace_that_is_no_file_is_refused(
             ("--noise-model", "coloured", "--noise", "1e-6"),
             "--noise: is that of white noise; leave it out with coloured noise.",
         ),
+        (
+            ("--noise-model", "coloured", "--noise-share", "0.03"),
+            "--noise-share: is that of white noise; leave it out with coloured noise.",
+        ),
+        (
+            ("--sd", "sd_rad", "--noise", "1e-6"),
+            "--noise: does not go with --sd, which says all of the noise.",
+        ),
+        (
+            ("--noise-share", "3"),
+            "--noise-share: found 3.0, allowed is greater than 0 and at most 1.",
+        ),
+        (("--sd", "sd"), "found no such column, allowed are time_s, rotation_rad."),
         (("--time", ""), "--time: found '' of 0 characters, allowed are at least 1."),
         (("--rotation", "x" * 5000), "of 5000 characters, allowed are at most 4000."),
     ],
@@ -564,3 +577,35 @@ def test_a_terminal_sees_every_phase_and_colours(tmp_path: Path, few: str) -> No
     assert "\r\x1b[K" in said.split(str(EXAMPLE))[-2]
     assert "\x1b[32mdetermined: " in said
     assert "\x1b[33monly bounded above" in said
+
+
+def test_weights_from_a_column_or_a_share_reach_the_fit(tmp_path: Path, few: str) -> None:
+    """Noise of 4 % of the rotation: with either, limits are narrower and nothing is doubted."""
+    times, rotation = clean("endothelial_cell", 2.0)
+    rng = np.random.default_rng(8)
+    trace = rotation * (1 + 0.04 * rng.standard_normal(len(times)))
+    deviations = 0.04 * np.maximum(rotation, 0.01 * rotation.max())
+    file = tmp_path / "trace.csv"
+    rows = zip(times, 1e6 * trace, 1e6 * deviations, strict=True)
+    lines = ["time_s,rotation_urad,sd", *(f"{t:.6g},{v:.8e},{s:.8e}" for t, v, s in rows)]
+    file.write_text("\n".join(lines) + "\n")
+    found = []
+    for options in ([], ["--sd", "sd"], ["--noise-share", "0.04"]):
+        output, page = tmp_path / "found.json", tmp_path / "page.html"
+        run = identify(
+            file, "--rotation", "rotation_urad", *options, "--model", "liquid_drop",
+            "--config", few, "--output", output, "--report", page,
+        )  # fmt: skip
+        assert run.returncode == 0, run.stderr
+        found.append(json.loads(output.read_text()))
+    unweighted, by_column, by_share = found
+    assert unweighted["fit"] == "doubtful"
+    assert any("The noise grows with the rotation" in text for text in unweighted["reasons"])
+    for weighted in (by_column, by_share):
+        assert weighted["fit"] == "ok", weighted["reasons"]
+        k, before = weighted["quantities"][0], unweighted["quantities"][0]
+        assert k["high"] - k["low"] < 0.9 * (before["high"] - before["low"])
+        assert weighted["threshold"] == pytest.approx(3.8415, abs=1e-4)
+    assert by_column["noise_rad"] == pytest.approx(np.sqrt(np.mean(deviations**2)), rel=1e-4)
+    assert by_share["noise_rad"] == pytest.approx(by_column["noise_rad"], rel=0.01)
+    assert by_share["assumed"]["measurement"]["noise_share"] == 0.04

@@ -188,7 +188,7 @@ def _groups_parser(stages: Any) -> None:
 def _design_parser(stages: Any) -> None:
     text = "design torque and sampling times that determine every parameter"
     design = stages.add_parser("design", help=text, description=text)
-    design.set_defaults(command=_design, noise_model=None)
+    design.set_defaults(command=_design, noise_model=None, sd=None, noise_share=None)
     design.add_argument(
         "configs",
         type=Path,
@@ -239,6 +239,12 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
 def _trace_options(command: argparse.ArgumentParser) -> None:
     """Add options for reading and identifying recorded traces."""
     _reading_options(command)
+    command.add_argument(
+        "--sd", metavar="COLUMN", help="column of the rotations' standard deviations"
+    )
+    command.add_argument(
+        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the rotation"
+    )
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
     )
@@ -318,6 +324,8 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         options.offset,
         options.drift,
         options.noise_model,
+        options.sd,
+        options.noise_share,
     )
 
 

@@ -52,7 +52,8 @@ def fitted(problems: list[Problem], noise_rad: float | None = None) -> JointFit:
     def identify(problem: Problem) -> Identification:
         return run("least_squares", problem)
 
-    return fitted_jointly(problems, MODEL, identify, confidence=0.95, noise_rad=noise_rad)
+    known = None if noise_rad is None else [noise_rad] * len(problems)
+    return fitted_jointly(problems, MODEL, identify, confidence=0.95, noise_rad=known)
 
 
 @pytest.fixture(scope="module")

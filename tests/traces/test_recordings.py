@@ -528,3 +528,33 @@ def test_what_a_column_is_was_said_by_options_or_by_keys(
 def test_an_angle_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
     with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
         unit_of(Path("t.csv"), "phi", given, ROTATION_UNITS)
+
+
+@pytest.mark.parametrize("more", ["", "# a comment, for which the fast reader gives up"])
+def test_standard_deviations_are_read_in_the_unit_of_the_rotations(
+    tmp_path: Path, more: str
+) -> None:
+    lines = ["sd,time_s,phi", *(f"{i + 1},{i},{i}" for i in range(12)), more]
+    path = written(tmp_path / "t.csv", lines)
+    recording = read_recording(path, Columns("time_s", "phi", rotation_unit="mrad", sd="sd"))
+    assert recording.sd_rad is not None
+    np.testing.assert_allclose(recording.sd_rad, 1e-3 * np.arange(1, 13), rtol=1e-15)
+    np.testing.assert_allclose(recording.rotation_rad, 1e-3 * np.arange(12), rtol=1e-15)
+
+
+def test_what_is_no_standard_deviation_is_refused(tmp_path: Path) -> None:
+    rows = [f"{i},{i}e-6,1e-7" for i in range(12)]
+    columns = Columns("time_s", "rotation_rad", sd="sd")
+    lines = ["time_s,rotation_rad,sd", *rows[:4], "4,4e-6,0", *rows[5:]]
+    said = refusal(written(tmp_path / "t.csv", lines), columns)
+    assert said == ", line 6, column 'sd': found 0, allowed is a standard deviation above 0."
+    lines = ["time_s,rotation_rad,sd_mrad", *rows]
+    said = refusal(
+        written(tmp_path / "t.csv", lines), Columns("time_s", "rotation_rad", sd="sd_mrad")
+    )
+    assert "found the unit 'rad' where the name says 'mrad'" in said
+    path = written(tmp_path / "t.csv", ["time_s,rotation_rad", *ROWS])
+    said = refusal(path, Columns("time_s", "rotation_rad", sd="rotation_rad"))
+    assert "found rotation and sd in one column, allowed are two" in said
+    gap = ["time_s,rotation_rad,sd", *rows[:4], "4,4e-6,", *rows[5:]]
+    assert read_recording(written(tmp_path / "t.csv", gap), columns).without_number == 1

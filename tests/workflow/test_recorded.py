@@ -71,8 +71,16 @@ def test_a_bad_recording_stops_with_its_place(tmp_path: Path) -> None:
             ["is what a recorded trace is to tell; leave it out"],
         ),
         ("{file: " + str(EXAMPLE) + ", ", "{", ["time: is only for a recorded trace"]),
+        (
+            "{file: " + str(EXAMPLE) + ", ",
+            "{file: " + str(EXAMPLE) + ", sd: sd, noise_rad: 1.0e-6, noise_model: coloured, ",
+            [
+                "noise_rad: does not go with sd, which says all of the noise.",
+                "sd: is that of white noise; leave it out where noise_model is coloured.",
+            ],
+        ),
     ],
-    ids=["missing", "known", "simulated"],
+    ids=["missing", "known", "simulated", "weighted"],
 )
 def test_what_a_recording_cannot_be_is_named(
     tmp_path: Path, old: str, new: str, messages: list[str]

@@ -21,7 +21,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
-from biogrip.groups.replicates import joint_problem
+from biogrip.groups.replicates import compute_common_noise, joint_problem
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.whiteness import one_in
@@ -62,7 +62,7 @@ def fitted_jointly(
     identify: Callable[[Problem], Identification],
     *,
     confidence: float,
-    noise_rad: float | None = None,
+    noise_rad: Sequence[float] | None = None,
 ) -> JointFit:
     """Fit all traces of a cell jointly, and compute confidence limits.
 
@@ -77,20 +77,23 @@ def fitted_jointly(
     confidence
         Confidence level of the limits, e.g. 0.95.
     noise_rad
-        Standard deviation of the noise if it is known, the same for all traces.
+        Standard deviation of the noise of each trace if it is known.
     """
     if len(problems) == 1:
         (problem,) = problems
         found = identify(problem)
-        diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=noise_rad)
+        known = None if noise_rad is None else noise_rad[0]
+        diagnosis = diagnose(problem, model, found, confidence=confidence, noise_rad=known)
         return JointFit(diagnosis, (diagnosis.likelihood.noise_rad,), None)
-    levels = [noise_rad or problem.residuals.noise_scale_rad for problem in problems]
+    levels = list(noise_rad or [problem.residuals.noise_scale_rad for problem in problems])
     joint = joint_problem(problems, levels)
+    samples = [problem.residuals.samples for problem in problems]
+    known = None if noise_rad is None else compute_common_noise(samples, noise_rad)
     found = identify(joint)
     for _ in range(_MOST_OPTIMA):
         if noise_rad is None:
             joint, found, levels = _reweighted(problems, joint, found, levels)
-        diagnosis = diagnose(joint, model, found, confidence=confidence, noise_rad=noise_rad)
+        diagnosis = diagnose(joint, model, found, confidence=confidence, noise_rad=known)
         best = np.exp(diagnosis.likelihood.best)
         if noise_rad is not None or np.array_equal(best, found.parameters):
             break
@@ -127,16 +130,18 @@ def _reweighted(
     return joint, found, levels
 
 
-def _agreement(problems: Sequence[Problem], best: Array, noise_rad: float | None) -> float:
+def _agreement(
+    problems: Sequence[Problem], best: Array, noise_rad: Sequence[float] | None
+) -> float:
     """Return the likelihood-ratio p value of shared against separate parameters (Wilks 1938)."""
     from scipy.special import chdtrc
 
     gained = 0.0
-    for problem in problems:
+    for trace, problem in enumerate(problems):
         alone = fit_from([problem], best).x[0]
         joint, own = _square_sum(problem, best), _square_sum(problem, alone)
         if noise_rad is not None:
-            gained += (joint - own) / noise_rad**2
+            gained += (joint - own) / noise_rad[trace] ** 2
         else:
             gained += problem.residuals.free * log(joint / own)
     return float(chdtrc((len(problems) - 1) * len(best), max(gained, 0.0)))

@@ -38,8 +38,7 @@ class JointResiduals(Residuals):
         self.samples = sum(part.samples for part in parts)
         self.duration_s = max(part.duration_s for part in parts)
         self.model, self.nonlinear = parts[0].model, parts[0].nonlinear
-        counted = zip(parts, noise_rad, strict=True)
-        whole = sqrt(self.samples / fsum(part.samples / own**2 for part, own in counted))
+        whole = compute_common_noise([part.samples for part in parts], noise_rad)
         self.weights = np.array([whole / own for own in noise_rad])
         peaks = (w * part.peak_rad for w, part in zip(self.weights, parts, strict=True))
         self.peak_rad = float(max(peaks))
@@ -131,6 +130,15 @@ class JointResiduals(Residuals):
         """Concatenate rows of all traces along the last axis, in units of each trace's noise."""
         weighted = (weight * own for weight, own in zip(self.weights, rows, strict=True))
         return np.concatenate(list(weighted), axis=-1)
+
+
+def compute_common_noise(samples: Sequence[int], noise_rad: Sequence[float]) -> float:
+    """Compute the standard deviation in rad that the weighted residuals of all traces share.
+
+    `samples` has the number of readings of each trace, and `noise_rad` its noise.
+    """
+    counted = zip(samples, noise_rad, strict=True)
+    return sqrt(sum(samples) / fsum(count / own**2 for count, own in counted))
 
 
 def joint_problem(problems: Sequence[Problem], noise_rad: Sequence[float]) -> Problem:

@@ -20,7 +20,7 @@ from biogrip.response.misfit import Misfit
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
 from biogrip.response.residuals import estimate_noise
-from biogrip.response.whitening import NoiseModel, Whitening
+from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,10 @@ class CaseProblem:
         True to simulate the nonlinear model.
     offset, drift
         True if the instrument may have added a constant, or a drift linear in time.
+    noise_share
+        Standard deviation of the noise as a share of the rotation; read by `read_checked`.
+    sd_rad : (n_samples,), optional
+        Standard deviations of the readings of a trace, see `weighted`.
     coloured
         True if the noise of a trace may be autocorrelated, see `trace_fit`.
     uncertainty
@@ -56,6 +60,8 @@ class CaseProblem:
     offset: bool = False
     drift: bool = False
     noise_rad: float | None = None
+    noise_share: float | None = None
+    sd_rad: Array | None = field(default=None, compare=False)
     coloured: bool = False
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     _condensed: dict[tuple[bytes, bool], Condensed] = field(
@@ -86,6 +92,16 @@ class CaseProblem:
     def to_identify(self, *others: SampleModel) -> "CaseProblem":
         """Return a copy without noise model, gripper uncertainty and unused search ranges."""
         return replace(self.searched_for(*others), coloured=False, uncertainty={})
+
+    def weighted(self, sd_rad: Array | None) -> "CaseProblem":
+        """Return a copy for a trace whose readings have known standard deviations, or itself.
+
+        Readings are divided by them, so that the noise becomes white; its standard deviation is
+        then their root mean square.
+        """
+        if sd_rad is None:
+            return self
+        return replace(self, sd_rad=sd_rad, noise_rad=float(np.sqrt(np.mean(sd_rad**2))))
 
     @property
     def plain(self) -> bool:
@@ -124,7 +140,7 @@ class CaseProblem:
             shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
             sampled = time_s.tobytes(), shown
             if sampled not in self._condensed:
-                self._condensed[sampled] = self._condense(time_s, self.nuisance(time_s), shown)
+                self._condensed[sampled] = self._weighted(time_s, shown)
             condensed = self._condensed[sampled]
         return make_problem(
             self.gripper,
@@ -136,6 +152,11 @@ class CaseProblem:
             condensed,
             noise_rad=noise_rad,
         )
+
+    def _weighted(self, time_s: Array, inertia: bool) -> Condensed:
+        if self.sd_rad is not None:
+            return self.in_noise(time_s, None, np.zeros((0, len(time_s))), inertia=inertia)
+        return self._condense(time_s, self.nuisance(time_s), inertia)
 
     def shows_inertia(
         self, time_s: Array, rotation_rad: Array, noise_rad: float | None = None
@@ -188,6 +209,8 @@ class CaseProblem:
             Rotation that noise grows with, see `Whitening`.
         """
         nuisance, whitening = self.nuisance(time_s), None
+        if noise_model is None and self.sd_rad is not None:
+            noise_model, growing = WEIGHTED, self.sd_rad
         if noise_model is not None:
             whitening = Whitening(time_s, noise_model, nuisance, uncertain, growing)
         return self._condense(time_s, with_uncertain(nuisance, uncertain), inertia, whitening)

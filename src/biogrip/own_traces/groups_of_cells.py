@@ -51,6 +51,7 @@ class _TraceProblem:
     problem: Problem
     case: Case
     notes: list[Note]
+    noise_rad: float | None
 
 
 def groups(
@@ -137,7 +138,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
                 case_problem.searched,
                 _identify(usable[0], progress.within),
                 confidence=confidence,
-                noise_rad=case_problem.noise_rad,
+                noise_rad=_known_noise(usable),
             )
             fit.diagnosis.notes.extend(note for each in usable for note in each.notes)
             judged.append(JudgedCell(cell.name, cell.group, fit))
@@ -269,14 +270,20 @@ class _Traces:
                 f"{visible(trace)}: found the same rotations as in {visible(before)}, "
                 "allowed is each trace once."
             )
-        problem = case.problem.of(recorded.time_s, rotation_rad)
+        case_problem = case.problem.weighted(recorded.sd_rad)
+        problem = case_problem.of(recorded.time_s, rotation_rad)
         notes: list[Note] = []
         if case.problem.coloured:
             # All cells share one gripper: its calibration error is common to them, not noise.
-            assumed = replace(case.problem, uncertainty={})
+            assumed = replace(case_problem, uncertainty={})
             fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
             problem, notes = fit.problem, notes_on_fit(fit)
-        return _TraceProblem(trace, problem, case, notes)
+        return _TraceProblem(trace, problem, case, notes, case_problem.noise_rad)
+
+
+def _known_noise(traces: Sequence[_TraceProblem]) -> list[float] | None:
+    known = [each.noise_rad for each in traces if each.noise_rad is not None]
+    return known if len(known) == len(traces) else None
 
 
 def _identify(

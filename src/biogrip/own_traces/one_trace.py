@@ -106,7 +106,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         recorded = options.read_as.read(options.trace, case.gripper, case.problem)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
-        case_problem = case.problem
+        case_problem = case.problem.weighted(recorded.sd_rad)
         fit = fit_judged(
             case, case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
         )
@@ -225,7 +225,7 @@ def _instrument(
         case_problem.gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
     )[0]
     basis = case_problem.nuisance(time_s)
-    added = within(basis, measured - simulated)
+    added = within(basis, measured - simulated, case_problem.sd_rad)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     start = float(added[0] - slope * time_s[0])
     return ({"offset_rad": start} if case_problem.offset else {}) | (

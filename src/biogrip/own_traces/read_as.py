@@ -8,7 +8,7 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages import recording
-from biogrip.study.measurement_block import COLOURED
+from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE
 from biogrip.study.validation import measurement_problem
 from biogrip.traces.recordings import Columns
 
@@ -31,6 +31,10 @@ class ReadAs:
         If true, fit a constant or a linear drift of the instrument along; if None, as by default.
     noise_model
         Noise model, ``white`` or ``coloured``.
+    sd
+        Name of a column of standard deviations.
+    noise_share
+        Standard deviation of the noise as a share of the rotation.
     """
 
     time: str = "time_s"
@@ -41,6 +45,8 @@ class ReadAs:
     offset: bool | None = None
     drift: bool | None = None
     noise_model: str | None = None
+    sd: str | None = None
+    noise_share: float | None = None
 
     @property
     def block(self) -> dict[str, str | float | bool]:
@@ -51,7 +57,7 @@ class ReadAs:
     def columns(self) -> Columns:
         """Names and units of the file's columns."""
         units = self.time_unit, self.rotation_unit
-        return Columns(self.time, self.rotation, *units, by_options=True)
+        return Columns(self.time, self.rotation, *units, by_options=True, sd=self.sd)
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
         """Read a trace, and refuse one that is impossible with its gripper and protocol.
@@ -78,11 +84,15 @@ class ReadAs:
         BiogripError
             With the option's name.
         """
-        if self.noise_model == COLOURED and self.noise_rad is not None:
-            raise BiogripError(
-                f"--noise: is that of white noise; leave it out with {COLOURED} noise."
-            )
         for key, value in self.block.items():
+            option = _OPTIONS.get(key, key).replace("_", "-")
+            if self.noise_model == COLOURED and key in KNOWN_NOISE:
+                raise BiogripError(
+                    f"--{option}: is that of white noise; leave it out with {COLOURED} noise."
+                )
+            if self.sd is not None and key in set(KNOWN_NOISE) - {"sd"}:
+                raise BiogripError(
+                    f"--{option}: does not go with --sd, which says all of the noise."
+                )
             if problem := measurement_problem(key, value):
-                option = _OPTIONS.get(key, key).replace("_", "-")
                 raise BiogripError(f"--{option}: {problem}")

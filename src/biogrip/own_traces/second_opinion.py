@@ -42,7 +42,7 @@ def second_opinion(
         At most one. Empty if both terms are declared already, if the model is nonlinear, or if the
         noise model is coloured, which fits both unless they are refused.
     """
-    case_problem = case.problem
+    case_problem = case.problem.weighted(recorded.sd_rad)
     added = 2 - case_problem.offset - case_problem.drift
     if not added or case_problem.nonlinear or case_problem.coloured:
         return []

@@ -35,9 +35,15 @@ def without(basis: Array, rows: Array) -> Array:
     return rows - (rows @ basis.T) @ basis if len(basis) else rows
 
 
-def within(basis: Array, rows: Array) -> Array:
-    """Project functions of time, shape (..., n_times), on the span of a basis."""
-    return (rows @ basis.T) @ basis
+def within(basis: Array, rows: Array, sd: Array | None = None) -> Array:
+    """Project functions of time, shape (..., n_times), on the span of a basis.
+
+    With standard deviations of the values, (n_times,), by weighted least squares.
+    """
+    if sd is None or not len(basis):
+        return (rows @ basis.T) @ basis
+    weighted = np.linalg.qr((basis / sd).T)[0].T
+    return within(weighted, rows / sd) * sd
 
 
 def with_uncertain(basis: Array, functions: Array) -> Array:

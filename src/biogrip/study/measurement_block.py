@@ -14,6 +14,8 @@ from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
+KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
+"""Keys that say how large the noise is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +45,13 @@ class MeasurementBlock(Block):
     noise_rad: Annotated[float | None, Field(ge=1e-15, le=10)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
+    sd: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
+    """Name of the file's column of the readings' standard deviations, in the unit of the rotations.
+    Every reading then has the weight 1/sd² in all fits, and the noise is known."""
+    noise_share: Annotated[float | None, Field(gt=0, le=1)] = None
+    """Standard deviation of the noise as a share of the rotation, with weights as by sd. To it is
+    added noise_rad, squared; without that, it is at least the scatter of the tenth of the readings
+    with the smallest rotations."""
     offset: bool | None = None
     """If true, fit a constant offset of the instrument along. By default only with a coloured noise
     model."""
@@ -78,13 +87,16 @@ class MeasurementBlock(Block):
 
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict, and what a recorded trace lacks."""
-        if self.coloured and self.noise_rad is not None:
-            text = "is that of white noise; leave it out where noise_model is coloured."
-            yield ("noise_rad",), text
+        for key in KNOWN_NOISE:
+            if self.coloured and getattr(self, key) is not None:
+                text = "is that of white noise; leave it out where noise_model is coloured."
+                yield (key,), text
+            if self.sd is not None and key != "sd" and getattr(self, key) is not None:
+                yield (key,), "does not go with sd, which says all of the noise."
         if self.bursts and self.times_s:
             yield ("bursts",), "does not go with times_s; allowed is one of them."
         if self.file is None:
-            for key in ("time", "rotation", "time_unit", "rotation_unit", "noise_rad"):
+            for key in ("time", "rotation", "time_unit", "rotation_unit", *KNOWN_NOISE):
                 if getattr(self, key) is not None:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return

@@ -170,7 +170,8 @@ class Case:
         block = self.block.measurement
         assert block.time is not None
         assert block.rotation is not None
-        return Columns(block.time, block.rotation, block.time_unit, block.rotation_unit)
+        units = block.time_unit, block.rotation_unit
+        return Columns(block.time, block.rotation, *units, sd=block.sd)
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
@@ -204,6 +205,7 @@ class Case:
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
             noise_rad=measurement.noise_rad,
+            noise_share=measurement.noise_share,
             coloured=measurement.coloured,
             uncertainty=self.block.gripper.uncertainties,
         )

@@ -14,7 +14,7 @@ References
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -148,7 +148,11 @@ def check_recording(
         plausible.
     """
     _check_times(recording, torque.end_s, path, columns)
-    trace, lagged, free = recording.rotation_rad, _lagged(torque), free_rotation(gripper, torque)
+    trace, lagged, free = (
+        recording.rotation_rad,
+        lagged_torques(torque),
+        free_rotation(gripper, torque),
+    )
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         # Beyond this its square could overflow.
@@ -211,11 +215,21 @@ def _check_times(recording: Recording, end_s: float, path: Path, columns: Column
     )
 
 
-def _lagged(torque: TorqueHistory) -> Callable[[Array], Array]:
-    """Return a function of time for lagged torques, of the left arm and the difference of arms."""
+def lagged_torques(
+    torque: TorqueHistory, shares: Sequence[float] = _LAG_SHARES
+) -> Callable[[Array], Array]:
+    """Return a function of time for lagged torques, of the left arm and the difference of arms.
+
+    Parameters
+    ----------
+    torque
+        The protocol.
+    shares
+        Relaxation times of the lags over the length of the protocol, ascending.
+    """
     drives = 1 if torque.symmetric else 2
-    rates = -1 / (torque.end_s * np.tile(_LAG_SHARES, drives))
-    static = np.repeat(np.eye(drives), len(_LAG_SHARES), axis=0)[:, None, :]
+    rates = -1 / (torque.end_s * np.tile(shares, drives))
+    static = np.repeat(np.eye(drives), len(shares), axis=0)[:, None, :]
     lags = StepResponse(static, rates[:, None], -static[..., None])
     return lambda time_s: rotation(lags, torque, time_s)
 
@@ -285,7 +299,7 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     rest = without(nuisance, functions.constant)
     norm = np.linalg.norm(rest)
     also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
-    responses = _extreme_responses(functions.lagged, gripper)
+    responses = extreme_responses(functions.lagged, gripper, len(_LAG_SHARES))
     declared, freed = (
         [_left_over(without(basis, trace), sign * _cleared(basis, responses)) for sign in (1, -1)]
         for basis in (nuisance, also)
@@ -297,15 +311,15 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     return bool(likelier and freed[0] > freed[1])
 
 
-def _extreme_responses(lagged: Array, gripper: Gripper) -> Array:
+def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:
     """Return extreme responses, (n, n_rows), of which all samples' are non-negative combinations.
 
     A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
     where x is the sample's rigidity and decreases, as it relaxes, from at most 1 to at least 0.
     The extremes are: no sample, rigid ones that relax with one of the lags, and a rigid one.
+    `lagged` has that many lags of each torque, see `lagged_torques`.
     """
     k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-    lags = len(_LAG_SHARES)
     alone = lagged[:lags] / k_2
     if len(lagged) == lags:
         return alone

@@ -3,10 +3,10 @@
 import csv
 import re
 from codecs import BOM_UTF16_BE, BOM_UTF16_LE
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
-from itertools import islice
+from itertools import combinations, islice
 from pathlib import Path
 from unicodedata import normalize
 
@@ -57,6 +57,8 @@ class Columns:
         Keys of `TIME_UNITS` and `ROTATION_UNITS`; None if the column's name ends with the unit.
     by_options
         True if command-line options set them, false for config keys; used in messages.
+    sd
+        Name of the column of the rotations' standard deviations, in their unit, if there is one.
     """
 
     time: str
@@ -64,6 +66,13 @@ class Columns:
     time_unit: str | None = None
     rotation_unit: str | None = None
     by_options: bool = False
+    sd: str | None = None
+
+    @property
+    def named(self) -> dict[str, str]:
+        """Names of the columns by the key that says them, in the order of reading."""
+        names = {"time": self.time, "rotation": self.rotation}
+        return names if self.sd is None else {**names, "sd": self.sd}
 
 
 @dataclass(frozen=True)
@@ -78,12 +87,15 @@ class Recording:
         Line number of each sample, from 1.
     without_number
         Number of rows left out as gaps.
+    sd_rad : (n_samples,) or None
+        Standard deviations of the rotations, where the file has them.
     """
 
     time_s: Array
     rotation_rad: Array
     lines: IntArray
     without_number: int
+    sd_rad: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -97,7 +109,7 @@ class _Layout:
     width
         Number of columns.
     indices
-        Indices of the time and the rotation column by name, in this order.
+        Indices of the columns to read by name, in the order of reading.
     """
 
     separator: str
@@ -138,8 +150,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     BiogripError
         If the file cannot be read as text, lacks a column or repeats it, its unit is unknown or
         contradicts the name, a row has too few or too many cells, or text that is neither a finite
-        number nor a gap, the time does not increase, or there are fewer than `FEWEST_SAMPLES`
-        samples or more than `MOST_ROWS` rows.
+        number nor a gap, a standard deviation is not positive, the time does not increase, or there
+        are fewer than `FEWEST_SAMPLES` samples or more than `MOST_ROWS` rows.
     """
     try:
         if not path.is_file():
@@ -160,8 +172,10 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     without_number = len(lines) - len(kept_lines)
     _check_count(path, columns, len(kept), without_number)
     _check_order(path, columns, kept[:, 0], kept_lines)
-    time_s, rotation_rad = kept[:, 0] * sizes[0], kept[:, 1] * sizes[1]
-    return Recording(time_s, rotation_rad, kept_lines, without_number)
+    if columns.sd is not None:
+        _check_positive(path, columns.sd, kept[:, 2], kept_lines)
+    time_s, rotation_rad, *sd_rad = (own * size for own, size in zip(kept.T, sizes, strict=True))
+    return Recording(time_s, rotation_rad, kept_lines, without_number, *sd_rad)
 
 
 def place(path: Path, line: int | None = None, column: str | None = None) -> str:
@@ -270,9 +284,9 @@ def _read_text(path: Path, columns: Columns) -> tuple[Array, Array, IntArray]:
 
 
 def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, Array, IntArray]:
-    """Read unit factors to s and rad, (2,), numbers, (n_rows, 2), and line numbers.
+    """Read unit factors to s and rad, (n,), numbers, (n_rows, n), and line numbers.
 
-    The numbers are time and rotation in the file's units, with NaN for gaps.
+    The columns are time, rotation and standard deviation, in the file's units, with NaN for gaps.
     """
     at: list[int] = []
     lines = _significant(path, stream, at)
@@ -285,12 +299,16 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
         )
     )
     sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
+    if columns.sd is not None:
+        sizes = np.append(
+            sizes, ROTATION_UNITS[unit_of(path, columns.sd, rotation_unit, ROTATION_UNITS)]
+        )
     from biogrip.traces.plain_rows import plain_rows  # Arrow takes as long as a short job.
 
     plain = plain_rows(path, at[0], layout.width, [*layout.indices.values()], layout.separator)
     if plain is not None and len(plain) <= MOST_ROWS:
         return sizes, plain, at[0] + 1 + np.arange(len(plain))
-    values, row_lines = [np.zeros((0, 2))], [np.zeros(0, np.int64)]
+    values, row_lines = [np.zeros((0, len(sizes)))], [np.zeros(0, np.int64)]
     for rows in _blocks(path, lines, layout.separator, at):
         _check_rows(path, at, rows, layout)
         cells = {name: [row[i] for row in rows] for name, i in layout.indices.items()}
@@ -313,19 +331,20 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
 def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
     if header is None:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
-    needed = (columns.time, columns.rotation)
-    separator, names = _header(path, at[0], header, needed)
-    which = _said_by(columns.by_options, "time", "rotation")
-    time, rotation = (_index(path, at[0], names, column, which) for column in needed)
-    if time == rotation:
-        raise BiogripError(
-            f"{place(path, at[0], columns.time)}: found time and rotation in one column, "
-            "allowed are two."
-        )
-    return _Layout(separator, len(names), {columns.time: time, columns.rotation: rotation})
+    needed = columns.named
+    separator, names = _header(path, at[0], header, list(needed.values()))
+    which = _said_by(columns.by_options, *needed)
+    indices = [_index(path, at[0], names, column, which) for column in needed.values()]
+    for (one, i), (other, j) in combinations(zip(needed, indices, strict=True), 2):
+        if i == j:
+            raise BiogripError(
+                f"{place(path, at[0], needed[one])}: found {one} and {other} in one column, "
+                "allowed are two."
+            )
+    return _Layout(separator, len(names), dict(zip(needed.values(), indices, strict=True)))
 
 
-def _header(path: Path, at: int, line: str, needed: tuple[str, str]) -> tuple[str, list[str]]:
+def _header(path: Path, at: int, line: str, needed: Sequence[str]) -> tuple[str, list[str]]:
     """Return the separator that yields most wanted columns, then most columns, and the names."""
     readings = {}
     for separator in _SEPARATORS:
@@ -453,12 +472,25 @@ def _listed(names: list[str]) -> str:
     return listed if len(names) <= _MOST_LISTED else f"{listed} and {len(names)} in all"
 
 
+def _all(columns: Columns) -> str:
+    *names, last = columns.named.values()
+    return f"{'both ' if len(names) == 1 else ''}{', '.join(names)} and {last}"
+
+
 def _check_count(path: Path, columns: Columns, found: int, without_number: int) -> None:
     if found < FEWEST_SAMPLES:
         gaps = f" ({counted(without_number, 'row')} with NaN)" if without_number else ""
         raise BiogripError(
-            f"{place(path)}: found {counted(found, 'row')} with a number in both "
-            f"{columns.time} and {columns.rotation}{gaps}, allowed are at least {FEWEST_SAMPLES}."
+            f"{place(path)}: found {counted(found, 'row')} with a number in {_all(columns)}{gaps}, "
+            f"allowed are at least {FEWEST_SAMPLES}."
+        )
+
+
+def _check_positive(path: Path, column: str, sd: Array, lines: IntArray) -> None:
+    for row in np.flatnonzero(sd <= 0)[:1]:
+        raise BiogripError(
+            f"{place(path, lines[row], column)}: found {sd[row]:.15g}, allowed is a standard "
+            "deviation above 0."
         )
 
 

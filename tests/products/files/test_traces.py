@@ -9,6 +9,7 @@ from biogrip.products.files.traces import (
     Measurements,
     each_trace,
     read_jaw_force,
+    read_measurements,
     read_target,
     seeds_in,
     write_measurements,
@@ -69,3 +70,14 @@ def test_traces_are_read_one_after_the_other(
     write_measurements(path, Measurements(np.arange(4.0), np.zeros(4), written))
     assert seeds_in(path) == list(written)
     np.testing.assert_array_equal(list(each_trace(path)), list(written.values()))
+
+
+def test_standard_deviations_are_kept(tmp_path: Path) -> None:
+    path, trace = tmp_path / "seeds_0-0.parquet", {0: np.ones(4)}
+    write_measurements(path, Measurements(np.arange(4.0), None, trace, sd_rad=np.full(4, 0.1)))
+    for seeds in ([0], None):
+        read = read_measurements(path, seeds)
+        assert read.sd_rad is not None
+        np.testing.assert_array_equal(read.sd_rad, 0.1)
+        assert list(read.rotation_rad) == [0]
+    assert seeds_in(path) == [0]

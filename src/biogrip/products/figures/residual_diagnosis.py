@@ -14,7 +14,7 @@ _TWO_SIDED = 1.96
 
 def draw_residuals(fit: Fit) -> Figure:
     """Draw standardised residuals over time, their autocorrelation and their quantiles."""
-    residual = fit.measured_rad - fit.fitted_rad
+    residual = (fit.measured_rad - fit.fitted_rad) / (1 if fit.sd_rad is None else fit.sd_rad)
     scaled = residual / np.std(residual)
     drawn = figure(PAGE_IN, 2.4)
     over_time, correlation, quantiles = drawn.subplots(1, 3, width_ratios=[1.5, 1, 0.9])

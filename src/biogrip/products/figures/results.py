@@ -35,9 +35,11 @@ class Fit:
     """Noisy rotation, (n_samples,)."""
     fitted_rad: Array
     """Fitted rotation, (n_samples,)."""
+    sd_rad: Array | None = None
+    """Standard deviations of the readings, (n_samples,), where they are known."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TypicalFit(Fit):
     """The identification of the typical seed, see `typical`."""
 
@@ -69,8 +71,8 @@ def fit_of(
     )[0]
     measured = recorded.rotation_rad[seed]
     nuisance = problem.nuisance(recorded.time_s)
-    fitted = simulated + within(nuisance, measured - simulated)
-    return Fit(recorded.time_s, recorded.target_rad, measured, fitted)
+    fitted = simulated + within(nuisance, measured - simulated, recorded.sd_rad)
+    return Fit(recorded.time_s, recorded.target_rad, measured, fitted, recorded.sd_rad)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:

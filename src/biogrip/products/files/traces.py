@@ -21,6 +21,8 @@ TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
 # Prefix of a seed's column.
 _SEED = "seed_"
+# Columns that are there if they are known.
+_KNOWN = ("target_rad", "sd_rad")
 _READ_AT_ONCE = 50
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
@@ -38,6 +40,8 @@ class Measurements:
     """Noisy trace of each seed, (n_samples,) each."""
     gaps: int = 0
     """Number of rows of a recording that were left out for want of a number."""
+    sd_rad: Array | None = None
+    """Standard deviations of the readings, (n_samples,), where they are known."""
 
 
 def write_target(
@@ -103,10 +107,11 @@ def _target_columns(path: Path) -> Array:
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write noisy traces as Parquet: time_s, target_rad if known, then seed_0, seed_1, ..."""
+    """Write noisy traces as Parquet: time_s, target_rad and sd_rad if known, then seed_0, ..."""
     columns = {"time_s": measurements.time_s}
-    if measurements.target_rad is not None:
-        columns["target_rad"] = measurements.target_rad
+    for name in _KNOWN:
+        if (known := getattr(measurements, name)) is not None:
+            columns[name] = known
     columns |= {f"{_SEED}{seed}": trace for seed, trace in measurements.rotation_rad.items()}
     table = table_of(columns, len(measurements.time_s))
     write_tables(path, [table], dictionary=False)
@@ -115,12 +120,13 @@ def write_measurements(path: Path, measurements: Measurements) -> None:
 def read_measurements(path: Path, seeds: list[int] | None = None) -> Measurements:
     """Read noisy traces of all or of given seeds, which it must have."""
     present = column_names(path)
-    kept = ["time_s", *(["target_rad"] if "target_rad" in present else [])]
+    kept = ["time_s", *(name for name in _KNOWN if name in present)]
     names = present if seeds is None else [*kept, *(f"{_SEED}{seed}" for seed in seeds)]
     columns = read_columns(path, names)
-    time_s, target = columns.pop("time_s"), columns.pop("target_rad", None)
+    time_s, target, sd_rad = (columns.pop(name, None) for name in ("time_s", *_KNOWN))
+    assert time_s is not None
     traces = {int(name.removeprefix(_SEED)): trace for name, trace in columns.items()}
-    return Measurements(time_s, target, traces)
+    return Measurements(time_s, target, traces, sd_rad=sd_rad)
 
 
 def seeds_in(path: Path) -> list[int]:

@@ -40,6 +40,7 @@ def identify(
     case_problem = case.problem.calibrated(calibrated)
     identified = identifier(method, case.methods[method])
     recorded = read_measurements(measurements, list(seeds))
+    case_problem = case_problem.weighted(recorded.sd_rad)
     progress = Progress(f"{case.name}, {method}", len(seeds))
     whose = case.name, method, case_problem.model, case_problem.searched, case_problem.fixed
     records = []

@@ -54,8 +54,8 @@ def fit_judged(
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
     """Fit the trace of seed 0 by least squares, and write verdicts, profiles and valley."""
-    case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
+    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
     fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     said = diagnosis_data(diagnosis, notes_on_fit(fit))

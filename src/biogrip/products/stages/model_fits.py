@@ -42,7 +42,8 @@ def fit(
     """Fit a batch of seeds by least squares with each model."""
     case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, list(seeds))
-    MODEL_FITS.write(fits, _rows(case, case_problem, seeds, recorded))
+    weighted = case_problem.weighted(recorded.sd_rad)
+    MODEL_FITS.write(fits, _rows(case, weighted, seeds, recorded))
 
 
 def _rows(

@@ -51,8 +51,8 @@ def sample(
     samples: Path,
 ) -> None:
     """Sample the posterior of the trace of seed 0."""
-    case_problem = case.problem.calibrated(calibrated)
     recorded = read_measurements(measurements, [TRACE])
+    case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
     time_s, trace = recorded.time_s, recorded.rotation_rad[TRACE]
     limits = limits_in(read_verdicts(verdicts))
     pose = partial(case_problem.of, time_s, trace)

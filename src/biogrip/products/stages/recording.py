@@ -12,6 +12,7 @@ from biogrip.products.uses import from_case
 from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
+from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.recordings import Columns, place, read_recording
 
@@ -35,10 +36,12 @@ def read_checked(
 ) -> Measurements:
     """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
     trace = read_recording(recorded, columns)
-    if problem.coloured and len(trace.time_s) > MOST_SAMPLES:
+    weighted = columns.sd is not None or problem.noise_share is not None
+    if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
             f"{place(recorded)}: found {len(trace.time_s)} samples, allowed are at most "
-            f"{MOST_SAMPLES} with a coloured noise model: average neighbouring ones."
+            f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
+            "neighbouring ones."
         )
     nuisance = problem.nuisance(trace.time_s)
     check_recording(
@@ -48,9 +51,21 @@ def read_checked(
         recorded,
         columns,
         nuisance,
-        problem.noise_rad,
+        None if weighted else problem.noise_rad,
     )
-    return Measurements(trace.time_s, None, {0: trace.rotation_rad}, trace.without_number)
+    sd_rad = trace.sd_rad
+    if problem.noise_share is not None:
+        sd_rad = proportional_deviations(
+            trace.time_s,
+            trace.rotation_rad,
+            gripper,
+            problem.torque,
+            nuisance,
+            problem.noise_share,
+            problem.noise_rad,
+        )
+    rotations = {0: trace.rotation_rad}
+    return Measurements(trace.time_s, None, rotations, trace.without_number, sd_rad)
 
 
 def notes_on_gaps(trace: Measurements) -> list[str]:

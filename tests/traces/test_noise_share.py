@@ -1,0 +1,49 @@
+"""Noise as a share of the rotation, of traces whose rotation is known."""
+
+import numpy as np
+import pytest
+
+from biogrip.response.nuisance import nuisance_basis
+from biogrip.traces.noise_share import proportional_deviations
+from tests.helpers.problems import GRIPPER, TORQUE, clean
+
+TIMES, CLEAN = clean("endothelial_cell", 2.0)
+NONE = nuisance_basis(TIMES, offset=False, drift=False)
+
+
+def test_deviations_follow_the_rotation_without_its_noise() -> None:
+    """Each reading has noise of 5 %; the smooth rotation is known far better."""
+    rng = np.random.default_rng(0)
+    trace = CLEAN * (1 + 0.05 * rng.standard_normal(len(TIMES)))
+    found = proportional_deviations(TIMES, trace, GRIPPER, TORQUE, NONE, 0.05)
+    large = np.quantile(CLEAN, 0.1) < CLEAN
+    errors = np.abs(found[large] / (0.05 * CLEAN[large]) - 1)
+    assert np.median(errors) < 0.05 / 3
+    assert np.quantile(errors, 0.99) < 0.05
+
+
+def test_no_reading_is_certain() -> None:
+    """Of a trace without noise: the first rotation is zero, and counts as one of the smallest."""
+    assert CLEAN[0] == 0
+    found = proportional_deviations(TIMES, CLEAN, GRIPPER, TORQUE, NONE, 0.05)
+    smallest = np.sort(CLEAN)[: len(CLEAN) // 10]
+    assert found.min() == pytest.approx(0.05 * np.median(smallest), rel=0.01)
+
+
+def test_other_noise_shows_where_the_rotation_is_small() -> None:
+    rng = np.random.default_rng(1)
+    floor = 0.3 * float(CLEAN.max())
+    trace = CLEAN + floor * rng.standard_normal(len(TIMES))
+    found = proportional_deviations(TIMES, trace, GRIPPER, TORQUE, NONE, 1e-3)
+    # Some eighty readings tell the scatter.
+    assert found.min() == pytest.approx(floor, rel=0.3)
+    given = proportional_deviations(TIMES, CLEAN, GRIPPER, TORQUE, NONE, 0.05, floor)
+    np.testing.assert_allclose(given, np.hypot(0.05 * CLEAN, floor), rtol=1e-3)
+
+
+def test_an_offset_is_not_rotation() -> None:
+    offset = nuisance_basis(TIMES, offset=True, drift=False)
+    trace = CLEAN + 3 * CLEAN.max()
+    found = proportional_deviations(TIMES, trace, GRIPPER, TORQUE, offset, 0.05)
+    large = np.quantile(CLEAN, 0.2) < CLEAN
+    np.testing.assert_allclose(found[large], 0.05 * CLEAN[large], rtol=0.1)
