@@ -39,8 +39,8 @@ class NoiseModel:
     flicker: float
     """Share of noise with spectrum 1/f."""
     proportional: float = 0.0
-    """Share of white noise whose standard deviation is proportional to the rotation, on average over
-    the readings. The rest is white noise that is the same everywhere."""
+    """Share of white noise whose standard deviation is proportional to the rotation, on average
+    over the readings. The rest is white noise that is the same everywhere."""
 
     @property
     def white(self) -> float:
