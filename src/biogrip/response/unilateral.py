@@ -47,7 +47,7 @@ class UnilateralResponse:
     parted_s: tuple[float, ...]
     """Times at which contact was lost."""
     met_s: tuple[float, ...]
-    """Times at which it was regained."""
+    """Times at which contact was regained."""
 
 
 @dataclass(frozen=True)
