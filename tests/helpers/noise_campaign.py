@@ -74,6 +74,7 @@ KINDS = {
     "flicker": Kind("1/f, three tenths", noise(flicker=Flicker(0.3))),
     "drift": Kind("drift of 0.4 standard deviations", noise(drift=Drift(0.4))),
     "outliers": Kind("one in a hundred ten times as large", noise(outliers=Outliers(0.01, 10.0))),
+    "growing": Kind("in proportion to the rotation", Noise("gaussian", LEVEL, "signal")),
     "all": Kind(
         "half of each of these",
         noise(AR1(0.05, 10.0), Flicker(0.15), Drift(0.2), Outliers(0.005, 10.0)),

@@ -140,7 +140,7 @@ class CaseProblem:
             shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
             sampled = time_s.tobytes(), shown
             if sampled not in self._condensed:
-                self._condensed[sampled] = self._weighted(time_s, shown)
+                self._condensed[sampled] = self._condense_weighted(time_s, shown)
             condensed = self._condensed[sampled]
         return make_problem(
             self.gripper,
@@ -153,7 +153,7 @@ class CaseProblem:
             noise_rad=noise_rad,
         )
 
-    def _weighted(self, time_s: Array, inertia: bool) -> Condensed:
+    def _condense_weighted(self, time_s: Array, inertia: bool) -> Condensed:
         if self.sd_rad is not None:
             return self.in_noise(time_s, None, np.zeros((0, len(time_s))), inertia=inertia)
         return self._condense(time_s, self.nuisance(time_s), inertia)
