@@ -20,6 +20,13 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
+from biogrip.experiment.sample import MODELS
+from biogrip.identifiability.profiles import Profile
+from biogrip.identifiability.quantities import parameters_and_sum
+from biogrip.identifiability.verdicts import Finding
+from biogrip.identify.answer import History, Identification
+from biogrip.identify.model_choice import ranked
+from biogrip.own_traces.fitted_models import FittedModels
 from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
@@ -496,6 +503,8 @@ def test_the_chosen_model_is_held_against_others(
 ) -> None:
     """The example is of a drop with a membrane; its parallel damper does not show."""
     assert "model is richer than the trace asks for: Maxwell liquid drop" in example[0]
+    assert example[1]["advice"].endswith(" Its values lie within the limits.")
+    assert example[0].count("97.5 %") == 1
     few = tmp_path / "few.yaml"
     few.write_text("least_squares: {candidates: 100, starts: 4}\n")
     for model, said in (("liquid_drop", "suits the trace better"), ("damper", "is not adequate")):
@@ -506,6 +515,30 @@ def test_the_chosen_model_is_held_against_others(
         assert "generalized_maxwell_3" in [
             row["model"] for row in json.loads(output.read_text())["models"]
         ]
+
+
+def test_values_of_a_simpler_model_are_held_against_limits() -> None:
+    """A drop's c is c + c_p of the richer model, whose c_p it has not."""
+    names = ["generalized_maxwell", "liquid_drop"]
+    answers = [
+        Identification(x, 1.0, 1, 1, "converged", History.of([(x, 1.0, 1.0, 1)]))
+        for x in (np.array([20.0, 5.0, 79.0, 1.0]), np.array([20.0, 5.0, 80.0]))
+    ]
+    models = FittedModels(names[0], ranked(names, [1.0, 1.0], 400), answers)
+
+    def advised(**limits: tuple[float | None, float | None]) -> str:
+        findings = []
+        for quantity in parameters_and_sum(MODELS[names[0]]):
+            ends = limits.get(quantity.label.replace(" + ", "_and_"), (None, None))
+            low, high = (None if end is None else float(np.log(end)) for end in ends)
+            profile = Profile(np.zeros(1), np.zeros(1), 0.0, low, high, np.zeros(4))
+            findings.append(Finding(quantity, profile, 0.1))
+        return str(models.data(findings)["advice"])
+
+    assert advised(k=(19.0, 21.0), c_p=(None, 3.0)).endswith("Its values lie within the limits.")
+    outside = advised(k=(21.0, None), c=(None, 90.0), c_and_c_p=(70.0, 79.0))
+    assert outside.endswith("Outside the limits lies its k, 20 N/m and its c + c_p, 80 N s/m.")
+    assert "limits" not in advised()
 
 
 @pytest.mark.parametrize(

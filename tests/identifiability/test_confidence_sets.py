@@ -44,6 +44,36 @@ def test_a_verdict_names_its_gaps() -> None:
     assert words == [said, f"{said}, except 0.368 to 2.72 N/m"]
 
 
+def test_no_limit_is_said_only_of_what_has_none() -> None:
+    """A profile that ends between 95 and 99.9 % has no limit, yet not every value fits."""
+    likelihood = likelihood_for("liquid_drop_1", 0)
+    k = QUANTITIES[:1]
+    ((plain,),) = compute_profiles([likelihood], k, smooth=False)
+    rise = max(plain.increases[[0, -1]])
+    said = []
+    for wanted in (2.0, 7.0):
+        noise_rad = likelihood.noise_rad * np.sqrt(rise / wanted)
+        ((found,),) = compute_profiles([replace(likelihood, noise_rad=noise_rad)], k, smooth=False)
+        assert (found.low, found.high) == (None, None)
+        assert max(found.increases[[0, -1]]) == pytest.approx(wanted, rel=0.05)
+        said.append(Finding(QUANTITIES[0], found, 0.1).words())
+    assert said[0] == "not determined: the trace sets no limit within the search range"
+    assert said[1].startswith("not determined: towards an end of the search range the fit is worse")
+    assert said[1].endswith("and a limit takes 10.8)")
+
+
+def test_values_are_held_against_limits_and_gaps() -> None:
+    values = np.linspace(-5, 5, 101)
+    gaps = find_gaps(values, parabolas(values), 1.0)
+    finding = Finding(
+        QUANTITIES[4], Profile(values, parabolas(values), 2.0, -3.0, None, np.zeros(4), gaps), 0.1
+    )
+    # c + c_p, of which one may vanish.
+    for log_sum, inside in ((-3.1, False), (-2.0, True), (0.0, False), (9.0, True)):
+        x = np.array([0.0, 0.0, log_sum, -np.inf])
+        assert finding.allows(x) == inside
+
+
 class Parabolas(ConstrainedFits):
     """Fits that stay where they start."""
 

@@ -10,6 +10,7 @@ OVERLAYS = {
     "design": (["design", "designed"], "all_designs", "designed*"),
     "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
+    "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 

@@ -53,6 +53,9 @@ class Profile:
         Log-parameters of the lowest increase, which is negative if the optimum was missed.
     gaps
         Stretches between the limits in which the profile is above the threshold.
+    certainty
+        Increase that a limit takes at an end of the range, if an end is above the threshold and
+        yet has no limit for want of it; else None.
     """
 
     log_values: Array
@@ -62,6 +65,7 @@ class Profile:
     high: float | None
     lowest: Array
     gaps: tuple[tuple[float, float], ...] = ()
+    certainty: float | None = None
 
 
 def compute_profiles(
@@ -108,9 +112,10 @@ def _profiles(fits: ConstrainedFits, *, smooth: bool) -> list[Profile]:
         low, high = (None if np.isnan(end) else end for end in ends)
         gaps = find_gaps(values, increases, float(fits.threshold[index]))
         lowest = x[int(np.argmin(increases))]
-        found.append(
-            Profile(values, increases, float(fits.at_best[index]), low, high, lowest, gaps)
-        )
+        short = (increases[[0, -1]] > fits.threshold[index]) & np.isnan(ends)
+        certainty = float(fits.certainty[index]) if np.any(short) else None
+        best = float(fits.at_best[index])
+        found.append(Profile(values, increases, best, low, high, lowest, gaps, certainty))
     return found
 
 

@@ -7,6 +7,7 @@ from itertools import combinations
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.likelihood import Likelihood
 from biogrip.identifiability.profiles import Profile, compute_profiles
@@ -17,9 +18,10 @@ BOUNDED_BELOW = "bounded below"
 BOUNDED_ABOVE = "bounded above"
 NOT_DETERMINED = "not determined"
 
-# Limits further than this factor from their middle tell little more than an order of magnitude:
-# moduli of cells of one kind scatter by a factor of about 2 to 3.
-_WIDE = 3.0
+WIDE = 3.0
+"""Limits further than this factor from their middle tell little more than an order of magnitude:
+moduli of cells of one kind scatter by a factor of about 2 to 3."""
+
 # A combination of undetermined parameters is profiled if the first-order standard
 # deviation of its logarithm is below this.
 _WORTH_A_LOOK = 0.5
@@ -76,6 +78,13 @@ class Finding:
         """True if the trace bounds the quantity on at least one side."""
         return self.verdict != NOT_DETERMINED
 
+    def allows(self, log_parameters: Array) -> bool:
+        """Return whether parameters, (n_parameters,), lie within the limits; NaN does."""
+        value = self.quantity.log(log_parameters)
+        low, high = self.profile.low, self.profile.high
+        beyond = (low is not None and value < low) or (high is not None and value > high)
+        return not (beyond or any(start < value < end for start, end in self.profile.gaps))
+
     def words(self) -> str:
         """Return the verdict in words, e.g. ``determined: 34.1 N/m (31.2 to 37.3)``."""
         but = " and ".join(f"{start:.3g} to {end:.3g}" for start, end in self.gaps)
@@ -93,13 +102,20 @@ class Finding:
             assert self.low is not None
             assert self.high is not None
             factor = math.sqrt(self.high / self.low)
-            how = f" only within a factor of {factor:.2g}" if factor > _WIDE else ""
+            how = f" only within a factor of {factor:.2g}" if factor > WIDE else ""
             return f"determined{how}: {self.value:.3g}{unit} ({self.low:.3g} to {self.high:.3g})"
         if self.verdict == BOUNDED_BELOW:
             return f"only bounded below: at least {self.low:.2g}{unit}"
         if self.verdict == BOUNDED_ABOVE:
             return f"only bounded above: at most {self.high:.2g}{unit}"
-        return "not determined: the trace sets no limit within the search range"
+        certainty = self.profile.certainty
+        if certainty is None:
+            return "not determined: the trace sets no limit within the search range"
+        rise = max(self.profile.increases[[0, -1]])
+        return (
+            "not determined: towards an end of the search range the fit is worse, but not clearly "
+            f"(χ² is higher by {rise:.2g}, and a limit takes {certainty:.3g})"
+        )
 
     @property
     def best_in_words(self) -> str:

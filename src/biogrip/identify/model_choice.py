@@ -78,6 +78,17 @@ def ranked(
     ]
 
 
+def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
+    """Return the candidate that BIC prefers, if it is simpler and fits about as well; else None."""
+    own = next(each for each in tried if each.candidate == chosen)
+    best = min(tried, key=lambda each: each.delta_bic)
+    more = len(own.model.names) - len(best.model.names)
+    # Difference of n ln(misfit^2), which leaves the number of parameters aside.
+    worse = own.delta_aic - best.delta_aic - 2 * more
+    worth_it = own.delta_bic >= WORTH_A_MENTION
+    return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
+
+
 def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     """State in a sentence whether BIC prefers another model to the chosen one.
 
@@ -93,12 +104,9 @@ def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     title = own.model.title[0].upper() + own.model.title[1:]
     if own.delta_bic < WORTH_A_MENTION:
         return f"{title}: none of the {len(tried)} models tried suits the trace better."
-    more, fewer = len(best.model.names), len(own.model.names)
     lead = f"{best.model.title} is preferred, with a BIC lower by {own.delta_bic:.3g}."
-    # Difference of n ln(misfit^2), which leaves the number of parameters aside.
-    worse = own.delta_aic - best.delta_aic - 2 * (fewer - more)
-    if more > fewer or (more < fewer and worse > WORTH_A_MENTION):
-        return f"{title} is not adequate: {lead}"
-    if more < fewer:
+    if preferred_simpler(tried, chosen):
         return f"{title} is richer than the trace asks for: {lead}"
-    return f"{title} suits the trace less well: {lead}"
+    if len(best.model.names) == len(own.model.names):
+        return f"{title} suits the trace less well: {lead}"
+    return f"{title} is not adequate: {lead}"

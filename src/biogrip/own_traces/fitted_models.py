@@ -1,19 +1,21 @@
 """Model selection for one trace: fits of other sample models, ranked by AIC and BIC."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from biogrip.experiment.nesting import as_richer, contained
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.likelihood import MISSED
+from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.answer import Identification
-from biogrip.identify.model_choice import FittedModel, advice, ranked
+from biogrip.identify.model_choice import FittedModel, advice, preferred_simpler, ranked
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
@@ -43,8 +45,14 @@ class FittedModels:
         pairs = zip(self.tried, self.answers, strict=True)
         return next((answer for each, answer in pairs if each.candidate == self.chosen), None)
 
-    def data(self) -> dict[str, Any]:
-        """Return one row per model, and a sentence of advice, as plain data."""
+    def data(self, findings: Sequence[Finding]) -> dict[str, Any]:
+        """Return one row per model, and advice in words, as plain data.
+
+        Parameters
+        ----------
+        findings
+            Findings on the quantities of the chosen model; none if its fit is rejected.
+        """
         if not self.tried:
             return {"models": [], "advice": None}
         rows = [
@@ -60,7 +68,26 @@ class FittedModels:
             }
             for each, answer in zip(self.tried, self.answers, strict=True)
         ]
-        return {"models": rows, "advice": advice(self.tried, self.chosen)}
+        words = f"{advice(self.tried, self.chosen)} {self._compared(findings)}".rstrip()
+        return {"models": rows, "advice": words}
+
+    def _compared(self, findings: Sequence[Finding]) -> str:
+        """Return a sentence on where a preferred simpler model's values are, if it is nested."""
+        simpler = preferred_simpler(self.tried, self.chosen)
+        bounded = [each for each in findings if each.is_bounded]
+        if simpler is None or simpler not in contained(self.chosen) or not bounded:
+            return ""
+        answers = dict(zip((each.candidate for each in self.tried), self.answers, strict=True))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = np.log(as_richer(self.chosen, simpler, answers[simpler].parameters))
+            outside = [
+                f"{each.quantity.label}, {np.exp(each.quantity.log(x)):.3g} {each.quantity.unit}"
+                for each in bounded
+                if not each.allows(x)
+            ]
+        if not outside:
+            return "Its values lie within the limits."
+        return f"Outside the limits lies its {' and its '.join(outside)}."
 
 
 def vanished(candidate: str, answer: Identification) -> list[str]:

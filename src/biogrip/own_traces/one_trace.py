@@ -16,7 +16,7 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
-from biogrip.identifiability.fit_status import HARMLESS, Note
+from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
 from biogrip.own_traces.fitted_models import judge_again, models_tried
@@ -140,7 +140,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
             "noise_model": fit.noise_data(),
-            **models.data(),
+            **models.data([] if said["fit"] == REJECTED else diagnosis.findings),
             "assumed": assumed(case),
             "by_default": by_default(options.config),
             "versions": versions(),

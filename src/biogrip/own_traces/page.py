@@ -18,6 +18,7 @@ from biogrip.own_traces.words import (
     further_notes,
     labels_of,
     limits_in_short,
+    one_sided_in_words,
     taken_for_granted,
 )
 from biogrip.products.figures.corner import draw_corner
@@ -51,6 +52,7 @@ class Page:
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
                 "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
                 "evidence_in_words": evidence_in_words(compared),
+                "one_sided": " ".join(one_sided_in_words([data])),
                 "granted": taken_for_granted(data) if data["by_default"] else None,
             }
         )

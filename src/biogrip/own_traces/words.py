@@ -45,9 +45,7 @@ def in_words(found: Mapping[str, Any]) -> str:
             for item in found["quantities"]
         ),
     ]
-    if any((item["low"] is None) != (item["high"] is None) for item in found["quantities"]):
-        alone = f"{50 * (1 + found['confidence']):g} %"
-        lines.append(f"One-sided limits hold with {alone} confidence.")
+    lines += one_sided_in_words([found])
     lines += [trade["words"] for trade in found["trades"]]
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
@@ -58,6 +56,14 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return a sentence on the confidence of one-sided limits of traces; nothing without any."""
+    quantities = [item for each in found for item in each["quantities"]]
+    if all((item["low"] is None) == (item["high"] is None) for item in quantities):
+        return []
+    return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
@@ -109,6 +115,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
+        lines += one_sided_in_words(found)
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
         lines += [f"Sums hold provided {words}." for words in provided]
         lines += [

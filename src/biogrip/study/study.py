@@ -271,6 +271,11 @@ class Case:
         return self.block.identifiability.coverage_seeds if tried else 0
 
     @property
+    def verdicts_every(self) -> int:
+        """Seeds of the coverage test that are multiples of this get verdicts, too."""
+        return self.block.identifiability.verdicts_every
+
+    @property
     def has_valley(self) -> bool:
         """True if two exchangeable parameters are searched, and others besides."""
         model = self.sample.model

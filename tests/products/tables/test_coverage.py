@@ -4,11 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import f
 
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import write_target
 from biogrip.products.stages import intervals as stage
 from biogrip.products.tables.coverage import coverage
+from biogrip.products.tables.verdict_counts import verdict_counts
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import study_of
 
@@ -65,6 +67,52 @@ def test_verdicts_are_counted_beside_intervals(tmp_path: Path, target: Path) -> 
     assert [c_p[name] for name in shown] == [2, 0, 0, 2, 1]
     assert c_p["bound_percent"] is None
     assert "95" not in made.caption
+
+
+def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
+    """Intervals of shares by the F distribution, as Clopper and Pearson's are in textbooks."""
+    empty = ("", "", "", "")
+    rows = [
+        # Of k = 1 two intervals within a factor of 3, one of which holds it, and one that is wider.
+        (CASE, "k", 0, *empty, "determined", 0.9, 1.1),
+        (CASE, "k", 1, *empty, "determined", 1.1, 1.2),
+        (CASE, "k", 2, *empty, "determined", 0.2, 2.0),
+        (CASE, "k", 3, *empty, "bounded above", "", 0.99),
+        (CASE, "k", 4, *empty, "not determined", "", ""),
+        # Not judged in full.
+        (CASE, "k", 5, 1.0, 0.9, 1.1, 1.0, "", "", ""),
+    ]
+    INTERVALS.write(tmp_path / "i.csv", rows)
+    made = verdict_counts(study_of(OVERLAY), [tmp_path / "i.csv"])
+    names = [column.name for column in made.columns]
+    found = {row[4]: dict(zip(names, row, strict=True)) for row in made.rows}
+    assert list(found) == ["bounded above", "determined", "not determined"]
+    assert [row["count"] for row in found.values()] == [1, 3, 1]
+    assert {row["seeds"] for row in found.values()} == {5}
+    assert [row["true"] for row in found.values()] == [0, 2, None]
+    assert [row["narrow"] for row in found.values()] == [None, 2, None]
+    determined = found["determined"]
+    for count, tried, name in ((3, 5, "count"), (2, 3, "true")):
+        more = tried - count + 1
+        low = 1 / (1 + more / (count * f.isf(0.975, 2 * count, 2 * more)))
+        odds = (count + 1) / (tried - count) * f.isf(0.025, 2 * (count + 1), 2 * (tried - count))
+        assert determined[f"{name}_from_percent"] == pytest.approx(100 * low)
+        assert determined[f"{name}_to_percent"] == pytest.approx(100 * odds / (1 + odds))
+    assert "at 90 %" in made.caption
+
+
+@pytest.mark.parametrize(("every", "judged"), [(1, [9, 10, 11]), (10, [10])])
+def test_some_seeds_are_judged_in_full(
+    tmp_path: Path, target: Path, every: int, judged: list[int]
+) -> None:
+    overlay = OVERLAY.replace("0.9}", f"0.9, verdicts_every: {every}}}")
+    expected = tmp_path / "expected.json"
+    expected.write_text('{"quantities": [], "trades": [], "notes": [], "fit": "ok"}')
+    case = study_of(overlay).case(CASE)
+    stage.estimate(case, range(9, 12), target, expected, [], tmp_path / "i.csv")
+    found = INTERVALS.read(tmp_path / "i.csv")
+    assert found["seed"].drop_duplicates().tolist() == judged
+    assert found["verdict"].notna().all()
 
 
 def test_every_tenth_seed_is_judged_in_full(tmp_path: Path, target: Path) -> None:

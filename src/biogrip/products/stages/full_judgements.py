@@ -11,9 +11,6 @@ from biogrip.identifiability.quantities import Quantity
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.multi_start import fit_from
 
-EVERY = 10
-"""Seeds that are multiples of this get full verdicts, from whole profiles."""
-
 _MOST_RESTARTS = 3
 
 
@@ -24,11 +21,6 @@ class Shown:
     verdict: str
     low: float | None
     high: float | None
-
-
-def judged_in_full(seed: int) -> bool:
-    """Return whether a seed gets a full verdict; it does not depend on the batch."""
-    return seed % EVERY == 0
 
 
 def refitted(likelihood: Likelihood, missed: np.ndarray, confidence: float) -> Likelihood | None:

@@ -28,7 +28,7 @@ from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.files.verdicts import EXPECTED, read_verdicts
 from biogrip.products.product import Product, Weight, the
 from biogrip.products.stages.calibrated import CALIBRATED
-from biogrip.products.stages.full_judgements import EVERY, Shown, judged_in_full, refitted, shown_of
+from biogrip.products.stages.full_judgements import Shown, refitted, shown_of
 from biogrip.products.stages.groups import groups
 from biogrip.products.uses import from_case, searched_for
 from biogrip.progress import Progress
@@ -52,7 +52,7 @@ def estimate(
 
     The noise of a seed is that of its measurement. A second estimate has parameters without
     information fixed at their true values, as the Cramér-Rao bound assumes. Some seeds get a full
-    verdict as well, as users are shown it, see `judged_in_full`.
+    verdict as well, as users are shown it: multiples of `verdicts_every`, whatever the batch.
     """
     case_problem = case.problem.calibrated(calibrated)
     time_s, _, rotation = read_target(target)
@@ -82,7 +82,7 @@ def _rows(
     rest_known, informed, truth = _rest_known(case, case_problem, time_s, rotation)
     progress = Progress(f"{case.name}, intervals", len(seeds))
     # Combine groups until they hold enough seeds with full verdicts.
-    for some in groups(seeds, EVERY):
+    for some in groups(seeds, case.verdicts_every):
         lines: dict[int, list[list[str]]] = {}
         in_full: dict[int, Likelihood] = {}
         for group in groups(some, _TIMES):
@@ -95,7 +95,7 @@ def _rows(
             for index, seed in enumerate(group):
                 best = likelihoods[index].best
                 lines[seed] = _lines(chosen, best, limits[index], known[index])
-                if judged_in_full(seed):
+                if seed % case.verdicts_every == 0:
                     in_full[seed] = likelihoods[index]
             progress.done(len(group))
         shown = shown_of(list(in_full.values()), chosen.every, case.confidence)
@@ -206,7 +206,7 @@ INTERVAL = Product(
     {"intervals": INTERVALS.batch_path},
     estimate,
     from_case(
-        "name least_squares parameters noise confidence study.study_seed",
+        "name least_squares parameters noise confidence verdicts_every study.study_seed",
         problem=searched_for,
     ),
     lambda plan: plan.batch_jobs("coverage", plan.study.covered),

@@ -20,7 +20,6 @@ from biogrip.instrument.calibrated_gripper import CALIBRATIONS
 from biogrip.products.files.intervals import INTERVALS
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import of_cases
-from biogrip.products.stages.full_judgements import EVERY
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.uses import covered, each, from_study
@@ -83,10 +82,18 @@ def coverage(
         "they are near zero they can only be overestimated, at the expense of others: hence the "
         "bias, and a spread above the bound. Rest known: the spread with these parameters at "
         "their true values. On the right: verdicts from whole profiles, as users are shown them, "
-        f"in every {EVERY}th seed, and how many of them are true; one-sided limits hold more often "
-        "than the confidence says."
+        f"in {_judged_seeds(study)}, and how many of them are true; one-sided limits hold more "
+        "often than the confidence says."
     )
     return Table(caption, _COLUMNS, rows)
+
+
+def _judged_seeds(study: Study) -> str:
+    """Return in words which seeds have verdicts."""
+    every = {case.verdicts_every for case in study.cases.values()}
+    if len(every) > 1:
+        return "some seeds"
+    return "every seed" if 1 in every else f"every {every.pop()}th seed"
 
 
 def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float) -> list[Cell]:
@@ -101,18 +108,18 @@ def _spreads(found: pd.DataFrame, truth: float, bound: float, confidence: float)
         _spread(found["estimate_rest_known"]) / bound,
         float(np.mean(100 * np.log(found["estimate"].to_numpy(float) / truth))),
         100 * confidence,
-        100 * float(np.mean(_holds(found, truth))),
+        100 * float(np.mean(holds(found, truth))),
         len(found),
     ]
 
 
 def _shown(found: pd.DataFrame, truth: float) -> Iterator[int]:
     """Yield counts of determined verdicts and true ones among them, then of one-sided verdicts."""
-    holds = _holds(found, truth, "shown_")
+    held = holds(found, truth, "shown_")
     for verdicts in ((DETERMINED,), (BOUNDED_BELOW, BOUNDED_ABOVE)):
         chosen = found["verdict"].isin(verdicts).to_numpy()
         yield int(np.sum(chosen))
-        yield int(np.sum(holds[chosen]))
+        yield int(np.sum(held[chosen]))
 
 
 def _spread(estimates: "pd.Series[float]") -> float:
@@ -120,7 +127,8 @@ def _spread(estimates: "pd.Series[float]") -> float:
     return 100 * float(np.std(np.log(estimates.to_numpy(float)), ddof=1))
 
 
-def _holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
+def holds(found: pd.DataFrame, truth: float, which: str = "") -> Array:
+    """Return 1 for every row whose limits hold the true value, else 0; (n_rows,)."""
     low = found[f"{which}low"].fillna(0.0).to_numpy(float)
     high = found[f"{which}high"].fillna(np.inf).to_numpy(float)
     return ((low <= truth) & (truth <= high)).astype(float)
@@ -135,7 +143,9 @@ COVERAGE = table(
     caption="Estimates of least squares over many seeds beside the Cramér-Rao bound, and how often "
     "their intervals, and the verdicts that users are shown, hold the truth.",
     rule="tables",
-    uses=from_study(cases=each(covered, "problem parameters noise confidence is_calibrated")),
+    uses=from_study(
+        cases=each(covered, "problem parameters noise confidence verdicts_every is_calibrated")
+    ),
     reads={
         "targets": of_cases(TARGETS, covered),
         "intervals": of_cases(INTERVALS.path, covered),
