@@ -87,12 +87,12 @@ def test_verdicts_of_every_seed_are_counted(tmp_path: Path) -> None:
     names = [column.name for column in made.columns]
     found = {row[4]: dict(zip(names, row, strict=True)) for row in made.rows}
     assert list(found) == ["bounded above", "determined", "not determined"]
-    assert [row["count"] for row in found.values()] == [1, 3, 1]
+    assert [row["reached"] for row in found.values()] == [1, 3, 1]
     assert {row["seeds"] for row in found.values()} == {5}
     assert [row["true"] for row in found.values()] == [0, 2, None]
     assert [row["narrow"] for row in found.values()] == [None, 2, None]
     determined = found["determined"]
-    for count, tried, name in ((3, 5, "count"), (2, 3, "true")):
+    for count, tried, name in ((3, 5, "reached"), (2, 3, "true")):
         more = tried - count + 1
         low = 1 / (1 + more / (count * f.isf(0.975, 2 * count, 2 * more)))
         odds = (count + 1) / (tried - count) * f.isf(0.025, 2 * (count + 1), 2 * (tried - count))
