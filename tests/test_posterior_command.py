@@ -8,6 +8,7 @@ import pytest
 
 from biogrip.cli import main
 from biogrip.identifiability.convergence import FEWEST, MOST_R_HAT
+from biogrip.identifiability.prior_sensitivity import NOTABLE
 from biogrip.own_traces.words import evidence_in_words
 from biogrip.products.files.parquet import column_names, read_columns
 from tests.helpers.places import EXAMPLE
@@ -57,10 +58,19 @@ def test_a_prior_and_the_evidence(trace: Path, capsys: pytest.CaptureFixture[str
     assert all(row["reliable"] for row in found["evidence"])
     for item in told.values():
         assert item["in_words"] in said
-    for words in (found["in_words"], "prior: k as given, else log-uniform", "The evidence is high"):
+    # What is told outweighs the trace.
+    assert told["k"]["prior_sensitivity"] > NOTABLE > told["k"]["likelihood_sensitivity"]
+    assert "The prior shapes k (" in found["prior_in_words"]
+    for words in (
+        found["in_words"],
+        found["prior_in_words"],
+        "prior: k as given, else log-uniform",
+        "The evidence is high",
+    ):
         assert words in said
     text = page.read_text()
     assert "k log-normal, median 1, spread 0.02" in text
+    assert found["prior_in_words"] in text
     assert "Posterior: marginals and pairs of parameters" in text
     samples = trace.with_name("drop.identified.parquet")
     assert f"{samples}" in said

@@ -1,6 +1,7 @@
 """The campaign that tests whether posteriors are calibrated, and a few of its draws."""
 
 import numpy as np
+import pytest
 
 from biogrip.identifiability.posterior_settings import PosteriorSettings
 from tests.helpers.posterior_campaign import NAMES, Draw, counted, drawn
@@ -19,7 +20,19 @@ def test_ranks_that_are_uniform_pass_and_others_do_not() -> None:
         assert found["p_value"].max() < 0.01
     outside = counted(Draw(np.full(len(NAMES), 0.99), False) for _ in range(20))
     assert outside["coverage_95_percent"].max() == 0
-    assert outside["converged"].max() == 0
+    assert set(outside["part"]) == {"all", "not converged"}
+
+
+def test_draws_that_have_not_converged_are_counted_apart() -> None:
+    """Those that have are uniform, and the others always too high."""
+    good = [Draw(np.full(len(NAMES), rank), True) for rank in (np.arange(40) + 0.5) / 40]
+    found = counted([*good, *[Draw(np.full(len(NAMES), 0.99), False)] * 10])
+    by_part = found.groupby("part")
+    assert by_part["draws"].first().to_dict() == {"all": 50, "converged": 40, "not converged": 10}
+    assert by_part["coverage_95_percent"].first().to_dict() == pytest.approx(
+        {"all": 76.0, "converged": 95.0, "not converged": 0.0}
+    )
+    assert by_part["p_value"].max()["converged"] > 0.5 > by_part["p_value"].max()["not converged"]
 
 
 def test_a_few_draws_are_not_all_on_one_side() -> None:

@@ -6,7 +6,9 @@ import emcee
 import numpy as np
 import pytest
 from scipy import integrate, stats
+from scipy.special import xlogy
 
+from biogrip.arrays import Array
 from biogrip.experiment.sample import CANDIDATES, MODELS, Sample
 from biogrip.identifiability.convergence import diagnose_convergence
 from biogrip.identifiability.marginals import AGREES, DIFFERS, PRIOR, compute_marginals
@@ -14,6 +16,12 @@ from biogrip.identifiability.mixture import FREEDOM, Mixture, fit_mixture
 from biogrip.identifiability.posterior import Posterior
 from biogrip.identifiability.posterior_settings import LogNormal, PosteriorSettings
 from biogrip.identifiability.prior import make_prior
+from biogrip.identifiability.prior_sensitivity import (
+    NOTABLE,
+    compute_sensitivities,
+    in_words,
+    scaled,
+)
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.valley_coordinates import ValleyCoordinates, valley_coordinates
 from tests.helpers.problems import MODEL, problem
@@ -180,6 +188,49 @@ def test_marginals_are_quantiles_of_what_counts() -> None:
     assert "no lower limit (its upper 2)" in k.why(None, 2.0)
     assert "no lower and upper limit." in k.why(None, None)
     assert "takes the best fit at every value" in k.why(0.5, 2.0)
+
+
+def jensen_shannon(p: Array, q: Array, x: Array) -> float:
+    """Cumulative Jensen-Shannon divergence, both ways, of two distribution functions."""
+    middle = 0.5 * (p + q)
+    both = xlogy(p, p / middle) + xlogy(q, q / middle)
+    return float(integrate.trapezoid(both, x) / np.log(2))
+
+
+@pytest.mark.parametrize("slope", [0.3, 1.0])
+def test_sensitivity_is_that_of_the_scaled_distribution(slope: float) -> None:
+    """A normal distribution that a part of its density tilts: raised to a power, it shifts."""
+    x = stats.norm.ppf((np.arange(20_000) + 0.5) / 20_000)
+    grid = np.linspace(x[0], x[-1], 20_001)
+    wanted = []
+    for power in (0.99, 1.01):
+        shift = (power - 1) * slope
+        distances = []
+        for way in (1, -1):
+            p, q = stats.norm.cdf(grid), stats.norm.cdf(grid - way * shift)
+            bound = integrate.trapezoid(p + q, grid)
+            distances.append(np.sqrt(jensen_shannon(p, q, grid) / bound))
+        wanted.append(max(distances) / abs(np.log2(power)))
+    # Tails of weights are smoothed.
+    assert scaled(x, slope * x) == pytest.approx(np.mean(wanted), rel=0.01)
+
+
+def test_the_prior_shapes_what_the_trace_leaves_open() -> None:
+    """Within a decade of c_p any value fits, and c makes up for it; k_p is known to a percent."""
+    trace = problem("liquid_drop_2", 0)
+    posterior = Posterior(trace, make_prior(MODEL, trace.low, trace.high, {}))
+    x = np.log([1.0, 1.0, 10.0, 0.1]) + np.random.default_rng(3).uniform(-1, 1, (2000, 4)) * [
+        *(0.02, 0.01, 0.02, 1.15)
+    ]
+    found = {
+        each.quantity.label: each
+        for each in compute_sensitivities(posterior, x, parameters_and_sum(MODEL))
+    }
+    assert found["c_p"].prior > NOTABLE > found["k_p"].prior
+    said = in_words(list(found.values()))
+    assert said.startswith("The prior shapes c_p (")
+    assert "k_p" not in said
+    assert in_words([found["k_p"]]).startswith("A slightly stronger or weaker prior")
 
 
 def test_samples_that_have_not_converged_are_told() -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.identifiability.quantities import Quantity
 
 AGREES, PRIOR, DIFFERS = "agrees", "prior", "differs"
@@ -95,12 +95,19 @@ def compute_marginals(
         Of the outer intervals.
     """
     levels = [0.5, *(0.5 * (1 + way * share) for share in (_INNER, confidence) for way in (-1, 1))]
-    found, (count, size) = [], log_parameters.shape
+    found = []
     for quantity in quantities:
-        late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.penalties]
-        holds = np.all(np.less_equal(late, 0.0).reshape(-1, count), axis=0)
+        holds = fulfilled(quantity, log_parameters, duration_s)
         # If no sample fulfils the conditions, all count.
         counted = log_parameters[holds] if np.any(holds) else log_parameters
         median, a, b, c, d = np.exp(np.quantile(quantity.logs(counted), levels)).tolist()
         found.append(Marginal(quantity, median, (a, b), (c, d), float(np.mean(holds))))
     return found
+
+
+def fulfilled(quantity: Quantity, log_parameters: Array, duration_s: float) -> BoolArray:
+    """Return which samples, of (n, n_parameters), fulfil the conditions of a quantity; (n,)."""
+    count, size = log_parameters.shape
+    late = [log_parameters @ h.form(size) - h.allowed(duration_s) for h in quantity.penalties]
+    holds: BoolArray = np.all(np.less_equal(late, 0.0).reshape(-1, count), axis=0)
+    return holds

@@ -88,6 +88,7 @@ def _posterior(posterior: Mapping[str, Any]) -> list[str]:
             if item["against_profile"] != AGREES
         ),
         posterior["in_words"],
+        posterior["prior_in_words"],
         *evidence_in_words(posterior["evidence"]),
     ]
 

@@ -15,6 +15,7 @@ from biogrip.products.files.parquet import read_columns, table_of, write_tables
 if TYPE_CHECKING:
     from biogrip.identifiability.marginals import Marginal
     from biogrip.identifiability.posterior_settings import PosteriorSettings
+    from biogrip.identifiability.prior_sensitivity import Sensitivity
     from biogrip.identifiability.sampling import Samples
 
 POSTERIOR = "results/posterior/{case}.json"
@@ -30,9 +31,12 @@ def posterior_data(
     samples: "Samples",
     settings: "PosteriorSettings",
     marginals: Sequence["Marginal"],
+    sensitivities: Sequence["Sensitivity"],
     found: Limits,
 ) -> dict[str, Any]:
     """Return the summary of a posterior as plain data in SI units."""
+    from biogrip.identifiability.prior_sensitivity import in_words
+
     steps, walkers, _ = samples.log_parameters.shape
     convergence = samples.convergence
     return {
@@ -45,7 +49,15 @@ def posterior_data(
         "tail": rounded(convergence.tail),
         "converged": convergence.reached,
         "in_words": convergence.words(),
-        "quantities": [_quantity(own, *found[own.quantity.label]) for own in marginals],
+        "prior_in_words": in_words(sensitivities),
+        "quantities": [
+            {
+                **_quantity(own, *found[own.quantity.label]),
+                "prior_sensitivity": rounded(each.prior),
+                "likelihood_sensitivity": rounded(each.likelihood),
+            }
+            for own, each in zip(marginals, sensitivities, strict=True)
+        ],
     }
 
 

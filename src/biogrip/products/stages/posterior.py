@@ -39,6 +39,7 @@ from biogrip.study.study import Case
 
 # Imported lazily: the sampler takes a second to import.
 _SAMPLER = "biogrip.identifiability.sampling"
+_SENSITIVITY = "biogrip.identifiability.prior_sensitivity"
 _EVIDENCE = "biogrip.identifiability.evidence"
 
 
@@ -79,6 +80,7 @@ def posterior_of_trace(
     log-parameters, (n, n_parameters).
     """
     from biogrip.identifiability.marginals import compute_marginals
+    from biogrip.identifiability.prior_sensitivity import compute_sensitivities
     from biogrip.identifiability.quantities import parameters_and_sum
     from biogrip.identifiability.sampling import sampled
 
@@ -90,10 +92,11 @@ def posterior_of_trace(
     every = found.log_parameters.reshape(-1, drawn.shape[1])
     quantities = parameters_and_sum(case_problem.searched)
     marginals = compute_marginals(every, quantities, problem.residuals.duration_s, case.confidence)
+    sensitivities = compute_sensitivities(posterior, drawn, quantities)
     data = {
         "model": case_problem.model.name,
         "confidence": case.confidence,
-        **posterior_data(found, block, marginals, limits),
+        **posterior_data(found, block, marginals, sensitivities, limits),
         "evidence": _evidence(case, pose, case_problem.noise_rad, progress),
     }
     return data, drawn
@@ -166,5 +169,5 @@ SAMPLED = Product(
         "calibrated": CALIBRATED,
     },
     weight=JUDGEMENT,
-    modules=lambda _: (METHODS["least_squares"].module, _SAMPLER, _EVIDENCE),
+    modules=lambda _: (METHODS["least_squares"].module, _SAMPLER, _SENSITIVITY, _EVIDENCE),
 )
