@@ -31,6 +31,7 @@ ERRORS = PUBLISHED / "tables" / "errors.csv"
 VERDICTS = PUBLISHED / "tables"
 NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
+RANKS = DISHES.with_name("ranks.csv")
 SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
@@ -232,11 +233,31 @@ def simulated_dishes() -> str:
             "ratio held": f"{row['coverage_percent']:.1f} %",
             "found": f"{row['power_percent']:.1f} %",
             "designed": f"{row['designed_power_percent']:.1f} %",
-            "held by ranks": f"{row['rank_coverage_percent']:.1f} %",
             "spread held": f"{row['spread_coverage_percent']:.1f} %",
             "shrunk cells held": f"{row['shrunk_coverage_percent']:.1f} %",
         }
         for row in pd.read_csv(DISHES).to_dict("records")
+    )
+
+
+def unequal_dishes() -> str:
+    """How often both ratios held the truth for dishes that spread alike or not."""
+    rows = pd.read_csv(RANKS)
+    return _table(
+        {
+            "cells a dish": f"{row['cells_1']} and {row['cells_2']}",
+            "spreads": f"{row['spread_1']:g} and {row['spread_2']:g}",
+        }
+        | {
+            f"{what}, {kind}": f"{held:.1f} %" if held == held else "too few cells"
+            for kind, of_kind in rows.groupby("kind", sort=False)
+            for what, held in zip(
+                ("ratio held", "by ranks"),
+                of_kind.iloc[number][["coverage_percent", "rank_coverage_percent"]],
+                strict=True,
+            )
+        }
+        for number, row in enumerate(rows[rows["kind"] == rows["kind"][0]].to_dict("records"))
     )
 
 
@@ -246,9 +267,8 @@ def posterior_calibration() -> str:
         return "(Not yet published.)"
     return _table(
         {
+            "draws": f"{row['part']}, {row['draws']}",
             "quantity": row["quantity"],
-            "draws": f"{row['draws']}",
-            "converged": f"{row['converged']}",
             "p-value": f"{row['p_value']:.2g}",
             "in bins": f"{row['p_value_binned']:.2g}",
             "in the 50 % interval": f"{row['coverage_50_percent']:.3g} %",
@@ -346,7 +366,11 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
         "methods": methods_compared,
     },
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "groups.md": {"cells": cells_needed_table, "dishes": simulated_dishes},
+    ROOT / "docs" / "groups.md": {
+        "cells": cells_needed_table,
+        "dishes": simulated_dishes,
+        "ranks": unequal_dishes,
+    },
     ROOT / "docs" / "design.md": {"sequential": experiments_needed, "shapes": bounds_by_shape},
     ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study},

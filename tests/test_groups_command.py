@@ -93,7 +93,7 @@ def test_groups_are_compared(compared: tuple[dict[str, Any], str]) -> None:
     assert apart["low"] < 2 < apart["high"]
     assert apart["low"] > 1
     assert apart["p"] == apart["adjusted_p"] < 0.05
-    # Six cells are too few for any interval by ranks.
+    # Three cells a dish are too few for an interval by ranks.
     assert apart["by_ranks"]["low"] is None
     for word in ("treated over control", f"{apart['ratio']:.3g}", "3 of 3", "control_0_1.csv"):
         assert word in said

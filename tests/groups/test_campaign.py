@@ -8,6 +8,8 @@ import pandas as pd
 import pytest
 
 from tests.helpers.groups_campaign import QUANTITIES, TABLE, counted, dishes
+from tests.helpers.ranks_campaign import DISHES, rows
+from tests.helpers.ranks_campaign import TABLE as RANKS
 
 
 def test_cells_are_known_as_well_as_they_say() -> None:
@@ -60,3 +62,20 @@ def test_published_power_is_that_designed(published: pd.DataFrame) -> None:
     small = published["error"] < published["spread"] / 2
     assert small.sum() == 5
     assert (apart[small] <= allowed[small]).all()
+
+
+def test_pairs_of_unequal_dishes_are_counted() -> None:
+    found = pd.DataFrame(rows(4))
+    assert len(found) == 2 * len(DISHES)
+    assert set(found["coverage_percent"]) <= {0.0, 25.0, 50.0, 75.0, 100.0}
+    few = found[["cells_1", "cells_2"]].min(axis=1) < 6
+    assert (found["rank_coverage_percent"].isna() == few).all()
+
+
+def test_published_ratios_by_ranks_hold_the_truth_for_unequal_spreads() -> None:
+    """Three standard deviations of a share of 95 % of 800, and 0.5 % for few cells."""
+    published = pd.read_csv(RANKS)
+    assert (published["pairs"] == 800).all()
+    held = published["rank_coverage_percent"].dropna()
+    assert len(held) == 10
+    assert held.min() > 95 - 3 * 0.77 - 0.5

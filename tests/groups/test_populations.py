@@ -5,10 +5,11 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 from scipy import integrate, special, stats
+from statsmodels.stats.nonparametric import rank_compare_2indep
 
 from biogrip.arrays import Array
 from biogrip.groups.comparison import adjusted, difference
-from biogrip.groups.hodges_lehmann import shift
+from biogrip.groups.median_ratio import shift
 from biogrip.groups.population import Estimates, Population, estimate_population
 from biogrip.groups.power import cells_needed, detectable_ratio, power
 
@@ -134,20 +135,32 @@ def test_p_values_of_several_groups_are_adjusted_step_by_step() -> None:
     assert adjusted([0.2]) == pytest.approx([0.2])
 
 
-def test_a_shift_is_where_the_rank_test_turns() -> None:
-    one, other = drawn(7, 1.0, 0.0, 1.0), drawn(6, 1.0, 0.0)
+@pytest.mark.parametrize(("cells", "spread"), [((7, 6), 1.0), ((6, 12), 0.2), ((9, 9), 5.0)])
+def test_a_shift_is_where_the_rank_test_turns(cells: tuple[int, int], spread: float) -> None:
+    """Brunner and Munzel's test as statsmodels has it, for spreads that differ, too."""
+    one, other = drawn(cells[0], spread, 0.0, 1.0), drawn(cells[1], 1.0, 0.0)
     found = shift(one, other, 0.95)
     assert found.estimate == np.median(np.subtract.outer(one, other))
     assert found.low is not None
     assert found.high is not None
     for limit, inwards in ((found.low, 1), (found.high, -1)):
-        p_inside, p_outside = (
-            stats.mannwhitneyu(one - limit - side * 1e-9, other, method="exact").pvalue
-            for side in (inwards, -inwards)
-        )
-        assert p_outside <= 0.05 < p_inside
-    few = shift(one[:3], other[:3], 0.95)
-    assert (few.low, few.high) == (None, None)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            p_inside, p_outside = (
+                rank_compare_2indep(one - limit - side * 1e-9, other).pvalue
+                for side in (inwards, -inwards)
+            )
+        assert p_inside >= 0.05
+        # Not a number where all of one are on one side of all of the other.
+        assert not p_outside >= 0.05
+
+
+def test_few_cells_have_no_interval_by_ranks() -> None:
+    """Of n cells beside others that hardly scatter, all are on one side in 2 of 2^n cases."""
+    one, other = drawn(20, 1.0, 0.0), drawn(20, 1.0, 0.0)
+    for confidence, fewest in ((0.9, 5), (0.95, 6), (0.99, 8)):
+        few = shift(one[: fewest - 1], other, confidence)
+        assert (few.low, few.high) == (None, None)
+        assert shift(other, one[:fewest], confidence).low is not None
 
 
 def test_power_is_the_noncentral_t() -> None:

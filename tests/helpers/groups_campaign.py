@@ -17,7 +17,6 @@ from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.groups.comparison import difference
 from biogrip.groups.group_findings import log_deviation
-from biogrip.groups.hodges_lehmann import shift
 from biogrip.groups.population import FEWEST_CELLS, Estimates, estimate_population
 from biogrip.groups.power import power
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
@@ -134,7 +133,7 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
     """Count how often intervals hold the truth and differences are seen, a row a quantity."""
     rows = []
     for q, quantity in enumerate(QUANTITIES):
-        held, seen, ranked, spreads, shrunk, widths = [], [], [], [], [], []
+        held, seen, spreads, shrunk, widths = [], [], [], [], []
         determined = []
         for first, second in ((one[q], other[q]) for one, other in found):
             own = [each.estimates for each in (first, second)]
@@ -145,9 +144,6 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
             compared = difference(*populations)
             held.append(compared.low <= RATIO <= compared.high)
             seen.append(compared.p_value < 1 - CONFIDENCE)
-            plain = shift(own[0].log_values, own[1].log_values, CONFIDENCE)
-            if plain.low is not None and plain.high is not None:
-                ranked.append(plain.low <= np.log(RATIO) <= plain.high)
             for dish, each in zip((first, second), populations, strict=True):
                 spreads.append(each.spread_low <= SPREAD <= each.spread_high)
                 away = np.abs(each.shrunk - dish.truth)
@@ -167,7 +163,6 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
                 "coverage_percent": 100 * np.mean(held),
                 "power_percent": 100 * np.mean(seen),
                 "designed_power_percent": 100 * power(RATIO, cells, SPREAD, error, CONFIDENCE),
-                "rank_coverage_percent": 100 * np.mean(ranked),
                 "spread_coverage_percent": 100 * np.mean(spreads),
                 "shrunk_coverage_percent": 100 * np.mean(shrunk),
             }

@@ -7,8 +7,8 @@ from math import sqrt
 import numpy as np
 
 from biogrip.groups.comparison import Difference, adjusted, difference
-from biogrip.groups.hodges_lehmann import Shift, shift
 from biogrip.groups.joint_fit import JointFit
+from biogrip.groups.median_ratio import Shift, shift
 from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, estimate_population
 from biogrip.groups.power import detectable_ratio
 from biogrip.identifiability.likelihood import Likelihood
