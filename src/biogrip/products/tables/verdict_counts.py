@@ -34,15 +34,7 @@ _COLUMNS = (
 
 
 def verdict_counts(study: Study, intervals: list[Path]) -> Table:
-    """Count verdicts of whole profiles, and those whose limits hold the true value.
-
-    Parameters
-    ----------
-    study
-        The study with these cases.
-    intervals
-        Files of the cases, CSV, in their order.
-    """
+    """Count verdicts of whole profiles, and those whose limits hold the true value."""
     rows: list[tuple[Cell, ...]] = []
     for (name, case), file in zip(study.cases.items(), intervals, strict=True):
         found = INTERVALS.read(file)
@@ -89,8 +81,6 @@ def _judged(study: Study) -> list[str]:
 
 VERDICT_COUNTS = table(
     verdict_counts,
-    name="verdict_counts",
-    item="verdict_counts",
     caption="How often whole profiles call each quantity determined, bounded or not determined, "
     "and how often the limits that users are shown hold the true value.",
     uses=from_study(cases=each(_judged, "problem parameters confidence")),
