@@ -111,10 +111,10 @@ class Finding:
         certainty = self.profile.certainty
         if certainty is None:
             return "not determined: the trace sets no limit within the search range"
-        rise = max(self.profile.increases[[0, -1]])
+        increase = max(self.profile.increases[[0, -1]])
         return (
             "not determined: towards an end of the search range the fit is worse, but not clearly "
-            f"(χ² is higher by {rise:.2g}, and a limit takes {certainty:.3g})"
+            f"(χ² is higher by {increase:.2g}, and a limit takes {certainty:.3g})"
         )
 
     @property
