@@ -64,7 +64,7 @@ def test_an_uncertain_inertia_changes_the_ring_where_one_shows() -> None:
         0,
         len(times),
     )
-    (row,) = gripper_functions(case_problem, times, parameters, inertia=True)
+    row, _ = gripper_functions(case_problem, times, parameters, inertia=True)
     heavy, light = (
         simulated_rotation(
             replace(

@@ -2,9 +2,16 @@ import numpy as np
 import pytest
 from mpmath import mp, mpf
 
-from biogrip.instrument.actuator import CombDrive, capacitance_slope, torque, voltage
+from biogrip.instrument.actuator import (
+    CombDrive,
+    capacitance_slope,
+    torque,
+    torque_uncertainty,
+    voltage,
+)
 
-TABLE_2 = CombDrive(40e-6, 4e-6, 3e-6, 66, 321e-6, 6.0, 4.5, 1.5)
+REST = 66, 321e-6, 6.0, 4.5, 1.5
+TABLE_2 = CombDrive(40e-6, 4e-6, 3e-6, *REST)
 
 
 def test_slope_is_the_sum_of_cylindrical_capacitors() -> None:
@@ -52,3 +59,21 @@ def test_voltage_inverts_torque() -> None:
 def test_a_comb_drive_does_not_push() -> None:
     with pytest.raises(ValueError, match="only pulls"):
         voltage(TABLE_2, -1e-9)
+
+
+def test_the_torque_is_as_uncertain_as_that_of_combs_that_vary() -> None:
+    """Torques of combs drawn at random scatter so, to the standard error of 20 000 draws."""
+    rng = np.random.default_rng(3)
+    volts, gap, height = 16.3, 0.06e-6, 0.8e-6
+    drawn = [
+        torque(
+            CombDrive(40e-6 + height * z[0], 4e-6 - gap * z[1], 3e-6 + gap * z[1], *REST),
+            volts * (1 + 0.01 * z[2]),
+        )
+        for z in rng.standard_normal((20_000, 3))
+    ]
+    scatter = np.std(drawn) / float(torque(TABLE_2, volts))
+    found = torque_uncertainty(TABLE_2, 0.01, gap, height)
+    assert found == pytest.approx(scatter, rel=3 / np.sqrt(2 * len(drawn)))
+    assert torque_uncertainty(TABLE_2, 0.01, 0.0, 0.0) == pytest.approx(0.02)
+    assert torque_uncertainty(TABLE_2, 0.0, 0.0, height) == pytest.approx(0.02)

@@ -159,6 +159,13 @@ BAD = {
     r"coloured noise model",
     "gripper: {uncertainty: {left: {stiffness_Nm_per_rad: 1e-6}}}": r"uncertainty.left."
     r"stiffness_Nm_per_rad: found 1e-06, allowed is less than half of 4.4e-07",
+    "gripper: {uncertainty: {arm_length_m: 1e-3}}": r"uncertainty.arm_length_m: found 0.001, "
+    r"allowed is less than half of 0.0015",
+    "gripper: {uncertainty: {thickness_m: 1e-6}}": r"uncertainty.thickness_m: needs a protocol in "
+    r"voltages; allowed with torques is torque_percent",
+    "gripper: {uncertainty: {finger_gap_m: 2e-6}}\n"
+    "protocol: {phases: [{duration_s: 400.0, voltage_V: 16.0}]}": r"finger_gap_m: found 2e-06, "
+    r"allowed is less than half of 3e-06",
     "measurement: {noise: {kind: pink}}": r"noise.kind: found 'pink'. Allowed: gaussian, uniform",
     "genetic_algorithm: {survivors: 500}": r"survivors: found 500, allowed is less than population",
     "search_range: {k: {exponent: [3, -3]}}": r"found \[3, -3\], allowed is \[lowest, highest\]",

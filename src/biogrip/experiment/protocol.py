@@ -6,7 +6,7 @@ voltage, as voltage.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -127,6 +127,11 @@ class TorqueHistory:
         for start, omega, amplitudes in self.swings[::2]:
             harmonics[self.time_s.searchsorted(start)].append((omega, amplitudes))
         return powers, harmonics
+
+    def times(self, factor: float) -> "TorqueHistory":
+        """Return the protocol with all torques multiplied by a factor."""
+        names = ("left", "right", "harmonic_left", "harmonic_right")
+        return replace(self, **{name: factor * getattr(self, name) for name in names})
 
     @cached_property
     def only_steps(self) -> bool:

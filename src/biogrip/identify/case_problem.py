@@ -42,7 +42,8 @@ class CaseProblem:
     coloured
         True if the noise of a trace may be autocorrelated, see `trace_fit`.
     uncertainty
-        Standard uncertainties of the gripper's arms, by arm and key.
+        Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
+        ``gripper`` itself; and ``share`` of the ``torque``.
     phases
         The protocol.
     sample
@@ -104,10 +105,15 @@ class CaseProblem:
         return replace(self, sd_rad=sd_rad, noise_rad=float(np.sqrt(np.mean(sd_rad**2))))
 
     @property
+    def uncertain_keys(self) -> list[str]:
+        """Parts and keys of the gripper that are known with an uncertainty."""
+        parts = self.uncertainty.items()
+        return [f"{part}.{key}" for part, known in parts for key in known if known[key]]
+
+    @property
     def plain(self) -> bool:
         """True if noise is assumed to be white, and the gripper to be known exactly."""
-        known = [value for arm in self.uncertainty.values() for value in arm.values()]
-        return not self.coloured and not any(known)
+        return not self.coloured and not self.uncertain_keys
 
     def calibrated(self, files: Sequence[Path]) -> "CaseProblem":
         """Return a copy with the arms of the first calibration file (YAML), if there is one.
@@ -120,7 +126,7 @@ class CaseProblem:
         if not files:
             return self
         gripper, uncertainty = read_calibrated_arms(files[0], self.gripper)
-        return replace(self, gripper=gripper, uncertainty=uncertainty)
+        return replace(self, gripper=gripper, uncertainty={**self.uncertainty, **uncertainty})
 
     def of(
         self,

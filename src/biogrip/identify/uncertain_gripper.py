@@ -1,25 +1,31 @@
 """Effect of the gripper's calibration uncertainty on a rotation."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.simulation import simulated_rotation
 
-_WITHOUT_RING = ("stiffness_Nm_per_rad", "damping_Nms_per_rad")
+# Square of three standard uncertainties.
+_SECOND_ORDER = 9.0
+_OF_RING = "inertia_kgm2"
 
 
 def gripper_functions(
     case_problem: CaseProblem, time_s: Array, parameters: Array, *, inertia: bool
 ) -> Array:
-    """Compute the change of a rotation by one standard uncertainty of each arm property.
+    """Compute the changes of a rotation by the uncertainties of the gripper's properties.
 
-    The change is half the difference between rotations with the property a standard
-    uncertainty above and below its value, as is recommended for nonlinear models [1]_.
+    To the first order it is half the difference between rotations with the property a standard
+    uncertainty above and below its value, as is recommended for nonlinear models [1]_. The mean
+    of both, less the rotation itself, is its second order: it grows with the square of the error,
+    and has the amplitude of an error of three standard uncertainties. Without it limits would be
+    too narrow where the noise is far below the square.
 
     Parameters
     ----------
@@ -34,8 +40,8 @@ def gripper_functions(
 
     Returns
     -------
-    (n_properties, n_times)
-        Changes in rad, one row for each uncertain property.
+    (2 n_properties, n_times)
+        Changes in rad of first order, a row for each uncertain property, then those of second.
 
     References
     ----------
@@ -44,27 +50,41 @@ def gripper_functions(
     """
     network = case_problem.searched.network(parameters)
 
-    def simulated(gripper: Gripper) -> Array:
-        rows = simulated_rotation(
-            gripper, network, case_problem.torque, time_s, nonlinear=case_problem.nonlinear
-        )
-        return rows[0]
+    def simulated(gripper: Gripper, torque: TorqueHistory) -> Array:
+        nonlinear = case_problem.nonlinear
+        return simulated_rotation(gripper, network, torque, time_s, nonlinear=nonlinear)[0]
 
-    properties = (*_WITHOUT_RING, "inertia_kgm2") if inertia else _WITHOUT_RING
-    pairs = _pairs(case_problem.gripper, case_problem.uncertainty, properties)
-    found = [0.5 * (simulated(above) - simulated(below)) for above, below in pairs]
-    return np.reshape(found, (len(found), len(time_s)))
+    pairs = [
+        (simulated(*above), simulated(*below))
+        for above, below in _pairs(case_problem, inertia=inertia)
+    ]
+    if not pairs:
+        return np.zeros((0, len(time_s)))
+    above, below = np.stack(pairs, axis=1)
+    second = 0.5 * (above + below) - simulated(case_problem.gripper, case_problem.torque)
+    return np.vstack((0.5 * (above - below), _SECOND_ORDER * second))
 
 
-def _pairs(
-    gripper: Gripper, uncertainty: Mapping[str, Mapping[str, float]], properties: Sequence[str]
-) -> Iterator[tuple[Gripper, Gripper]]:
-    """Yield two grippers for each uncertain property, one above and one below its value."""
-    for name, known in uncertainty.items():
-        arm = getattr(gripper, name)
-        for key in properties:
-            if known.get(key):
-                above, below = (
-                    replace(arm, **{key: getattr(arm, key) + sign * known[key]}) for sign in (1, -1)
-                )
-                yield replace(gripper, **{name: above}), replace(gripper, **{name: below})
+_Instrument = tuple[Gripper, TorqueHistory]
+
+
+def _pairs(case_problem: CaseProblem, *, inertia: bool) -> Iterator[tuple[_Instrument, ...]]:
+    """Yield two instruments for each uncertain property, one above and one below its value."""
+    gripper, torque = case_problem.gripper, case_problem.torque
+    for name, known in case_problem.uncertainty.items():
+        for key, uncertainty in known.items():
+            if not uncertainty or (key == _OF_RING and not inertia):
+                continue
+            errors = (uncertainty, -uncertainty)
+            if name == "torque":
+                yield tuple((gripper, torque.times(1 + error)) for error in errors)
+            else:
+                yield tuple((_changed(gripper, name, key, error), torque) for error in errors)
+
+
+def _changed(gripper: Gripper, name: str, key: str, error: float) -> Gripper:
+    """Return a gripper with a property of its own or of an arm changed."""
+    if name == "gripper":
+        return replace(gripper, **{key: getattr(gripper, key) + error})
+    arm = getattr(gripper, name)
+    return replace(gripper, **{name: replace(arm, **{key: getattr(arm, key) + error})})

@@ -10,9 +10,11 @@ from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, HARMLESS, Note
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
-from biogrip.identify.answer import Progress
+from biogrip.identify.answer import Identification, Progress
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.multi_start import fit_from
+from biogrip.identify.problem import Problem
+from biogrip.identify.trace_fit import trace_fit
 from biogrip.products.files.traces import Measurements
 from biogrip.response.flow import drift_is_flow
 from biogrip.study.study import Case, Study
@@ -47,10 +49,13 @@ def second_opinion(
     if not added or case_problem.nonlinear or case_problem.coloured:
         return []
     also = replace(case_problem, offset=True, drift=True)
-    problem = also.of(recorded.time_s, recorded.rotation_rad[0])
-    rng = stream(study.study_seed, case.name, 0, "instrument")
-    found = best_fit(problem, case.method("least_squares"), rng, progress)
-    likelihood = diagnosis.likelihood
+
+    def find(problem: Problem) -> Identification:
+        rng = stream(study.study_seed, case.name, 0, "instrument")
+        return best_fit(problem, case.method("least_squares"), rng, progress)
+
+    fit = trace_fit(also, recorded.time_s, recorded.rotation_rad[0], find)
+    problem, found, likelihood = fit.problem, fit.found, diagnosis.likelihood
     # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
     from_there = found.at(fit_from([problem], likelihood.best))
     found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))

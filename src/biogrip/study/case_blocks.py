@@ -228,8 +228,11 @@ class CaseBlock(Shared):
                 text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
                 yield ("assumed_gripper",), f"{text}gripper block."
 
-    def contact_problems(self, comb: CombDrive) -> Iterator[Problem]:
-        """Find a sample that does not fit between the jaws."""
+    def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
+        """Find a sample that does not fit between the jaws, and what is no comb drive's."""
+        in_volts = all(phase.voltage_V is not None for phase in self.protocol.phases)
+        for path, text in self.gripper.comb_problems(comb, in_volts=in_volts):
+            yield ("gripper", *path), text
         if self.sample.size_m is not None:
             try:
                 self.gripper.contact(comb, self.sample.size_m)

@@ -163,7 +163,7 @@ class StudyConfig(Shared):
                 yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
         yield from self._band_problems()
         for name, case in self.cases.items():
-            for path, text in case.contact_problems(self.actuator):
+            for path, text in case.comb_problems(self.actuator):
                 yield ("cases", name, *path), text
         methods = {name: asdict(block) for name, block in self.method_blocks.items()}
         known = self.model_dump() | methods if self.reconstructed else {}

@@ -11,6 +11,7 @@ from biogrip.study.yaml_text import LONGEST_NUMBER
 
 _UNITS = {
     **{name: name for name in ("s", "m", "Hz", "rad", "deg", "V")},
+    "percent": "%",
     **{"Nm": "N m", "Nms": "N m s", "kgm2": "kg m²"},
     **{"Nms_per_rad": "N m s/rad", "Nm_per_rad": "N m/rad"},
 }

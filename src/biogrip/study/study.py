@@ -207,7 +207,7 @@ class Case:
             noise_rad=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
-            uncertainty=self.block.gripper.uncertainties,
+            uncertainty=self.block.gripper.uncertainties(self.actuator),
         )
 
     def method(self, name: str) -> object:

@@ -144,7 +144,7 @@ def _point_problems(study: StudyConfig) -> Iterator[Problem]:
     for name, block in point_blocks(sweeps, study.cases).items():
         case, found = _with_methods(CaseBlock, block)
         if case and not found:
-            found = list(case.contact_problems(study.actuator))
+            found = list(case.comb_problems(study.actuator))
             found += [(path[2:], text) for path, text in _assumed_problems({name: case})]
         yield from (placed(by_name, (("cases", name, *path), text)) for path, text in found)
 
