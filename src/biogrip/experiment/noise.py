@@ -98,7 +98,8 @@ def add_noise(
         if time_s is None:
             raise ValueError("noise with parts that are not white needs the sampling times")
         unit = _with_parts(unit, time_s, noise, rng)
-    return rotation_rad + standard_deviation(rotation_rad, noise) * unit
+    noisy: Array = rotation_rad + standard_deviation(rotation_rad, noise) * unit
+    return noisy
 
 
 def _with_parts(unit: Array, time_s: Array, noise: Noise, rng: np.random.Generator) -> Array:
