@@ -78,7 +78,7 @@
       { yaxis: { type: "log" } });
     const note = item.nonlinear ? " The study's model is nonlinear here; the page draws the linear one." : "";
     element("fit-words").textContent = !item.closed_form
-      ? "Arms or torques differ, or arms ring: the page has no closed form for that, and shows traces only."
+      ? "Arms or torques differ, arms ring, or readings have weights: the page does not compute that, and shows traces only."
       : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit_rad)} rad.${note}` : "";
     element("plot-profile").dataset.ready = "";
     clearTimeout(showTrace.later);
@@ -173,7 +173,7 @@
   function showTried() {
     const item = cases[tried.index];
     if (!item.closed_form) {
-      element("force-words").textContent = "Arms or torques differ, or arms ring: the page has no closed form for that.";
+      element("force-words").textContent = "Arms or torques differ, arms ring, or readings have weights: the page does not compute that.";
       return;
     }
     const torque = mechanics.scaled(item.torque, tried.torque);

@@ -87,8 +87,9 @@ def _case(
         "name": case.name,
         "title": case.title,
         "model": model.title,
-        # What the page can compute: symmetric arms that do not ring.
-        "closed_form": is_symmetric(case.problem.gripper, torque)
+        # What the page can compute: symmetric arms that do not ring, and readings of one weight.
+        "closed_form": sampled.sd_rad is None
+        and is_symmetric(case.problem.gripper, torque)
         and not case.problem.shows_inertia(time_s, shown, sigma),
         "nonlinear": problem.nonlinear or (not case.recorded and case.nonlinear_target),
         "truth": _network(model, case.parameters),
