@@ -6,7 +6,7 @@ import pytest
 from biogrip.digits import counted, rounded
 from biogrip.identifiability.whiteness import doubts_about_noise
 from biogrip.products.files.traces import Measurements
-from biogrip.products.stages.recording import notes_on_gaps
+from biogrip.products.stages.recording import notes_on_recording
 
 
 @pytest.mark.parametrize(
@@ -18,7 +18,7 @@ def test_one_is_no_plural(count: object, said: str) -> None:
 
 def test_notes_on_one_of_something_are_sentences() -> None:
     times = np.arange(800.0)
-    (note,) = notes_on_gaps(Measurements(times, None, {0: times}, 1))
+    (note,) = notes_on_recording(Measurements(times, None, {0: times}, 1))
     assert note == "Left out for want of a number: 1 row of 801."
     residual = np.random.default_rng(3).standard_normal(60)
     residual[30] = 30.0

@@ -411,7 +411,7 @@ def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
     quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
     quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
     rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
-    rest |= {"fit": "ok", "reasons": []}
+    rest |= {"fit": "ok", "reasons": [], "limits": "Limits are statistical only."}
     write_table(Outcome([{**found, **rest}], {}), table)
     check_output(table, force=False)
     table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
@@ -580,7 +580,7 @@ def test_colours_are_for_terminals(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     quantity |= {"value": 2.0, "low": 1.0, "high": 3.0, "in_words": "determined: 2"}
     found: dict[str, Any] = {"trace": "a", "quantities": [quantity], "confidence": 0.9}
-    found |= {"by_default": [], "notes": [], "fit": "ok"}
+    found |= {"by_default": [], "notes": [], "fit": "ok", "limits": "Limits are statistical."}
     assert "\x1b" not in side_by_side([found], {})
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
     monkeypatch.delenv("NO_COLOR", raising=False)

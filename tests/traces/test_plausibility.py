@@ -60,9 +60,11 @@ def check(
     columns: Columns,
     noise_rad: float | None = None,
     offset: bool = False,
-) -> None:
+) -> str | None:
     nuisance = nuisance_basis(recording.time_s, offset=offset, drift=False)
-    check_recording(recording, gripper, torque, path, columns, nuisance, noise_rad)
+    return check_recording(
+        recording, gripper, torque, path, columns, nuisance, noise_rad, noise_rad
+    )
 
 
 def recorded(time_s: Array, rotation_rad: Array) -> Recording:
@@ -174,6 +176,25 @@ def test_the_unit_that_would_fit_is_named(
         said = refusal(recorded(times, values), gripper, steps, columns)
         assert f"column '{columns.rotation}'" in said
         assert said.endswith(f"It would fit if it were {hint}")
+
+
+def test_a_stiff_sample_passes_if_its_rotation_is_far_above_a_given_noise(
+    gripper: Gripper, steps: TorqueHistory
+) -> None:
+    times = sample_times(400.0, 1.0)
+    values = trace(gripper, steps, (35e3, 12.3e3, 3e5, 1.0), times)
+    seen = recorded(times, values)
+    assert "allowed is at least 7.27e-06 rad, or less with a given noise (--noise)" in refusal(
+        seen, gripper, steps
+    )
+    note = check(seen, gripper, steps, FILE, SI, noise_rad=values.max() / 20)
+    assert note is not None
+    assert "the sample is very stiff, or the unit is not the right one" in note
+    assert "It would fit if it were" in note
+    with pytest.raises(BiogripError, match="allowed is at least"):
+        check(seen, gripper, steps, FILE, SI, noise_rad=values.max() / 5)
+    plausible = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
+    assert check(recorded(times, plausible), gripper, steps, FILE, SI, noise_rad=1e-6) is None
 
 
 def test_a_rotation_that_no_unit_explains_has_no_hint(

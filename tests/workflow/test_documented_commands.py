@@ -33,7 +33,7 @@ LEFT = {
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
-        *("maxwell.json", "posterior.json", "posterior.parquet"),
+        *("maxwell.json", "uncertain.json", "posterior.json", "posterior.parquet"),
     ],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),

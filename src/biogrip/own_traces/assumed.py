@@ -4,6 +4,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.study.load import read_configs
 from biogrip.study.plain import plain
 from biogrip.study.study import Case
@@ -18,6 +19,13 @@ def assumed(case: Case) -> dict[str, Any]:
 def _block(case: Case, name: str) -> Any:
     own = case.block
     return own.method_block(name) if name == "least_squares" else getattr(own, name)
+
+
+def gripper_in_limits(case_problem: CaseProblem) -> str:
+    """Return a sentence on the part that the gripper's uncertainty has in the limits."""
+    if not case_problem.uncertain_keys:
+        return "Limits are statistical only: the gripper is taken as exact."
+    return f"Limits include uncertainties of the gripper: {', '.join(case_problem.uncertain_keys)}."
 
 
 def by_default(config: Path | None) -> list[str]:

@@ -80,6 +80,7 @@ def write_table(outcome: Outcome, table: Path) -> None:
             each["noise_rad"],
             each["misfit_rad"],
             *_of_quantities(each, quantities),
+            each["limits"],
             " ".join(each["reasons"]),
             each["advice"] or "",
             each[WRITTEN_BY],
@@ -87,9 +88,9 @@ def write_table(outcome: Outcome, table: Path) -> None:
         for each in map(rounded_numbers, outcome.found)
     ]
     rows += [
-        (trace, problem, *[""] * (len(columns) + 1)) for trace, problem in outcome.refused.items()
+        (trace, problem, *[""] * (len(columns) + 2)) for trace, problem in outcome.refused.items()
     ]
-    write_rows(table, (*columns, "reasons", "advice", WRITTEN_BY), rows)
+    write_rows(table, (*columns, "limits", "reasons", "advice", WRITTEN_BY), rows)
 
 
 def _of_quantities(found: Mapping[str, Any], quantities: Iterable[str]) -> list[object]:

@@ -18,10 +18,17 @@ from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.own_traces.assumed import assumed, by_default, names_models, versions
+from biogrip.own_traces.assumed import (
+    assumed,
+    by_default,
+    gripper_in_limits,
+    names_models,
+    versions,
+)
 from biogrip.own_traces.fitted_models import judge_again, models_tried
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.search_ranges import with_own_ranges
 from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
@@ -104,6 +111,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     pieces = 5 + (case.posterior is not None)
     with Progress(str(options.trace), pieces, live=True) as progress:
         recorded = options.read_as.read(options.trace, case.gripper, case.problem)
+        case = with_own_ranges(case, recorded, options.config)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
         case_problem = case.problem.weighted(recorded.sd_rad)
@@ -129,14 +137,15 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         progress.done()
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
-        gaps = [Note(HARMLESS, text) for text in recording.notes_on_gaps(recorded)]
-        said = exact_data(diagnosis, [*gaps, *notes_on_fit(fit), *doubts])
+        read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
+        said = exact_data(diagnosis, [*read, *notes_on_fit(fit), *doubts])
         data = {
             WRITTEN_BY: __version__,
             "trace": str(options.trace),
             "model": case_problem.model.name,
             "model_title": case_problem.model.title,
             "confidence": confidence,
+            "limits": gripper_in_limits(case_problem),
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
             "noise_model": fit.noise_data(),

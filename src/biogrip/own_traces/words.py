@@ -46,7 +46,7 @@ def in_words(found: Mapping[str, Any]) -> str:
         ),
     ]
     lines += one_sided_in_words([found])
-    lines += [trade["words"] for trade in found["trades"]]
+    lines += [found["limits"], *(trade["words"] for trade in found["trades"])]
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
     if "drift_rad_per_s" in found:
@@ -116,7 +116,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
-        lines += one_sided_in_words(found)
+        lines += [*one_sided_in_words(found), found[0]["limits"]]
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
         lines += [f"Sums hold provided {words}." for words in provided]
         lines += [

@@ -58,6 +58,8 @@ _FAR_LIKELIER = -2 * math.log(FALSE_ALARM)
 _NO_CONSTANT = 1e-6
 # Share of a function's norm that may be rounding error.
 _ROUNDING = 1e-9
+# Multiple of a given noise from which a rotation is seen, however small it is.
+_FAR_ABOVE = 10.0
 # Multiple of the free rotation that neither noise nor a wrong unit explains.
 _ABSURD = 1e9
 # Number of samples processed at once.
@@ -119,13 +121,15 @@ def check_recording(
     columns: Columns,
     nuisance: Array,
     noise_rad: float | None = None,
-) -> None:
+    typical_rad: float | None = None,
+) -> str | None:
     """Refuse a trace that is impossible with the gripper and protocol.
 
     Checked in this order: times outside the protocol, or covering too little of it; no response
     to the torque; a response of the wrong sign; a rotation above the free gripper's, or so small
     that the sample would be hundreds of times stiffer than the hinges, so that the trace shows only
-    errors of the instrument. A trace in a wrong unit fails one of these checks.
+    errors of the instrument. A trace in a wrong unit fails one of these checks. A small rotation
+    passes if a given noise is far smaller still.
 
     Parameters
     ----------
@@ -140,6 +144,13 @@ def check_recording(
     noise_rad
         Standard deviation of the noise, if known; otherwise it is estimated from the residuals
         of the fit.
+    typical_rad
+        Standard deviation of the noise where it is given in any way.
+
+    Returns
+    -------
+    str or None
+        A sentence on a rotation that passes only since the given noise is far smaller.
 
     Raises
     ------
@@ -156,7 +167,7 @@ def check_recording(
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         # Beyond this its square could overflow.
-        _check_turn(recording, largest, free, path, columns)
+        _check_turn(recording, largest, free, path, columns, None)
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
     if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
@@ -174,7 +185,7 @@ def check_recording(
         )
     turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
-    _check_turn(recording, turn, free, path, columns)
+    return _check_turn(recording, turn, free, path, columns, typical_rad)
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -340,27 +351,39 @@ def _left_over(trace: Array, responses: Array) -> float:
 
 
 def _check_turn(
-    recording: Recording, turn: float, free: float, path: Path, columns: Columns
-) -> None:
+    recording: Recording,
+    turn: float,
+    free: float,
+    path: Path,
+    columns: Columns,
+    noise_rad: float | None,
+) -> str | None:
     smallest, largest = SMALLEST_SHARE * free, LARGEST_SHARE * free
 
     def fits(factor: float) -> bool:
         return smallest <= factor * turn <= largest
 
     if fits(1.0):
-        return
+        return None
+    unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
+    hint = _other_units(unit, ROTATION_UNITS, fits)
+    if noise_rad is not None and _FAR_ABOVE * noise_rad < turn < smallest:
+        return (
+            f"The largest rotation is {turn:.3g} rad, where without any sample the arm turns by "
+            f"{free:.3g} rad: the sample is very stiff, or the unit is not the right one.{hint}"
+        )
     limit = (
         f"at most {largest:.3g} rad: without any sample the arm turns by"
         if turn > largest
-        else f"at least {smallest:.3g} rad, where without any sample the arm turns by"
+        else f"at least {smallest:.3g} rad, or less with a given noise (--noise) {_FAR_ABOVE:g} "
+        "times smaller still, where without any sample the arm turns by"
     )
-    unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
     sample = np.argmax(np.abs(recording.rotation_rad))
     raise BiogripError(
         f"{place(path, recording.lines[sample], columns.rotation)}: found "
         f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit} {free:.3g} rad."
-        + _other_units(unit, ROTATION_UNITS, fits)
+        f"{hint}"
     )
 
 

@@ -42,6 +42,8 @@ class Measurements:
     """Number of rows of a recording that were left out for want of a number."""
     sd_rad: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    suspicion: str | None = None
+    """Sentence on a rotation of a recording that is hardly plausible."""
 
 
 def write_target(

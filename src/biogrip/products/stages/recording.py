@@ -1,6 +1,9 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
+import math
 from pathlib import Path
+
+import numpy as np
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
@@ -14,7 +17,7 @@ from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.recordings import Columns, place, read_recording
+from biogrip.traces.recordings import Columns, Recording, place, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
@@ -26,7 +29,7 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
         With file, line and column, if the trace cannot be used.
     """
     trace = read_checked(recorded, case.gripper, case.problem, case.columns)
-    for note in notes_on_gaps(trace):
+    for note in notes_on_recording(trace):
         warn(f"{place(recorded)}: {note}")
     write_measurements(measurements, trace)
 
@@ -44,7 +47,7 @@ def read_checked(
             "neighbouring ones."
         )
     nuisance = problem.nuisance(trace.time_s)
-    check_recording(
+    suspicion = check_recording(
         trace,
         gripper,
         problem.torque,
@@ -52,6 +55,7 @@ def read_checked(
         columns,
         nuisance,
         None if weighted else problem.noise_rad,
+        _typical_noise(trace, problem),
     )
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
@@ -65,16 +69,26 @@ def read_checked(
             problem.noise_rad,
         )
     rotations = {0: trace.rotation_rad}
-    return Measurements(trace.time_s, None, rotations, trace.without_number, sd_rad)
+    return Measurements(trace.time_s, None, rotations, trace.without_number, sd_rad, suspicion)
 
 
-def notes_on_gaps(trace: Measurements) -> list[str]:
-    """Return a note on rows of a recording that were left out, if any were."""
-    samples = len(trace.time_s)
-    if not trace.gaps:
-        return []
-    rows = counted(trace.gaps, "row")
-    return [f"Left out for want of a number: {rows} of {samples + trace.gaps}."]
+def _typical_noise(trace: Recording, problem: CaseProblem) -> float | None:
+    """Return the standard deviation of the noise, if it is given; typical where it differs."""
+    if trace.sd_rad is not None:
+        return float(np.median(trace.sd_rad))
+    if problem.noise_share is not None:
+        largest_rad = float(np.max(np.abs(trace.rotation_rad)))
+        return math.hypot(problem.noise_share * largest_rad, problem.noise_rad or 0.0)
+    return problem.noise_rad
+
+
+def notes_on_recording(trace: Measurements) -> list[str]:
+    """Return notes on rows of a recording that were left out, and on a hardly plausible one."""
+    notes = [trace.suspicion] if trace.suspicion else []
+    if trace.gaps:
+        rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
+        notes.append(f"Left out for want of a number: {rows}.")
+    return notes
 
 
 def check_traces(study: Study) -> None:

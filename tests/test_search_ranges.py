@@ -1,0 +1,102 @@
+"""Search ranges that follow from a trace."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.cli import main
+from biogrip.experiment.models import MODELS
+from biogrip.experiment.protocol import hold, torque_history
+from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.own_traces.search_ranges import ranges_of
+from biogrip.response.simulation import simulated_rotation
+from tests.helpers.default import STUDY
+
+# Creep of polystyrene, in Pa and Pa s, as of a gripper: jaws of l = b at 90 degrees whose arms have
+# 0.25 % of the sample's stiffness.
+K_P, C = 5.26e3, 8.7e7
+LEVER_M, DURATION_S, TORQUE_NM, NOISE_RAD = 1.5e-3, 3e4, 2.7e-5, 1e-5
+ARM = {
+    "inertia_kgm2": 1e-14,
+    "damping_Nms_per_rad": 1e-9,
+    "stiffness_Nm_per_rad": 0.0025 * K_P * 2 * LEVER_M**2,
+}
+CONFIG = {
+    "gripper": {"arm_length_m": LEVER_M, "reference_angle_deg": 90.0, "left": ARM, "right": ARM},
+    "protocol": {"phases": [{"duration_s": DURATION_S, "torque_Nm": TORQUE_NM}]},
+    "model_selection": {"models": []},
+    "least_squares": {"candidates": 500, "starts": 8},
+}
+DEFAULT = {"search_range": {name: {"exponent": [-4, 5]} for name in ("c", "c_p")}}
+
+
+@pytest.fixture
+def polystyrene(tmp_path: Path) -> Path:
+    gripper = Gripper(LEVER_M, 90.0, Arm(**ARM), Arm(**ARM))
+    network = MODELS["generalized_maxwell"].network(np.array([1e6, K_P, C, 1e3]))
+    times = np.geomspace(1.0, DURATION_S, 200)
+    torque = torque_history((hold(DURATION_S, TORQUE_NM),))
+    clean = simulated_rotation(gripper, network, torque, times, nonlinear=False)[0]
+    noisy = clean + NOISE_RAD * np.random.default_rng(1).standard_normal(len(times))
+    file = tmp_path / "polystyrene.csv"
+    rows = np.column_stack((times, noisy))
+    np.savetxt(file, rows, delimiter=",", header="time_s,rotation_rad", comments="")
+    return file
+
+
+def identified(trace: Path, **config: object) -> Any:
+    file, output = trace.with_suffix(".yaml"), trace.with_suffix(".json")
+    file.write_text(yaml.safe_dump({**CONFIG, **config}))
+    main(["identify", str(trace), "--config", str(file), "--output", str(output), "--force"])
+    return json.loads(output.read_text())
+
+
+def test_a_sample_beyond_the_ranges_of_the_paper_is_found(polystyrene: Path) -> None:
+    found = identified(polystyrene)
+    assert found["fit"] == "ok"
+    for quantity in found["quantities"]:
+        if quantity["quantity"] in ("k_p", "c + c_p"):
+            truth = K_P if quantity["quantity"] == "k_p" else C + 1e3
+            assert quantity["verdict"] == "determined"
+            assert quantity["low"] < truth < quantity["high"]
+    again = identified(polystyrene, search_range=found["assumed"]["search_range"])
+    assert again["quantities"] == found["quantities"]
+
+
+def test_a_given_range_stays(polystyrene: Path) -> None:
+    found = identified(polystyrene, **DEFAULT)
+    ranges = found["assumed"]["search_range"]
+    assert ranges["c"]["exponent"] == ranges["c_p"]["exponent"] == [-4, 5]
+    assert ranges["k"]["exponent"] != [-3, 8]
+    assert found["fit"] == "rejected"
+    assert any("c is at the upper end of its search range" in text for text in found["reasons"])
+
+
+@pytest.mark.parametrize("case", ["endothelial_cell", "liquid_drop_1", "liquid_drop_2"])
+def test_elements_at_the_ends_do_not_show(case: str) -> None:
+    """A spring or damper beyond either end is as good as absent, or rigid: less than the noise."""
+    chosen = STUDY.cases[case]
+    problem, time_s = chosen.problem, chosen.sampling.over(chosen.problem.torque.end_s)
+    parameters = problem.searched.sample(chosen.parameters)
+    simulated = simulated_rotation(
+        problem.gripper, parameters, problem.torque, time_s, nonlinear=False
+    )[0]
+    noise_rad = 0.1 * simulated.max()
+    rng = np.random.default_rng(2)
+    trace = simulated + noise_rad * rng.standard_normal(len(time_s))
+    ranges = ranges_of(problem, time_s, trace)
+
+    def response(**changes: float) -> np.ndarray:
+        network = problem.searched.sample({**chosen.parameters, **changes})
+        return simulated_rotation(
+            problem.gripper, network, problem.torque, time_s, nonlinear=False
+        )[0]
+
+    for name, genes in ranges.items():
+        for end, beyond in ((genes.low, 1e-3), (genes.high, 1e3)):
+            change = response(**{name: end}) - response(**{name: end * beyond})
+            assert np.linalg.norm(change) < noise_rad, (name, end)
