@@ -21,6 +21,7 @@ from biogrip.groups.power import cells_needed
 from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
 from biogrip.products.files.rows import RowFile
+from biogrip.products.report.answers import compared_rows, read_table, say_what_traces_tell
 from biogrip.study.reference import file_schema, reference
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
@@ -55,7 +56,6 @@ _WAYS = {
     "designed for the ranges, repeated": "one designed for all these cells, repeated",
     "designed for the true cell, repeated": "one designed for the true cell, repeated",
 }
-_ANSWERED = ("k", "c", "k_p", "c_p", "c + c_p")
 _RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
 
@@ -65,43 +65,19 @@ def config_keys() -> str:
 
 
 def paper_against_study() -> str:
-    """The README's table "paper | this study", from the published error table."""
-    rows = []
-    for row in pd.read_csv(ERRORS, dtype=str, keep_default_na=False).to_dict("records"):
-        if row["parameter"] in ("c_p",):
-            continue
-        low, high = (f"{float(row[key]):.3g}" for key in ("p05_identified", "p95_identified"))
-        error = row["paper_error_percent"]
-        rows.append(
-            {
-                "case": row["case"].replace("_", " "),
-                "parameter": f"{row['parameter']} ({row['unit']})",
-                "target": f"{float(row['target']):.4g}",
-                "paper": f"{float(row['paper_identified']):.4g} ({_percent(error)})",
-                "this study: typical seed": f"{float(row['typical_identified']):.3g} "
-                f"({_percent(row['typical_error_percent'])})",
-                "5-95 % of seeds": f"{low} to {high}",
-                "seeds near the noise": f"{100 * float(row['near_noise_share']):.0f} %",
-            }
-        )
-    return str(pd.DataFrame(rows).to_markdown(index=False, disable_numparse=True))
+    """The table "paper | this study", from the published error table."""
+    return _table(iter(compared_rows(read_table(ERRORS), _verdicts())))
+
+
+def _verdicts() -> list[dict[str, str]]:
+    return [row for file in sorted(VERDICTS.glob("verdicts_*.csv")) for row in read_table(file)]
 
 
 def answer() -> str:
     """In how many of the paper's samples a trace determines which quantity."""
-    verdicts = pd.concat(pd.read_csv(file) for file in sorted(VERDICTS.glob("verdicts_*.csv")))
-    told = (verdicts["verdict"] == "determined").groupby(verdicts["quantity"]).sum()
-    samples = verdicts["case"].nunique()
-    always = [name for name in _ANSWERED if told[name] == samples]
-    never = [name for name in _ANSWERED if told[name] == 0]
-    sometimes = [
-        f"{name} in {told[name]}" for name in _ANSWERED if name not in always and name not in never
-    ]
-    return (
-        f"**A trace of the paper's experiment always determines {' and '.join(always)}, never "
-        f"{' and '.join(never)}, and the rest sometimes**: {', '.join(sometimes)} of the {samples} "
-        "samples."
-    )
+    sentence = say_what_traces_tell(_verdicts(), " of the paper's experiment")
+    told, _, where = sentence.partition(": ")
+    return f"**{told}**: {where}"
 
 
 def _percent(text: str) -> str:

@@ -1,6 +1,7 @@
 """The page of a study in a real browser: whole, legible, and its explorer right."""
 
 import re
+from base64 import b64decode
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,12 @@ from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import read_measurements
 from biogrip.products.files.verdicts import read_verdicts
+from biogrip.products.report.answers import (
+    compare_with_paper,
+    read_table,
+    say_what_traces_tell,
+    say_which_method_finds_it,
+)
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.browser import chromium, executable
@@ -100,6 +107,56 @@ def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:
         .map(e => parseFloat(getComputedStyle(e).fontSize)))"""
     assert opened.page.evaluate(smallest) >= 12
     opened.page.close()
+
+
+CLIPPED = """[...document.querySelectorAll('table.compared, .compared :is(th, td, caption)')]
+    .filter(e => e.checkVisibility() && (e.scrollWidth > e.clientWidth + 1
+        || e.getBoundingClientRect().right > document.documentElement.clientWidth))
+    .map(e => e.textContent)"""
+
+
+@pytest.mark.parametrize(("medium", "width"), [("screen", 1400), ("screen", 400), ("print", 718)])
+def test_no_column_of_the_first_table_is_clipped(
+    browser: Any, report: Path, medium: Any, width: int
+) -> None:
+    """In print on A4 within margins of a centimetre."""
+    opened = Opened(browser, report, {"width": width, "height": 900})
+    page = opened.page
+    page.emulate_media(media=medium)
+    assert page.locator(".compared thead th").count() == 7
+    rows = page.locator(".compared tbody tr").all_inner_texts()
+    errors = read_table(report.parent / "tables" / "errors.csv")
+    assert len(rows) == sum(row["parameter"] != "c_p" for row in errors)
+    assert page.evaluate(CLIPPED) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    page.close()
+
+
+def test_the_page_answers_first_and_from_its_tables(opened: Opened, report: Path) -> None:
+    tables = report.parent / "tables"
+    errors, compared = (read_table(tables / f"{name}.csv") for name in ("errors", "methods"))
+    verdicts = [row for file in tables.glob("verdicts_*.csv") for row in read_table(file)]
+    assert opened.page.locator("h1 + .answers p").all_inner_texts() == [
+        compare_with_paper(errors, verdicts, {}),
+        say_what_traces_tell(sorted(verdicts, key=lambda row: row["case"])),
+        say_which_method_finds_it(compared, "genetic algorithm"),
+    ]
+
+
+def test_full_tables_are_folded_and_can_be_downloaded(opened: Opened, report: Path) -> None:
+    page = opened.page
+    assert page.locator("details[open]").count() == 0
+    links = page.locator("a[download]").evaluate_all("all => all.map(a => [a.download, a.href])")
+    assert len(links) == page.locator("details[id^=table-]").count() > 10
+    for name, address in links:
+        content = b64decode(address.removeprefix("data:text/csv;base64,"))
+        assert content == (report.parent / "tables" / name).read_bytes()
+
+
+def test_cards_have_the_true_values(opened: Opened) -> None:
+    card = opened.page.locator(".card").first.inner_text()
+    assert "(true: 35 N/m)" in card
+    assert "(true: 299.9 N s/m)" in card
 
 
 def test_summaries_are_whole_and_legible(browser: Any, finished: Path) -> None:
@@ -247,12 +304,22 @@ def test_a_sample_of_one_s_own_is_judged_at_once(opened: Opened) -> None:
     page.select_option("#try-case", "0")
     before = told()
     assert "determined" in before
+    # As the card above, where the first order does not say the same.
+    profile = page.locator("#determined td:last-child").all_inner_texts()
+    verdicts = page.evaluate("Object.values(biogrip.cases[0].verdicts)")
+    assert [said.partition(":")[0] for said in profile] == verdicts
+    first_order = page.locator("#determined td:nth-child(4)").all_inner_texts()
+    for said, near, verdict in zip(profile, first_order, verdicts, strict=True):
+        differ = {near, verdict} != {"determined"} and "determined" in (near, verdict)
+        assert ("the profile disagrees" in said) == (differ and near != "roughly")
     assert "press all the time" in page.inner_text("#force-words")
     page.eval_on_selector(
         "#try-noise", "e => { e.value = Math.log(1e-2); e.dispatchEvent(new Event('input')); }"
     )
     assert told() != before
     assert told().count("not determined") == 5
+    # No profile is computed for other samples.
+    assert set(page.locator("#determined td:last-child").all_inner_texts()) == {"–"}
     page.select_option("#try-case", "1")
     assert "would have to pull" in page.inner_text("#force-words")
     found = deviations()

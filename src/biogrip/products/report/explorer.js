@@ -154,7 +154,7 @@
     Object.assign(input, { type: "range", min: low, max: high, step: (high - low) / 2000, id });
     input.value = value;
     const say = (log) => { output.textContent = `${name} = ${short(Math.exp(log))} ${unit}`; };
-    input.addEventListener("input", () => { moved(Number(input.value)); say(Number(input.value)); showTried(); });
+    input.addEventListener("input", () => { tried.moved = true; moved(Number(input.value)); say(Number(input.value)); showTried(); });
     say(value);
     label.append(output, input);
     return label;
@@ -165,9 +165,18 @@
     const sample = item.truth || item.methods[0].fits[0].sample;
     tried.logs = inference.logsOf(item.layout, sample);
     tried.torque = 1;
+    tried.moved = false;
     tried.noise = Math.max(item.noise_rad || item.methods[0].fits[0].misfit_rad, 1e-9);
     sliders();
     showTried();
+  }
+
+  // What the profile of the study's trace says of a quantity, if the sample is the study's.
+  function byProfile(item, name, firstOrder) {
+    if (tried.moved || !item.truth || !(name in item.verdicts)) return "–";
+    const verdict = item.verdicts[name];
+    if (verdict === firstOrder || ![verdict, firstOrder].includes("determined") || firstOrder === "roughly") return verdict;
+    return `${verdict}: the profile disagrees${firstOrder === "determined" ? ", as values far away fit, too" : ""}`;
   }
 
   function showTried() {
@@ -200,11 +209,12 @@
       units.push("N s/m");
       values.push(dampers.reduce((sum, i) => sum + values[i], 0));
     }
+    const words = found.map((d) => (d < 0.05 ? "determined" : d < 0.5 ? "roughly" : "not determined"));
     element("determined").replaceChildren(...names.map((name, i) => {
       const row = document.createElement("tr");
       const cells = [name, `${short(values[i])} ${units[i]}`,
         found[i] < 1 ? `${short(100 * found[i])} %` : `a factor of ${short(Math.exp(Math.min(found[i], 50)))}`,
-        found[i] < 0.05 ? "determined" : found[i] < 0.5 ? "roughly" : "not determined"];
+        words[i], byProfile(item, name, words[i])];
       row.append(...cells.map((text) => Object.assign(document.createElement("td"), { textContent: text })));
       return row;
     }));

@@ -82,6 +82,7 @@ def _case(
     if target is not None:
         sigma = float(np.sqrt(np.mean(standard_deviation(target, case.noise) ** 2)))
     torque, gripper = problem.torque, problem.gripper
+    verdicts = read_verdicts(files.verdicts)
     shown = next(iter(traces.values())) if target is None else target
     return {
         "name": case.name,
@@ -112,7 +113,8 @@ def _case(
         "seeds": seeds,
         "traces_rad": [_packed(traces[seed][::stride]) for seed in seeds],
         "methods": [_method(method, model, files, seeds) for method in methods],
-        "threshold": read_verdicts(files.verdicts)["threshold"],
+        "threshold": verdicts["threshold"],
+        "verdicts": {item["quantity"]: item["verdict"] for item in verdicts["quantities"]},
     }
 
 

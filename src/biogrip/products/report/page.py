@@ -1,5 +1,6 @@
 """The report of a study: one self-contained HTML file with tables, figures and an explorer."""
 
+import base64
 import json
 import platform
 import re
@@ -24,12 +25,20 @@ from biogrip.products.files.verdicts import read_verdicts
 from biogrip.products.pages.summary import embedded
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight, of_cases
+from biogrip.products.report.answers import (
+    compare_with_paper,
+    compared_rows,
+    read_table,
+    say_what_traces_tell,
+    say_which_method_finds_it,
+)
 from biogrip.products.report.explorer_data import CaseFiles, explorer_data
 from biogrip.products.rule_products import group_by_rule
 from biogrip.products.stages.calibrated import CALIBRATED
+from biogrip.products.tables.verdicts import target_of
 from biogrip.products.uses import each, every, using
 from biogrip.study.plain import plain
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 
 PAGE = "results/report.html"
 
@@ -39,7 +48,7 @@ _SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "exp
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 _FOLDERS = ("results/figures/", "results/tables/")
 # Category, and which of a product's files is shown.
-_FIGURES, _TABLES = ("Figures", "png"), ("Tables", "html")
+_FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
 _STORY = "moduli"
 _FIRST = ("errors", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
@@ -95,8 +104,8 @@ class Content:
 
 
 _STUDY = using(
-    "identifiers",
-    cases=each(every, "name title parameters problem recorded noise nonlinear_target"),
+    "identifiers shown",
+    cases=each(every, "name title parameters problem recorded noise nonlinear_target truth"),
 )
 
 
@@ -117,6 +126,7 @@ def write(
     shown: Content,
     figures: list[Path],
     tables: list[Path],
+    downloads: list[Path],
     identifications: list[Path],
     histories: list[Path],
     verdicts: list[Path],
@@ -132,6 +142,8 @@ def write(
         Content, except results.
     figures, tables
         PNG and HTML files, in the order of the entries.
+    downloads
+        CSV files of the tables.
     identifications, histories, verdicts
         Files of all cases, in their order.
     measurements, calibrated
@@ -159,9 +171,13 @@ def write(
     ]
     data = explorer_data(cases, files, list(shown.study.identifiers.values()))
     shown_tables = [
-        {"entry": entry, "html": _table(path)}
-        for entry, path in zip(shown.tables, tables, strict=True)
+        {"entry": entry, "html": _table(path), "download": _download(csv)}
+        for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
     ]
+    errors, told, compared = (
+        [row for path in downloads if path.name.startswith(name) for row in read_table(path)]
+        for name in ("errors.csv", "verdicts_", "methods.csv")
+    )
     shown_figures = [
         {"entry": entry, "image": image}
         for entry, image in zip(shown.figures, _images(figures), strict=True)
@@ -175,10 +191,13 @@ def write(
         plotly=_plotly(),
         # Prevent text of a case from closing the script element.
         data=json.dumps(data).replace("<", "\\u003c"),
-        cases=[
-            {"title": case.title, "recorded": case.recorded, **read_verdicts(v)}
-            for case, v in zip(cases, verdicts, strict=True)
+        answers=[
+            compare_with_paper(errors, told, {case.name: _whose(case) for case in cases}),
+            say_what_traces_tell(told),
+            say_which_method_finds_it(compared, shown.study.identifiers[shown.study.shown].title),
         ],
+        compared=compared_rows(errors, told),
+        cases=[_card(case, v) for case, v in zip(cases, verdicts, strict=True)],
         story=[item for item in shown_figures if _is_named(item, _STORY)],
         figures=[item for item in shown_figures if not _is_named(item, _STORY)],
         first_tables=_named(shown_tables, _FIRST),
@@ -257,6 +276,25 @@ def _table(path: Path) -> Markup:
     return Markup(found[0])
 
 
+def _download(path: Path) -> str:
+    """Return a file as a data URL."""
+    return f"data:text/csv;base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def _whose(case: Case) -> str:
+    """Return the paper's table of a case, or the name of a case that it does not have."""
+    number = case.truth.published.table
+    return case.title if number is None else f"Table {number}"
+
+
+def _card(case: Case, path: Path) -> dict[str, Any]:
+    """Return the verdicts on a case with the true values beside them."""
+    found = read_verdicts(path)
+    for item in found["quantities"]:
+        item["target"] = target_of(item["quantity"], case.parameters)
+    return {"title": case.title, "recorded": case.recorded, **found}
+
+
 def _named(tables: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
     return [table for name in names for table in tables if _is_named(table, name)]
 
@@ -290,6 +328,7 @@ REPORT = Product(
     reads={
         "figures": _reads(_FIGURES),
         "tables": _reads(_TABLES),
+        "downloads": _reads(_DOWNLOADS),
         "identifications": of_cases(IDENTIFICATIONS, every),
         "histories": of_cases(HISTORIES, every),
         "verdicts": of_cases(VERDICTS, every),
