@@ -69,14 +69,14 @@ def compare_with_paper(
 
 def say_what_traces_tell(verdicts: Iterable[Row], experiment: str = "") -> str:
     """Say which quantities a trace determines always, never, or in some of the samples."""
-    told: dict[str, list[bool]] = defaultdict(list)
+    decided: dict[str, list[bool]] = defaultdict(list)
     for (_, quantity), determined in _determined(verdicts).items():
-        told[quantity].append(determined)
-    always = [name for name, each in told.items() if all(each)]
-    never = [name for name, each in told.items() if not any(each)]
+        decided[quantity].append(determined)
+    always = [name for name, each in decided.items() if all(each)]
+    never = [name for name, each in decided.items() if not any(each)]
     some = [
         f"{name} in {sum(each)} of {len(each)}"
-        for name, each in told.items()
+        for name, each in decided.items()
         if any(each) and not all(each)
     ]
     parts = [f"always determines {_listed(always)}"] if always else []
@@ -117,7 +117,9 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
     errors, verdicts
         Rows of the tables of errors and verdicts.
     """
-    told = {quantity for (_, quantity), determined in _determined(verdicts).items() if determined}
+    decided = {
+        quantity for (_, quantity), determined in _determined(verdicts).items() if determined
+    }
     return [
         {
             "case": row["case"].replace("_", " "),
@@ -135,7 +137,7 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
             else "",
         }
         for row in errors
-        if row["parameter"] in told
+        if row["parameter"] in decided
     ]
 
 

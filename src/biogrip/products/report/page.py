@@ -174,7 +174,7 @@ def write(
         {"entry": entry, "html": _table(path), "download": _download(csv)}
         for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
     ]
-    errors, told, compared = (
+    errors, judged, compared = (
         [row for path in downloads if path.name.startswith(name) for row in read_table(path)]
         for name in ("errors.csv", "verdicts_", "methods.csv")
     )
@@ -192,11 +192,11 @@ def write(
         # Prevent text of a case from closing the script element.
         data=json.dumps(data).replace("<", "\\u003c"),
         answers=[
-            compare_with_paper(errors, told, {case.name: _whose(case) for case in cases}),
-            say_what_traces_tell(told),
+            compare_with_paper(errors, judged, {case.name: _whose(case) for case in cases}),
+            say_what_traces_tell(judged),
             say_which_method_finds_it(compared, shown.study.identifiers[shown.study.shown].title),
         ],
-        compared=compared_rows(errors, told),
+        compared=compared_rows(errors, judged),
         cases=[_card(case, v) for case, v in zip(cases, verdicts, strict=True)],
         story=[item for item in shown_figures if _is_named(item, _STORY)],
         figures=[item for item in shown_figures if not _is_named(item, _STORY)],
