@@ -1,7 +1,7 @@
 """Whether posteriors are calibrated: ranks of true values among samples, over draws of the prior.
 
-``python -m tests.helpers.posterior_campaign [draws]`` takes some 50 minutes for 1000 draws on two
-cores, goes on where an earlier one ended, and writes the table that the documentation shows. The
+``python -m tests.helpers.posterior_campaign [draws]`` takes some 90 minutes of one core for 1000
+draws, goes on where an earlier one ended, and writes the table that the documentation shows. The
 test suite has a few.
 
 References
