@@ -18,19 +18,14 @@ _SHOWN = 100
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell and the files of its traces.
-
-    Parameters
-    ----------
-    name, group
-        Names in the table.
-    traces
-        Files of its recorded traces (replicates), sorted by path.
-    """
+    """A cell and the files of its traces."""
 
     name: str
+    """Name in the table."""
     group: str
+    """Name of its group there."""
     traces: tuple[Path, ...]
+    """Files of its recorded traces (replicates), sorted by path."""
 
 
 @dataclass(frozen=True)

@@ -22,22 +22,16 @@ from biogrip.groups.population import Population
 
 @dataclass(frozen=True)
 class Difference:
-    """Ratio of the medians of two populations.
-
-    Parameters
-    ----------
-    log_ratio, deviation
-        Logarithm of the ratio, and its standard deviation.
-    freedom
-        Degrees of freedom of the deviation; need not be an integer.
-    confidence
-        Confidence level of the interval, e.g. 0.95.
-    """
+    """Ratio of the medians of two populations."""
 
     log_ratio: float
+    """Logarithm of the ratio."""
     deviation: float
+    """Its standard deviation."""
     freedom: float
+    """Degrees of freedom of the deviation; need not be an integer."""
     confidence: float
+    """Confidence level of the interval, e.g. 0.95."""
 
     @property
     def ratio(self) -> float:

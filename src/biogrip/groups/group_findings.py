@@ -30,53 +30,37 @@ class JudgedCell:
 
 @dataclass(frozen=True)
 class GroupFinding:
-    """Cells and population of one quantity in one group.
-
-    Parameters
-    ----------
-    group, quantity, unit
-        Group, label of the quantity, and its unit.
-    estimates
-        Estimates of cells that determine the quantity.
-    others
-        Names of the other cells.
-    population
-        Population of the estimates; None if there are too few cells.
-    """
+    """Cells and population of one quantity in one group."""
 
     group: str
     quantity: str
+    """Label of the quantity."""
     unit: str
     estimates: Estimates
+    """Estimates of cells that determine the quantity."""
     others: tuple[str, ...]
+    """Names of the other cells."""
     population: Population | None
+    """Population of the estimates; None if there are too few cells."""
 
 
 @dataclass(frozen=True)
 class GroupDifference:
-    """Difference of one quantity between a group and the first group.
-
-    Parameters
-    ----------
-    quantity, group, against
-        Label of the quantity, the group, and the reference group.
-    difference
-        Ratio of the medians of the populations.
-    adjusted_p
-        p value adjusted for the number of groups that the quantity is compared in.
-    ranks
-        Estimate of the difference of logarithms by ranks.
-    detectable_ratio
-        Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`.
-    """
+    """Difference of one quantity between a group and the first group."""
 
     quantity: str
+    """Label of the quantity."""
     group: str
     against: str
+    """The reference group."""
     difference: Difference
+    """Ratio of the medians of the populations."""
     adjusted_p: float
+    """p value adjusted for the number of groups that the quantity is compared in."""
     ranks: Shift
+    """Estimate of the difference of logarithms by ranks."""
     detectable_ratio: float
+    """Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`."""
 
 
 def findings_of_groups(

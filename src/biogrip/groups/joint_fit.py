@@ -39,21 +39,15 @@ _DISAGREE = 1e-3
 
 @dataclass(frozen=True)
 class JointFit:
-    """Joint fit of all traces of a cell.
-
-    Parameters
-    ----------
-    diagnosis
-        Best fit and verdicts, as for one trace.
-    noise_rad
-        Standard deviation of the noise of each trace.
-    agreement
-        p value of the hypothesis that all traces have the same parameters; None for a single trace.
-    """
+    """Joint fit of all traces of a cell."""
 
     diagnosis: Diagnosis
+    """Best fit and verdicts, as for one trace."""
     noise_rad: tuple[float, ...]
+    """Standard deviation of the noise of each trace."""
     agreement: float | None
+    """p value of the hypothesis that all traces have the same parameters; None for a single
+    trace."""
 
 
 def fitted_jointly(

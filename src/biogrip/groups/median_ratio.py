@@ -26,19 +26,14 @@ from biogrip.arrays import Array
 
 @dataclass(frozen=True)
 class Shift:
-    """Shift between the values of two samples.
-
-    Parameters
-    ----------
-    estimate
-        Median of the differences.
-    low, high
-        Confidence limits; None if there are too few cells.
-    """
+    """Shift between the values of two samples."""
 
     estimate: float
+    """Median of the differences."""
     low: float | None
+    """Lower confidence limit; None if there are too few cells."""
     high: float | None
+    """Upper one, likewise."""
 
 
 def shift(one: Array, other: Array, confidence: float) -> Shift:

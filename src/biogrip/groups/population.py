@@ -42,52 +42,38 @@ _MOST_STEPS = 500
 
 @dataclass(frozen=True)
 class Estimates:
-    """Estimates of one quantity in the cells of one dish, as logarithms.
-
-    Parameters
-    ----------
-    cells
-        Names of the cells.
-    log_values : (n_cells,)
-        Logarithms of the quantity.
-    deviations : (n_cells,)
-        Standard deviations of the logarithms, above zero.
-    """
+    """Estimates of one quantity in the cells of one dish, as logarithms."""
 
     cells: tuple[str, ...]
+    """Names of the cells."""
     log_values: Array
+    """Logarithms of the quantity, (n_cells,)."""
     deviations: Array
+    """Standard deviations of the logarithms, above zero, (n_cells,)."""
 
 
 @dataclass(frozen=True)
 class Population:
-    """Population of the cells of a dish; all values are logarithms of the quantity.
-
-    Parameters
-    ----------
-    estimates
-        Estimates that the population is fitted to.
-    confidence
-        Confidence level of all intervals, e.g. 0.95.
-    centre, deviation
-        Mean of the logarithms, that is the logarithm of the median, and its standard deviation.
-    spread
-        Standard deviation between cells, without estimation errors.
-    spread_low, spread_high
-        Confidence limits of the spread.
-    shrunk, shrunk_deviations : (n_cells,)
-        Empirical Bayes estimates of the cells, and their standard deviations.
-    """
+    """Population of the cells of a dish; all values are logarithms of the quantity."""
 
     estimates: Estimates
+    """Estimates that the population is fitted to."""
     confidence: float
+    """Confidence level of all intervals, e.g. 0.95."""
     centre: float
+    """Mean of the logarithms, that is the logarithm of the median."""
     deviation: float
+    """Its standard deviation."""
     spread: float
+    """Standard deviation between cells, without estimation errors."""
     spread_low: float
+    """Lower confidence limit of the spread."""
     spread_high: float
+    """Upper one."""
     shrunk: Array
+    """Empirical Bayes estimates of the cells, (n_cells,)."""
     shrunk_deviations: Array
+    """Their standard deviations, (n_cells,)."""
 
     @property
     def freedom(self) -> int:

@@ -31,19 +31,14 @@ _TAILS = (0.025, 0.975)
 
 @dataclass(frozen=True)
 class Convergence:
-    """Convergence diagnostics of posterior samples, each the worst of all parameters.
-
-    Parameters
-    ----------
-    r_hat
-        Rank-normalized split R-hat, with the walkers as chains.
-    bulk, tail
-        Effective sample sizes of the middle and of the tails.
-    """
+    """Convergence diagnostics of posterior samples, each the worst of all parameters."""
 
     r_hat: float
+    """Rank-normalized split R-hat, with the walkers as chains."""
     bulk: float
+    """Effective sample size of the middle."""
     tail: float
+    """That of the tails."""
 
     @property
     def reached(self) -> bool:

@@ -23,27 +23,20 @@ _CLOSEST = 1e-7
 
 @dataclass
 class Brackets:
-    """Intervals in which n profiles cross their thresholds, each with an inner and an outer end.
-
-    Parameters
-    ----------
-    profile : (n,)
-        Index of the profile in `ConstrainedFits`.
-    values : (2, n)
-        Logarithms of the quantity at the inner end, below the threshold, and the outer, above.
-    increases : (2, n)
-        Increases of chi^2 there.
-    x : (2, n, n_parameters)
-        Log-parameters fitted there.
-    elsewhere : (n_starts, n, n_parameters) or None
-        Log-parameters of additional starts that may lead to deeper basins.
-    """
+    """Intervals in which n profiles cross their thresholds, each with an inner and an outer end."""
 
     profile: IntArray
+    """Index of the profile in `ConstrainedFits`, (n,)."""
     values: Array
+    """Logarithms of the quantity at the inner end, below the threshold, and the outer, above, (2,
+    n)."""
     increases: Array
+    """Increases of chi^2 there, (2, n)."""
     x: Array
+    """Log-parameters fitted there, (2, n, n_parameters)."""
     elsewhere: Array | None = None
+    """Log-parameters of additional starts that may lead to deeper basins, (n_starts, n,
+    n_parameters) or None."""
 
 
 def crossings(

@@ -30,27 +30,18 @@ _TOO_LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis of one trace: best fit, verdicts, contact force and doubts.
-
-    Parameters
-    ----------
-    likelihood
-        Best fit and noise.
-    findings
-        A verdict on every parameter and on the sum of the exchangeable ones.
-    trades
-        Parameters of which only a combination is determined.
-    grip
-        Force of the jaws on the sample of the best fit.
-    notes
-        Notes on the result, with weights.
-    """
+    """The diagnosis of one trace: best fit, verdicts, contact force and doubts."""
 
     likelihood: Likelihood
+    """Best fit and noise."""
     findings: list[Finding]
+    """A verdict on every parameter and on the sum of the exchangeable ones."""
     trades: list[Trade]
+    """Parameters of which only a combination is determined."""
     grip: Grip
+    """Force of the jaws on the sample of the best fit."""
     notes: list[Note]
+    """Notes on the result, with weights."""
 
     @property
     def status(self) -> str:

@@ -25,21 +25,14 @@ _DRAWN = 20_000
 
 @dataclass(frozen=True)
 class Evidence:
-    """Bayesian evidence: the integral of likelihood times prior over the parameters.
-
-    Parameters
-    ----------
-    log
-        Its natural logarithm, with densities of the trace per rad.
-    error
-        Standard deviation of `log`.
-    k_hat
-        Pareto shape of the tail of the importance weights.
-    """
+    """Bayesian evidence: the integral of likelihood times prior over the parameters."""
 
     log: float
+    """Its natural logarithm, with densities of the trace per rad."""
     error: float
+    """Standard deviation of `log`."""
     k_hat: float
+    """Pareto shape of the tail of the importance weights."""
 
     @property
     def reliable(self) -> bool:

@@ -15,18 +15,12 @@ _WEIGHTS = tuple(_STATUS)
 
 @dataclass(frozen=True)
 class Note:
-    """A sentence about a fit, with its weight.
-
-    Parameters
-    ----------
-    weight
-        `HARMLESS`: the results hold. `DOUBT`: they may not. `REJECTION`: they do not.
-    text
-        The sentence.
-    """
+    """A sentence about a fit, with its weight."""
 
     weight: str
+    """`HARMLESS`: the results hold. `DOUBT`: they may not. `REJECTION`: they do not."""
     text: str
+    """The sentence."""
 
 
 def compute_status(notes: Sequence[Note]) -> str:

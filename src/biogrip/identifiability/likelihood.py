@@ -31,35 +31,25 @@ A fit that is deeper than an optimum by more shows that the optimum is not the g
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Optimum, noise and thresholds that define the profile likelihoods of one trace.
-
-    Parameters
-    ----------
-    problem
-        The trace and the model.
-    best : (n_parameters,)
-        Log-parameters of the global optimum.
-    misfit_rad
-        Misfit there.
-    noise_rad
-        Standard deviation of the noise, known or estimated from the residual.
-    threshold
-        Increase of chi^2 at the confidence limits: a quantile of chi-squared with one degree
-        of freedom if the noise is known, of F if its variance or autocorrelation is estimated.
-        It is that of an interval with two ends. A single limit is one of these ends, and
-        holds with more than the confidence.
-    certainty
-        Increase that a profile must reach at an end of the range to have a limit on that side:
-        the quantile at `CERTAIN`. A profile that levels off between `threshold` and
-        `certainty` would have a limit by chance of the noise alone.
-    """
+    """Optimum, noise and thresholds that define the profile likelihoods of one trace."""
 
     problem: Problem
+    """The trace and the model."""
     best: Array
+    """Log-parameters of the global optimum, (n_parameters,)."""
     misfit_rad: float
+    """Misfit there."""
     noise_rad: float
+    """Standard deviation of the noise, known or estimated from the residual."""
     threshold: float
+    """Increase of chi^2 at the confidence limits: a quantile of chi-squared with one degree of
+    freedom if the noise is known, of F if its variance or autocorrelation is estimated. It is that
+    of an interval with two ends. A single limit is one of these ends, and holds with more than the
+    confidence."""
     certainty: float
+    """Increase that a profile must reach at an end of the range to have a limit on that side: the
+    quantile at `CERTAIN`. A profile that levels off between `threshold` and `certainty` would have
+    a limit by chance of the noise alone."""
 
     def increase(self, misfit_rad: float) -> float:
         """Return the increase of chi^2 over the optimum."""

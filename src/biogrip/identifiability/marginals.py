@@ -19,26 +19,19 @@ _INNER = 0.5
 
 @dataclass(frozen=True)
 class Marginal:
-    """The marginal posterior of a quantity, in SI units.
-
-    Parameters
-    ----------
-    quantity
-        The quantity.
-    median
-        Median of the samples.
-    inner, outer
-        Equal-tailed credible intervals, of 50 % and of the confidence that was asked for.
-    share
-        Share of the samples that fulfil the conditions of the quantity, its `penalties`;
-        the others do not count.
-    """
+    """The marginal posterior of a quantity, in SI units."""
 
     quantity: Quantity
+    """The quantity."""
     median: float
+    """Median of the samples."""
     inner: tuple[float, float]
+    """Equal-tailed credible interval of 50 %."""
     outer: tuple[float, float]
+    """That of the confidence that was asked for."""
     share: float
+    """Share of the samples that fulfil the conditions of the quantity, its `penalties`; the others
+    do not count."""
 
     def words(self) -> str:
         """Describe it in words, e.g. ``34.6 N/m (31.6 to 38; half of it 33.5 to 35.7)``."""

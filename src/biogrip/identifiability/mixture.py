@@ -34,20 +34,14 @@ _LEAST_VARIANCE = 1e-10
 
 @dataclass(frozen=True)
 class Mixture:
-    """Weighted multivariate t distributions.
-
-    Parameters
-    ----------
-    weights : (n_clusters,)
-        Sum to one.
-    centres : (n_clusters, n_dimensions)
-    factors : (n_clusters, n_dimensions, n_dimensions)
-        Lower Cholesky factors of the scale matrices.
-    """
+    """Weighted multivariate t distributions."""
 
     weights: Array
+    """Sum to one, (n_clusters,)."""
     centres: Array
+    """(n_clusters, n_dimensions)."""
     factors: Array
+    """Lower Cholesky factors of the scale matrices, (n_clusters, n_dimensions, n_dimensions)."""
 
     def log_density(self, points: Array) -> Array:
         """Return the logarithm of the density, (n,), at points, (n, n_dimensions)."""

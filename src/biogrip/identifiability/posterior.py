@@ -18,21 +18,14 @@ from biogrip.identify.problem import Problem
 
 @dataclass(frozen=True)
 class Posterior:
-    """Posterior density of the log-parameters of a trace, not divided by the evidence.
-
-    Parameters
-    ----------
-    problem
-        The trace and the model.
-    prior
-        Prior of the log-parameters.
-    noise_rad
-        Standard deviation of the noise if it is known.
-    """
+    """Posterior density of the log-parameters of a trace, not divided by the evidence."""
 
     problem: Problem
+    """The trace and the model."""
     prior: Prior
+    """Prior of the log-parameters."""
     noise_rad: float | None = None
+    """Standard deviation of the noise if it is known."""
 
     def log_density(self, log_parameters: Array, power: float = 1.0) -> Array:
         """Return the logarithm of likelihood times prior, of each point independent of others.

@@ -18,22 +18,18 @@ class Prior:
 
     A prior of zero precision is uniform. Branches are in the order of their relaxation
     times, the fastest first: exchanging them does not change a response.
-
-    Parameters
-    ----------
-    model
-        Sample model.
-    low, high : (n_parameters,)
-        Ends of the search range.
-    centre, precision : (n_parameters,)
-        Logarithms of the medians before truncation; reciprocal standard deviations.
     """
 
     model: SampleModel
+    """Sample model."""
     low: Array
+    """Lower ends of the search range, (n_parameters,)."""
     high: Array
+    """Upper ends."""
     centre: Array
+    """Logarithms of the medians before truncation, (n_parameters,)."""
     precision: Array
+    """Reciprocal standard deviations, (n_parameters,)."""
 
     def log_density(self, log_parameters: Array) -> Array:
         """Return the logarithm of the density of the log-parameters, which integrates to one.

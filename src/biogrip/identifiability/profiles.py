@@ -39,33 +39,26 @@ _CLEARLY = 1.01
 
 @dataclass(frozen=True)
 class Profile:
-    """A profile and its confidence limits, as logarithms of the quantity.
-
-    Parameters
-    ----------
-    log_values, increases : (n_points,)
-        Ascending values, and the increase of chi^2 at each.
-    best
-        Value at the optimum.
-    low, high
-        Confidence limits; None on a side where the trace sets no limit.
-    lowest : (n_parameters,)
-        Log-parameters of the lowest increase, which is negative if the optimum was missed.
-    gaps
-        Stretches between the limits in which the profile is above the threshold.
-    certainty
-        Increase that a limit takes at an end of the range, if an end is above the threshold and
-        yet has no limit for want of it; else None.
-    """
+    """A profile and its confidence limits, as logarithms of the quantity."""
 
     log_values: Array
+    """Ascending values, (n_points,)."""
     increases: Array
+    """Increase of chi^2 at each, (n_points,)."""
     best: float
+    """Value at the optimum."""
     low: float | None
+    """Lower confidence limit; None where the trace sets none."""
     high: float | None
+    """Upper confidence limit, likewise."""
     lowest: Array
+    """Log-parameters of the lowest increase, which is negative if the optimum was missed,
+    (n_parameters,)."""
     gaps: tuple[tuple[float, float], ...] = ()
+    """Stretches between the limits in which the profile is above the threshold."""
     certainty: float | None = None
+    """Increase that a limit takes at an end of the range, if an end is above the threshold and yet
+    has no limit for want of it; else None."""
 
 
 def compute_profiles(

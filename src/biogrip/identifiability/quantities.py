@@ -19,19 +19,13 @@ _WITHIN, _IN_ORDER = 10.0, 100.0
 
 @dataclass(frozen=True)
 class BranchPenalty:
-    """A penalty residual that is zero while a branch relaxes early enough.
-
-    Parameters
-    ----------
-    branch
-        Indices of its spring and damper.
-    before
-        Those of the branch that must relax later; None if the branch must relax
-        within the experiment.
-    """
+    """A penalty residual that is zero while a branch relaxes early enough."""
 
     branch: tuple[int, int]
+    """Indices of its spring and damper."""
     before: tuple[int, int] | None = None
+    """Those of the branch that must relax later; None if the branch must relax within the
+    experiment."""
 
     @property
     def stiffness(self) -> float:
@@ -54,33 +48,24 @@ class BranchPenalty:
 
 @dataclass(frozen=True)
 class Quantity:
-    """A parameter of a model, or a combination of its parameters.
-
-    Parameters
-    ----------
-    label, symbol, unit
-        Name in tables; name as mathtext; SI unit.
-    members
-        Indices of the parameters in it.
-    sign : (n_members,)
-        Powers in a product (relaxation times are quotients).
-    form
-        ``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of
-        reciprocals.
-    penalties
-        Conditions for the quantity to be meaningful. A sum requires that branches relax
-        within the experiment: the damper of a branch too weak and slow to be seen could
-        have any size. Parameters of several branches require that these relax in order:
-        branches could exchange their names.
-    """
+    """A parameter of a model, or a combination of its parameters."""
 
     label: str
+    """Name in tables."""
     symbol: str
+    """Name as mathtext."""
     unit: str
+    """SI unit."""
     members: tuple[int, ...]
+    """Indices of the parameters in it."""
     form: str = "product"
+    """``"product"`` of powers; ``"sum"``; ``"series"``, one over the sum of reciprocals."""
     sign: tuple[int, ...] = (1,)
+    """Powers in a product (relaxation times are quotients), (n_members,)."""
     penalties: tuple[BranchPenalty, ...] = ()
+    """Conditions for the quantity to be meaningful. A sum requires that branches relax within the
+    experiment: the damper of a branch too weak and slow to be seen could have any size. Parameters
+    of several branches require that these relax in order: branches could exchange their names."""
 
     @property
     def provided(self) -> str | None:

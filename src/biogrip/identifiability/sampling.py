@@ -51,20 +51,14 @@ _GRID = 2.0**-20
 
 @dataclass(frozen=True)
 class Samples:
-    """Posterior samples: the points that walkers visited after their exploration.
-
-    Parameters
-    ----------
-    log_parameters : (n_steps, n_walkers, n_parameters)
-    accepted
-        Share of accepted proposals.
-    convergence
-        Convergence diagnostics of the samples.
-    """
+    """Posterior samples: the points that walkers visited after their exploration."""
 
     log_parameters: Array
+    """(n_steps, n_walkers, n_parameters)."""
     accepted: float
+    """Share of accepted proposals."""
     convergence: Convergence
+    """Convergence diagnostics of the samples."""
 
 
 def sampled(

@@ -15,15 +15,10 @@ from biogrip.experiment.sample import SampleModel
 
 @dataclass(frozen=True)
 class ValleyCoordinates:
-    """A change of coordinates whose Jacobian determinant is one.
-
-    Parameters
-    ----------
-    members
-        Indices of the exchangeable parameters; fewer than two change nothing.
-    """
+    """A change of coordinates whose Jacobian determinant is one."""
 
     members: tuple[int, ...]
+    """Indices of the exchangeable parameters; fewer than two change nothing."""
 
     def of(self, log_parameters: Array) -> Array:
         """Replace the last member's logarithm by the sum's, the others' by log-ratios to the last.

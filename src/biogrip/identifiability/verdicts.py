@@ -29,19 +29,13 @@ _WORTH_A_LOOK = 0.5
 
 @dataclass(frozen=True)
 class Finding:
-    """A quantity, its profile, and the verdict on it.
-
-    Parameters
-    ----------
-    quantity, profile
-        The quantity, and its profile likelihood.
-    deviation
-        Standard deviation of its logarithm to first order, see `Likelihood.deviation`.
-    """
+    """A quantity, its profile, and the verdict on it."""
 
     quantity: Quantity
     profile: Profile
+    """Its profile likelihood."""
     deviation: float
+    """Standard deviation of its logarithm to first order, see `Likelihood.deviation`."""
 
     @property
     def verdict(self) -> str:
@@ -129,18 +123,12 @@ class Finding:
 
 @dataclass(frozen=True)
 class Trade:
-    """Parameters of which only a combination is determined.
-
-    Parameters
-    ----------
-    members
-        Names of parameters that trade against each other.
-    finding
-        The combination that is determined.
-    """
+    """Parameters of which only a combination is determined."""
 
     members: tuple[str, ...]
+    """Names of parameters that trade against each other."""
     finding: Finding
+    """The combination that is determined."""
 
     def words(self) -> str:
         """Return the trade as a sentence."""

@@ -23,22 +23,16 @@ def silent(evaluations: int, misfit_rad: float) -> None:
 
 @dataclass(frozen=True)
 class History:
-    """Course of an identification, step by step; the method defines what a step is.
-
-    Parameters
-    ----------
-    best_misfit, median_misfit : (n_steps + 1,)
-        Lowest misfit so far in rad, and the median over the method's population or fits.
-    best_parameters : (n_steps + 1, n_parameters)
-        Parameters of the lowest misfit.
-    evaluations : (n_steps + 1,)
-        Responses simulated so far.
-    """
+    """Course of an identification, step by step; the method defines what a step is."""
 
     best_misfit: Array
+    """Lowest misfit so far in rad, (n_steps + 1,)."""
     median_misfit: Array
+    """Median over the method's population or fits, (n_steps + 1,)."""
     best_parameters: Array
+    """Parameters of the lowest misfit, (n_steps + 1, n_parameters)."""
     evaluations: IntArray
+    """Responses simulated so far, (n_steps + 1,)."""
 
     @classmethod
     def of(cls, rows: Sequence[Row]) -> "History":
@@ -49,34 +43,23 @@ class History:
 
 @dataclass(frozen=True)
 class Identification:
-    """The result of identifying one trace by one method.
-
-    Parameters
-    ----------
-    parameters : (n_parameters,)
-        Parameters of lowest misfit.
-    misfit_rad
-        RMS misfit of these parameters.
-    generations
-        Number of steps: generations, or local fits.
-    evaluations
-        Number of simulated responses; a response with its derivatives counts as one.
-        Those of the final Newton refinement are not counted.
-    stop_reason
-        Reason why the method stopped.
-    history
-        Course of the identification.
-    converged
-        False if the final Newton refinement of the optimum did not converge.
-    """
+    """The result of identifying one trace by one method."""
 
     parameters: Array
+    """Parameters of lowest misfit, (n_parameters,)."""
     misfit_rad: float
+    """RMS misfit of these parameters."""
     generations: int
+    """Number of steps: generations, or local fits."""
     evaluations: int
+    """Number of simulated responses; a response with its derivatives counts as one. Those of the
+    final Newton refinement are not counted."""
     stop_reason: str
+    """Reason why the method stopped."""
     history: History
+    """Course of the identification."""
     converged: bool = True
+    """False if the final Newton refinement of the optimum did not converge."""
 
     def at(self, fit: Minima) -> "Identification":
         """Return a copy with the optimum of `fit`, a local fit of this trace alone."""

@@ -37,19 +37,15 @@ def identify_many(
 
 @dataclass(frozen=True)
 class Evolution:
-    """The result of one run of the genetic algorithm, with its first and last survivors.
-
-    Parameters
-    ----------
-    identification
-        Best individual and history.
-    first_survivors, last_survivors : (n_survivors, n_parameters)
-        Parameters of the survivors of the initial and of the last population, best first.
-    """
+    """The result of one run of the genetic algorithm, with its first and last survivors."""
 
     identification: Identification
+    """Best individual and history."""
     first_survivors: Array
+    """Parameters of the survivors of the initial population, best first, (n_survivors,
+    n_parameters)."""
     last_survivors: Array
+    """Those of the last population."""
 
 
 def evolve(
@@ -127,16 +123,12 @@ def evolve_many(
 
 @dataclass(frozen=True)
 class _Populations:
-    """Individuals of populations with the misfits by which they are ranked.
-
-    Parameters
-    ----------
-    codes : (n_words, n_populations, n)
-    ranking : (n_populations, n)
-    """
+    """Individuals of populations with the misfits by which they are ranked."""
 
     codes: IntArray
+    """(n_words, n_populations, n)."""
     ranking: Ranking
+    """(n_populations, n)."""
 
     def joined(self, other: "_Populations") -> "_Populations":
         return _Populations(

@@ -66,19 +66,15 @@ class GeneRange(Block):
 
 @dataclass(frozen=True)
 class Genome:
-    """Encoding of a sample model's parameters as genes.
-
-    Parameters
-    ----------
-    low, high : (n_genes,)
-        Smallest and largest value of each gene, both included.
-    sizes : (n_parameters,)
-        Number of genes of each parameter: its exponent and digits, in this order.
-    """
+    """Encoding of a sample model's parameters as genes."""
 
     low: IntArray
+    """Smallest value of each gene, included, (n_genes,)."""
     high: IntArray
+    """Largest one, included, (n_genes,)."""
     sizes: tuple[int, ...]
+    """Number of genes of each parameter, (n_parameters,): its exponent and digits, in this
+    order."""
 
     @property
     def genes(self) -> int:

@@ -62,24 +62,17 @@ class Rows:
 
 @dataclass
 class Normal(Rows):
-    """Normal equations of n problems.
-
-    Parameters
-    ----------
-    square_sum : (n,)
-        Sum of squares that is minimized.
-    gradient : (n, n_parameters)
-        Half its gradient.
-    information : (n, n_parameters, n_parameters)
-        Half its Hessian, in the Gauss-Newton approximation unless noted otherwise.
-    misfit_rad : (n,)
-        RMS misfit to the trace.
-    """
+    """Normal equations of n problems."""
 
     square_sum: Array
+    """Sum of squares that is minimized, (n,)."""
     gradient: Array
+    """Half its gradient, (n, n_parameters)."""
     information: Array
+    """Half its Hessian, in the Gauss-Newton approximation unless noted otherwise, (n, n_parameters,
+    n_parameters)."""
     misfit_rad: Array
+    """RMS misfit to the trace, (n,)."""
 
 
 Objective = Callable[[Array, IntArray], Normal]
@@ -98,24 +91,16 @@ class Constraint(Protocol):
 
 @dataclass
 class Minima(Rows):
-    """Results of minimizing n problems.
-
-    Parameters
-    ----------
-    x : (n, n_parameters)
-        Final points.
-    misfit_rad : (n,)
-        RMS misfits there.
-    evaluations : (n,)
-        Number of linearisations of each problem.
-    converged : (n,)
-        True if the minimization ended before the limit of steps.
-    """
+    """Results of minimizing n problems."""
 
     x: Array
+    """Final points, (n, n_parameters)."""
     misfit_rad: Array
+    """RMS misfits there, (n,)."""
     evaluations: IntArray
+    """Number of linearisations of each problem, (n,)."""
     converged: BoolArray
+    """True if the minimization ended before the limit of steps, (n,)."""
 
     @classmethod
     def none_yet(cls, starts: Array, evaluations: int) -> "Minima":

@@ -17,36 +17,27 @@ from importlib import import_module
 
 @dataclass(frozen=True)
 class Method:
-    """Description of an identification method, available without importing its module.
-
-    Parameters
-    ----------
-    name, title
-        Name in the config and in files; name in print.
-    blocks
-        Names of its config blocks, and of the settings class of each in its module.
-    step
-        What a row of its history follows.
-    color, dashes
-        Its lines in figures, as no other method's: a colour by its name in
-        `biogrip.products.figures.style.COLORS`, and Matplotlib's dashes.
-    settings
-        Class in its module that puts several blocks together, in their order.
-    exact
-        Whether it promises all digits of the optimum where it ends; tests hold it to that.
-    sure
-        Whether it promises the global optimum of (nearly) every trace; likewise.
-    """
+    """Description of an identification method, available without importing its module."""
 
     name: str
+    """Name in the config and in files."""
     title: str
+    """Name in print."""
     blocks: Mapping[str, str]
+    """Names of its config blocks, and of the settings class of each in its module."""
     step: str
+    """What a row of its history follows."""
     color: str
+    """Colour of its lines in figures, as no other method's: a name in
+    `biogrip.products.figures.style.COLORS`."""
     dashes: str
+    """Their dashes, as Matplotlib has them."""
     settings: str = ""
+    """Class in its module that puts several blocks together, in their order."""
     exact: bool = False
+    """Whether it promises all digits of the optimum where it ends; tests hold it to that."""
     sure: bool = False
+    """Whether it promises the global optimum of (nearly) every trace; likewise."""
 
     @property
     def module(self) -> str:

@@ -24,22 +24,16 @@ WORTH_A_MENTION = 2.0
 
 @dataclass(frozen=True)
 class FittedModel:
-    """A sample model fitted to a trace.
-
-    Parameters
-    ----------
-    candidate
-        Name of the model in `CANDIDATES`.
-    misfit_rad
-        RMS misfit of its best fit.
-    delta_aic, delta_bic
-        AIC and BIC minus the lowest of the models tried.
-    """
+    """A sample model fitted to a trace."""
 
     candidate: str
+    """Name of the model in `CANDIDATES`."""
     misfit_rad: float
+    """RMS misfit of its best fit."""
     delta_aic: float
+    """AIC minus the lowest of the models tried."""
     delta_bic: float
+    """BIC, likewise."""
 
     @property
     def model(self) -> SampleModel:

@@ -31,18 +31,12 @@ Objective = Callable[[Array, IntArray, Array], Normal]
 
 @dataclass
 class Expansion(Rows):
-    """First-order Taylor expansion of the correction about a point of each problem.
-
-    Parameters
-    ----------
-    about : (n, n_parameters)
-        Log-parameters.
-    rows : (n, 1 + n_parameters, n_rows)
-        Correction and its derivatives there.
-    """
+    """First-order Taylor expansion of the correction about a point of each problem."""
 
     about: Array
+    """Log-parameters, (n, n_parameters)."""
     rows: Array
+    """Correction and its derivatives there, (n, 1 + n_parameters, n_rows)."""
 
     def at(self, x: Array, problem: IntArray) -> Array:
         """Return correction and derivatives at points, (n, n_parameters), of some problems."""

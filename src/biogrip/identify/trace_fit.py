@@ -40,27 +40,18 @@ Find = Callable[[Problem], Identification]
 
 @dataclass(frozen=True)
 class TraceFit:
-    """The identification of one trace, with its noise model and outliers.
-
-    Parameters
-    ----------
-    problem
-        The trace without outliers; its residuals are white.
-    found
-        Its global optimum.
-    noise_model
-        Autocorrelation model of the noise; None if the noise was assumed to be white.
-    outliers : (n_samples,)
-        True for readings that were left out.
-    fitted_along
-        Terms of the instrument that were fitted along, in words.
-    """
+    """The identification of one trace, with its noise model and outliers."""
 
     problem: Problem
+    """The trace without outliers; its residuals are white."""
     found: Identification
+    """Its global optimum."""
     noise_model: NoiseModel | None
+    """Autocorrelation model of the noise; None if the noise was assumed to be white."""
     outliers: BoolArray
+    """True for readings that were left out, (n_samples,)."""
     fitted_along: str = ""
+    """Terms of the instrument that were fitted along, in words."""
 
     def noise_data(self) -> dict[str, float | None] | None:
         """Return the estimated noise model as plain data; None if noise was assumed white."""

@@ -15,16 +15,12 @@ ARM_KEYS = ("inertia_kgm2", "damping_Nms_per_rad", "stiffness_Nm_per_rad")
 
 @dataclass(frozen=True)
 class CalibratedArm:
-    """A calibrated arm with its standard uncertainties.
-
-    Parameters
-    ----------
-    arm, uncertainty
-        Estimates and their standard uncertainties, in the same units.
-    """
+    """A calibrated arm with its standard uncertainties."""
 
     arm: Arm
+    """Estimates."""
     uncertainty: Arm
+    """Their standard uncertainties, in the same units."""
 
 
 def calibration_yaml(left: CalibratedArm, right: CalibratedArm) -> str:

@@ -41,19 +41,14 @@ class CalibrationTest(Block):
 
 @dataclass(frozen=True)
 class FreeMotion:
-    """Rotation of a free arm after a torque step and after a torque impulse.
-
-    Parameters
-    ----------
-    time_s : (n_samples,)
-        Time since step and impulse.
-    step_rad, impulse_rad : (n_samples,)
-        Rotations after step and impulse.
-    """
+    """Rotation of a free arm after a torque step and after a torque impulse."""
 
     time_s: Array
+    """Time since step and impulse, (n_samples,)."""
     step_rad: Array
+    """Rotation after a step, (n_samples,)."""
     impulse_rad: Array
+    """Rotation after an impulse, (n_samples,)."""
 
 
 def free_motion(arm: Arm, time_s: Array, step_Nm: float, impulse_Nms: float) -> FreeMotion:

@@ -16,25 +16,18 @@ SMALLEST_M, LARGEST_M = 30e-6, 120e-6
 
 @dataclass(frozen=True)
 class Contact:
-    """The configuration in which the jaws just touch a sample.
-
-    Parameters
-    ----------
-    size_m
-        Diameter of the sample.
-    closing_rad
-        Rotation of each arm from its neutral position.
-    reference_angle_deg
-        hat-theta_2 in this configuration.
-    torque_Nm, voltage_V
-        Torque and voltage that hold each arm there against its hinge; the stiffer arm's.
-    """
+    """The configuration in which the jaws just touch a sample."""
 
     size_m: float
+    """Diameter of the sample."""
     closing_rad: float
+    """Rotation of each arm from its neutral position."""
     reference_angle_deg: float
+    """hat-theta_2 in this configuration."""
     torque_Nm: float
+    """Torque that holds the stiffer arm there against its hinge."""
     voltage_V: float
+    """Voltage that gives this torque."""
 
 
 def contact(neutral: Gripper, jaw_gap_m: float, comb: CombDrive, size_m: float) -> Contact:
