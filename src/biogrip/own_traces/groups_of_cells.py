@@ -35,6 +35,7 @@ from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import IdentifyOptions, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.search_ranges import with_own_ranges
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import fit_judged, notes_on_fit
 from biogrip.progress import Progress
@@ -256,12 +257,13 @@ class _Traces:
                     str(error) if visible(trace) in str(error) else f"{visible(trace)}: {error}"
                 )
                 self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
-        return case_problem
+        return _in_common_ranges(case_problem)
 
     def _trace_problem(self, trace: Path) -> _TraceProblem:
         study = study_of(replace(self._options, trace=trace))
         (case,) = study.cases.values()
         recorded = self._options.read_as.read(trace, case.gripper, case.problem)
+        case = with_own_ranges(case, recorded, self._options.config)
         rotation_rad = recorded.rotation_rad[0]
         # Noise never repeats: equal rotations are a copied file, and would feign agreement.
         same = sha256(rotation_rad.tobytes()).digest()
@@ -279,6 +281,15 @@ class _Traces:
             fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
             problem, notes = fit.problem, notes_on_fit(fit)
         return _TraceProblem(trace, problem, case, notes, case_problem.noise_rad)
+
+
+def _in_common_ranges(traces: list[_TraceProblem]) -> list[_TraceProblem]:
+    """Return the traces of a cell with search ranges that contain those of each."""
+    if len(traces) < 2:
+        return traces
+    low = np.min([each.problem.low for each in traces], axis=0)
+    high = np.max([each.problem.high for each in traces], axis=0)
+    return [replace(each, problem=replace(each.problem, low=low, high=high)) for each in traces]
 
 
 def _known_noise(traces: Sequence[_TraceProblem]) -> list[float] | None:
