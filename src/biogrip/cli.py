@@ -5,7 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from biogrip.own_traces.read_as import ReadAs
 
 RESULTS = Path("results")
+FIT = "fit"
 _SHOWN = 200
 
 # Imports are inside the commands, so that jobs import only what they use.
@@ -229,11 +230,37 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
     command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    command.add_argument("--skip", type=int, metavar="N", help="lines before the header [0]")
+    command.add_argument(
+        "--scale", type=float, metavar="FACTOR", help="rotation = FACTOR times the column [1]"
+    )
+    command.add_argument(
+        "--start",
+        type=_start,
+        metavar="SECONDS",
+        help="time of the clock at which the protocol starts, or fit to fit it along [0]",
+    )
     command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
     for name, what in (("--offset", "an offset"), ("--drift", "a linear drift")):
         command.add_argument(
             name, action=argparse.BooleanOptionalAction, help=f"fit {what} along, or not"
         )
+
+
+def _start(text: str) -> float | str:
+    """Read the value of ``--start``."""
+    with suppress(ValueError):
+        return text if text == FIT else float(text)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed are seconds, or {FIT}")
+
+
+def _parameter(text: str) -> tuple[str, float]:
+    """Read a value of ``--fix``."""
+    name, _, value = text.partition("=")
+    with suppress(ValueError):
+        if name:
+            return name, float(value)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
 
 
 def _trace_options(command: argparse.ArgumentParser) -> None:
@@ -247,6 +274,14 @@ def _trace_options(command: argparse.ArgumentParser) -> None:
     )
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
+    )
+    command.add_argument(
+        "--fix",
+        type=_parameter,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="known parameter, SI units; 0 leaves an element out; repeat for more",
     )
     command.add_argument(
         "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
@@ -280,6 +315,7 @@ def _identify(options: argparse.Namespace) -> None:
         report=options.report,
         table=options.csv,
         posterior=options.posterior,
+        fixed=dict(options.fix),
         strict=options.strict,
         force=options.force,
     )
@@ -294,6 +330,7 @@ def _groups(options: argparse.Namespace) -> None:
         _read_as(options),
         options.config,
         exclude=options.exclude,
+        fixed=dict(options.fix),
         output=options.output,
         force=options.force,
     )
@@ -320,6 +357,10 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         options.rotation,
         options.time_unit,
         options.rotation_unit,
+        options.skip,
+        options.scale,
+        None if options.start == FIT else options.start,
+        options.start == FIT or None,
         options.noise,
         options.offset,
         options.drift,

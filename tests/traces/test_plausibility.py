@@ -402,7 +402,9 @@ def test_times_outside_the_protocol_are_refused(
     times = sample_times(400.0, 1.0)
     values = trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
     said = refusal(recorded(times + shift_s, values), gripper, steps)
-    assert said == f"trace.csv, {found}, allowed is the protocol's time, 0 to 400 s."
+    remedy = "If the protocol starts at another time of the clock than 0, start_s under measurement"
+    allowed = "allowed is the protocol's time, 0 to 400 s."
+    assert said == f"trace.csv, {found}, {allowed} {remedy} says when."
 
 
 def test_the_last_digit_of_a_time_does_not_matter(gripper: Gripper, steps: TorqueHistory) -> None:
@@ -512,7 +514,10 @@ def test_a_mirrored_trace_is_refused_with_its_place_and_a_hint(
     values = trace(gripper, steps, SAMPLES["liquid_drop_2"], times)
     said = refusal(recorded(times, -values), gripper, steps)
     assert said.startswith(f"trace.csv, lines 2 to 402, column 'rotation_rad': {MIRRORED}, allowed")
-    assert "It would fit if it were -1 times (is opening counted as positive?)" in said
+    assert (
+        "It would fit if it were -1 times (is opening counted as positive? Then scale it by -1)"
+        in said
+    )
     noise = 0.1 * values.max() * np.random.default_rng(0).standard_normal(len(times))
     with pytest.raises(BiogripError, match=MIRRORED):
         check(recorded(times, noise - values), gripper, steps, FILE, SI, 0.1 * values.max())

@@ -385,6 +385,36 @@ def test_a_laboratorys_text_is_read(tmp_path: Path, encoding: str) -> None:
     assert found.rotation_rad == pytest.approx(np.radians(np.arange(12) * 1e-6))
 
 
+PREAMBLE = ['Messung "12.03.2026', "", "# Kanal;Sensor", "Rate;20;Hz;;", "Zeit (s);U (V)"]
+
+
+@pytest.mark.parametrize("row", ["{0};{0},5", '{0};"{0},5"'])
+def test_a_preamble_is_skipped_and_volts_are_scaled(tmp_path: Path, row: str) -> None:
+    """Both readers: Arrow takes no quoted cells."""
+    lines = [*PREAMBLE, *(row.format(i) for i in range(12))]
+    path = written(tmp_path / "t.csv", lines, encoding="cp1252")
+    found = read_recording(path, Columns("Zeit (s)", "U (V)", None, "mrad", 4, -0.25))
+    assert found.rotation_rad == pytest.approx(-0.25e-3 * (np.arange(12) + 0.5))
+    np.testing.assert_array_equal(found.lines, np.arange(6, 18))
+
+
+@pytest.mark.parametrize(
+    ("columns", "hint"),
+    [
+        (Columns("Zeit (s)", "U (V)"), "skip: 4 there."),
+        (Columns("time_s", "rotation_rad", by_options=True), "--skip 4."),
+        (Columns("time_s", "U (V)", skip=4), None),
+    ],
+)
+def test_a_header_below_a_preamble_is_found(
+    tmp_path: Path, columns: Columns, hint: str | None
+) -> None:
+    path = written(tmp_path / "t.csv", [*PREAMBLE, *(f"{i};{i},5" for i in range(12))])
+    said = refusal(path, columns)
+    assert "found no such column" in said
+    assert said.endswith(f" Line 5 looks like the header: {hint}") == (hint is not None)
+
+
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-32"])
 def test_other_encodings_are_refused(tmp_path: Path, encoding: str) -> None:
     path = written(tmp_path / "t.csv", ["time_s,rotation_rad", *ROWS], encoding=encoding)

@@ -50,6 +50,8 @@ class CaseProblem:
         Constitutive model.
     fixed
         Parameters that are known, by name.
+    fit_start
+        True if the time at which the protocol started is fitted along, see `fitted_onset`.
     """
 
     gripper: Gripper
@@ -65,6 +67,7 @@ class CaseProblem:
     sd_rad: Array | None = field(default=None, compare=False)
     coloured: bool = False
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    fit_start: bool = False
     _condensed: dict[tuple[bytes, bool], Condensed] = field(
         default_factory=dict, init=False, compare=False
     )

@@ -44,6 +44,11 @@ class Problem:
         quiet = self.residuals.without_inertia()
         return replace(self, misfit=quiet.condensed_misfit, residuals=quiet)
 
+    def later(self, change_s: float) -> "Problem":
+        """Return the problem of the same trace for a protocol that starts later by some s."""
+        moved = self.residuals.later(change_s)
+        return replace(self, misfit=moved.condensed_misfit, residuals=moved)
+
 
 def make_problem(
     gripper: Gripper,

@@ -47,6 +47,8 @@ def estimate_from_recordings(
     block = case.block.design
     assert block is not None
     read_as.check()
+    if read_as.fit_start:
+        raise BiogripError("--start: found fit, allowed with --after is a time.")
     noise_rad = read_as.noise_rad or block.noise_rad
     problems = [_make_problem(each, read_as, noise_rad) for each in traces]
     rng = stream(study_seed, case.name, 0, "after")

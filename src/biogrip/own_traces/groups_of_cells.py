@@ -1,7 +1,7 @@
 """The command ``biogrip groups``: recorded traces of cells, compared between groups of cells."""
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from math import exp
@@ -28,16 +28,17 @@ from biogrip.groups.group_findings import (
 )
 from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.groups.population import FEWEST_CELLS
-from biogrip.identifiability.fit_status import DOUBTFUL, OK, REJECTED, Note
+from biogrip.identifiability.fit_status import DOUBTFUL, HARMLESS, OK, REJECTED, Note
 from biogrip.identify.answer import Identification
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
-from biogrip.own_traces.one_trace import IdentifyOptions, study_of
+from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.search_ranges import with_own_ranges
+from biogrip.own_traces.words import fixed_in_words
 from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages.judgement import fit_judged, notes_on_fit
+from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
@@ -62,6 +63,7 @@ def groups(
     config: Path | None,
     *,
     exclude: Sequence[str],
+    fixed: Mapping[str, float],
     output: Path | None,
     force: bool,
 ) -> int:
@@ -75,6 +77,8 @@ def groups(
         Fields of `IdentifyOptions`.
     exclude
         Names of cells to leave out.
+    fixed
+        Field of `IdentifyOptions`.
     output
         JSON file. By default it is beside the table.
     force
@@ -97,7 +101,8 @@ def groups(
     traces = [trace for cell in cells for trace in cell.traces]
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
-    found = compare_groups(IdentifyOptions(table, model, read_as, config), cells, written)
+    options = IdentifyOptions(table, model, read_as, config, fixed=fixed)
+    found = compare_groups(options, cells, written)
     print(visible_lines(in_words(found)))
     print(f"Written to {visible(written)}.")
     return 1 if found["skipped"] else 0
@@ -179,6 +184,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         "model": case_problem.model.name,
         "model_title": case_problem.model.title,
         "confidence": confidence,
+        **fixed_data(case_problem),
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
@@ -197,6 +203,7 @@ def in_words(found: dict[str, Any]) -> str:
     """Return the result of `compare_groups` as tables in plain text."""
     percent = f"{100 * found['confidence']:g} %"
     parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
+    parts += fixed_in_words(found)
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
@@ -274,12 +281,12 @@ class _Traces:
             )
         case_problem = case.problem.weighted(recorded.sd_rad)
         problem = case_problem.of(recorded.time_s, rotation_rad)
-        notes: list[Note] = []
+        notes = [Note(HARMLESS, ONSET_AS_FITTED)] if case.problem.fit_start else []
         if case.problem.coloured:
             # All cells share one gripper: its calibration error is common to them, not noise.
             assumed = replace(case_problem, uncertainty={})
             fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
-            problem, notes = fit.problem, notes_on_fit(fit)
+            problem, notes = fit.problem, [*notes, *notes_on_fit(fit)]
         return _TraceProblem(trace, problem, case, notes, case_problem.noise_rad)
 
 

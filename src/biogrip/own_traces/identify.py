@@ -1,6 +1,6 @@
 """The command ``biogrip identify``: the files it writes and the text it prints."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from biogrip.errors import BiogripError
@@ -25,6 +25,7 @@ def identify(
     report: Path | None,
     table: Path | None,
     posterior: bool,
+    fixed: Mapping[str, float],
     strict: bool,
     force: bool,
 ) -> int:
@@ -40,8 +41,8 @@ def identify(
         JSON file for a single trace. By default each trace has one beside it.
     report, table
         HTML and CSV file to write, if any.
-    posterior
-        Field of `IdentifyOptions`.
+    posterior, fixed
+        Fields of `IdentifyOptions`.
     strict
         If true, a rejected fit counts as a failure.
     force
@@ -64,7 +65,7 @@ def identify(
     problems = {trace: trace_file_problem(trace) for trace in traces}
     absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
     there = [trace for trace in traces if str(trace) not in absent]
-    options = IdentifyOptions((there or traces)[0], model, read_as, config, posterior)
+    options = IdentifyOptions((there or traces)[0], model, read_as, config, posterior, fixed)
     samples = posterior
     if there and (len(traces) > 1 or config is not None):
         # Errors of options and config concern all traces: raise them once, here.

@@ -69,6 +69,8 @@ def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV."""
     quantities = labels_of(outcome.found)
     columns = ["trace", "problem", "fit", "model", "samples", "noise_rad", "misfit_rad"]
+    fixed = ["fixed"] if any("fixed" in each for each in outcome.found) else []
+    columns += fixed
     columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
     rows = [
         (
@@ -79,6 +81,7 @@ def write_table(outcome: Outcome, table: Path) -> None:
             each["samples"],
             each["noise_rad"],
             each["misfit_rad"],
+            *(", ".join(each[name]) for name in fixed),
             *_of_quantities(each, quantities),
             each["limits"],
             " ".join(each["reasons"]),

@@ -2,7 +2,8 @@
 
 import json
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
+from biogrip.identifiability.onset_profiles import profile_over_onset
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.own_traces.assumed import (
     assumed,
@@ -26,6 +28,7 @@ from biogrip.own_traces.assumed import (
     versions,
 )
 from biogrip.own_traces.fitted_models import judge_again, models_tried
+from biogrip.own_traces.late_onset import late_onset
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.search_ranges import with_own_ranges
@@ -34,14 +37,25 @@ from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import posterior, recording
-from biogrip.products.stages.judgement import fit_judged, notes_on_fit
+from biogrip.products.stages.judgement import (
+    ONSET_AS_FITTED,
+    fit_judged,
+    notes_on_fit,
+)
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
+from biogrip.study.sample_block import fixed_problems
+from biogrip.study.source import dotted
 from biogrip.study.study import Study
 from biogrip.study.trace_file import trace_file_problem
+
+_NOT_COMPARED = (
+    "With fixed parameters no other sample models are tried: a value that is known in this model "
+    "says nothing of theirs, and without it they would fit better for their freedom alone."
+)
 
 
 @dataclass(frozen=True)
@@ -60,6 +74,8 @@ class IdentifyOptions:
         YAML file laid over the default study: gripper, protocol, search range.
     posterior
         If true, sample the posterior even if the config does not say so.
+    fixed
+        Known parameters by name, SI units, beside those of the config.
     """
 
     trace: Path
@@ -67,6 +83,7 @@ class IdentifyOptions:
     read_as: ReadAs
     config: Path | None
     posterior: bool = False
+    fixed: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -134,10 +151,17 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             study, case, fit, diagnosis, lambda: None, named=names_models(options.config)
         )
         diagnosis, doubts = judge_again(fit, diagnosis, models, confidence, case_problem.noise_rad)
+        if case_problem.fit_start:
+            diagnosis = profile_over_onset(diagnosis, recorded.time_s)
         progress.done()
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
+        doubts += late_onset(case_problem, recorded, diagnosis)
         read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
+        if case_problem.fit_start and case.posterior is not None:
+            read.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))
+        if case_problem.fixed:
+            read.append(Note(HARMLESS, _NOT_COMPARED))
         said = exact_data(diagnosis, [*read, *notes_on_fit(fit), *doubts])
         data = {
             WRITTEN_BY: __version__,
@@ -145,6 +169,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             "model": case_problem.model.name,
             "model_title": case_problem.model.title,
             "confidence": confidence,
+            **fixed_data(case_problem),
             "limits": gripper_in_limits(case_problem),
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
@@ -204,6 +229,8 @@ def study_of(options: IdentifyOptions) -> Study:
         hint, names = nearest(options.model, CANDIDATES), ", ".join(CANDIDATES)
         raise BiogripError(f"--model: found '{options.model}'.{hint} Allowed: {names}.")
     sample = CANDIDATES[options.model]
+    for path, text in fixed_problems(sample.model, options.fixed):
+        raise BiogripError(f"--fix: {dotted(path)}: {text}" if path else f"--fix: {text}")
     files = [default_config(), *([options.config] if options.config else [])]
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
@@ -217,17 +244,27 @@ def study_of(options: IdentifyOptions) -> Study:
         case: {
             "sample": {"model": sample.name, "branches": sample.branches},
             "measurement": measurement,
+            "fixed": dict(options.fixed),
         }
     }
     return load_study(merged, files, command_line=["cases"], for_workflow=False)
 
 
+def fixed_data(case_problem: CaseProblem) -> dict[str, Any]:
+    """Return values and units of fixed parameters in words, or nothing if there are none."""
+    fixed = case_problem.fixed
+    units = {p.name: p.unit for p in case_problem.model.parameters}
+    words = [f"{name} = {value:g} {units[name]}".rstrip() for name, value in fixed.items()]
+    return {"fixed": words} if words else {}
+
+
 def _instrument(
     case_problem: CaseProblem, recorded: Measurements, parameters: Array
 ) -> dict[str, Any]:
-    """Return offset and drift of the instrument in the best fit, as far as they were fitted."""
+    """Return onset, offset and drift of the instrument in the best fit, as far as fitted."""
+    onset = {"onset_s": recorded.onset_s} if case_problem.fit_start else {}
     if not (case_problem.offset or case_problem.drift):
-        return {}
+        return onset
     time_s, measured = recorded.time_s, recorded.rotation_rad[0]
     network = case_problem.searched.network(parameters)
     simulated = simulated_rotation(
@@ -237,6 +274,8 @@ def _instrument(
     added = within(basis, measured - simulated, case_problem.sd_rad)
     slope = float((added[-1] - added[0]) / (time_s[-1] - time_s[0]))
     start = float(added[0] - slope * time_s[0])
-    return ({"offset_rad": start} if case_problem.offset else {}) | (
-        {"drift_rad_per_s": slope} if case_problem.drift else {}
+    return (
+        onset
+        | ({"offset_rad": start} if case_problem.offset else {})
+        | ({"drift_rad_per_s": slope} if case_problem.drift else {})
     )

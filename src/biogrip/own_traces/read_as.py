@@ -12,7 +12,7 @@ from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE
 from biogrip.study.validation import measurement_problem
 from biogrip.traces.recordings import Columns
 
-_OPTIONS = {"noise_rad": "noise"}
+_OPTIONS = {"noise_rad": "noise", "start_s": "start"}
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,10 @@ class ReadAs:
         Names of the columns.
     time_unit, rotation_unit
         Units of the columns, where their names have none.
+    skip, scale
+        Lines before the header, and rotation over the number in the column.
+    start_s, fit_start
+        Time of the clock at which the protocol starts, or true to fit it along.
     noise_rad
         Standard deviation of the noise, if it is known.
     offset, drift
@@ -41,6 +45,10 @@ class ReadAs:
     rotation: str = "rotation_rad"
     time_unit: str | None = None
     rotation_unit: str | None = None
+    skip: int | None = None
+    scale: float | None = None
+    start_s: float | None = None
+    fit_start: bool | None = None
     noise_rad: float | None = None
     offset: bool | None = None
     drift: bool | None = None
@@ -56,8 +64,17 @@ class ReadAs:
     @property
     def columns(self) -> Columns:
         """Names and units of the file's columns."""
-        units = self.time_unit, self.rotation_unit
-        return Columns(self.time, self.rotation, *units, by_options=True, sd=self.sd)
+        return Columns(
+            self.time,
+            self.rotation,
+            self.time_unit,
+            self.rotation_unit,
+            self.skip or 0,
+            1.0 if self.scale is None else self.scale,
+            self.start_s,
+            by_options=True,
+            sd=self.sd,
+        )
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
         """Read a trace, and refuse one that is impossible with its gripper and protocol.
@@ -74,7 +91,8 @@ class ReadAs:
         BiogripError
             With file, line and column, if the trace cannot be used.
         """
-        return recording.read_checked(file, gripper, problem, self.columns)
+        trace = recording.read_checked(file, gripper, problem, self.columns)
+        return recording.with_fitted_onset(trace, problem)
 
     def check(self) -> None:
         """Refuse option values that the config would refuse.

@@ -47,6 +47,9 @@ def in_words(found: Mapping[str, Any]) -> str:
     ]
     lines += one_sided_in_words([found])
     lines += [found["limits"], *(trade["words"] for trade in found["trades"])]
+    lines += fixed_in_words(found)
+    if "onset_s" in found:
+        lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
     if "offset_rad" in found:
         lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
     if "drift_rad_per_s" in found:
@@ -56,6 +59,11 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def fixed_in_words(found: Mapping[str, Any]) -> list[str]:
+    """Return a line on fixed parameters, or none."""
+    return [f"Fixed: {', '.join(found['fixed'])}."] if "fixed" in found else []
 
 
 def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -119,6 +127,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         lines += [*one_sided_in_words(found), found[0]["limits"]]
         provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
         lines += [f"Sums hold provided {words}." for words in provided]
+        lines += fixed_in_words(found[0])
         lines += [
             f"{visible(each['trace'])}: {note['weight']}: {visible(note['text'])}"
             for each in found

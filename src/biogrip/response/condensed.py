@@ -91,6 +91,17 @@ class Condensed:
             whitening=self._whitening,
         )
 
+    def later(self, change_s: float) -> "Condensed":
+        """Return rows for a protocol that starts later by some s; noise and nuisance stay."""
+        return Condensed(
+            self._torque,
+            self._all_s - change_s,
+            self.nuisance,
+            nonlinear=self.nonlinear,
+            ringing_s=self.ringing_s,
+            whitening=self._whitening,
+        )
+
     def cleared(self, rows: Array) -> Array:
         """Project nuisance out of functions of time, (..., n_samples), and whiten noise."""
         if self._whitening is not None:

@@ -34,13 +34,17 @@ def compute_growth(
     torque
         The protocol.
     time_s : (n_times,)
-        Ascending, from 0.
+        Ascending. Before the protocol nothing responds.
 
     Returns
     -------
     growth, slope : (n, n_drives, n_modes, n_times)
         In N m, and N m s, for each of the `drives`.
     """
+    if before := int(time_s.searchsorted(torque.time_s[0])):
+        growth, slope = compute_growth(rates, torque, time_s[before:])
+        zeros = np.zeros((*growth.shape[:-1], before), growth.dtype)
+        return np.concatenate((zeros, growth), axis=-1), np.concatenate((zeros, slope), axis=-1)
     n, m = rates.shape
     if not torque.only_steps:
         return _from_phase_to_phase(rates, torque, time_s)

@@ -123,7 +123,9 @@ def _interpolation(edges_s: Array, time_s: Array) -> list[Array]:
         for of_elements in (edges_s[:-1], np.diff(edges_s))
     )
     points = np.concatenate(([0.0], _radau()[0]))
-    return np.split(_polynomials(points, (time_s - starts) / lengths), cuts, axis=1)
+    functions = _polynomials(points, (time_s - starts) / lengths)
+    functions[:, time_s < edges_s[0]] = 0.0
+    return np.split(functions, cuts, axis=1)
 
 
 def nonlinear_rotation(

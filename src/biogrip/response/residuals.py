@@ -95,6 +95,15 @@ class Residuals:
         other.__dict__.pop("_trace_at_nodes", None)
         return other
 
+    def later(self, change_s: float) -> "Residuals":
+        """Return the residuals of the same trace for a protocol that starts later by some s."""
+        other = copy(self)
+        other._time_s = self._time_s - change_s
+        other._condensed = self._condensed.later(change_s)
+        other._trace_rows = {}
+        other.__dict__.pop("_trace_at_nodes", None)
+        return other
+
     def with_freedom(self, freedom: float) -> "Residuals":
         """Return a copy whose noise model is known with so many degrees of freedom."""
         other = copy(self)

@@ -28,7 +28,7 @@ from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
 from biogrip.study.plain import built
 from biogrip.study.protocol_block import ProtocolBlock
-from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, parameter_problems
+from biogrip.study.sample_block import LARGEST_PARAMETER, SampleBlock, fixed_problems
 
 METHOD_BLOCKS = tuple(dict.fromkeys(name for it in METHODS.values() for name in it.blocks))
 """Config blocks of the methods."""
@@ -114,6 +114,13 @@ class Shared(Checked, BaseModel):
             "block is there, even an empty one, `{}`."
         ),
     ] = None
+    fixed: Annotated[
+        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
+        Field(
+            description="Known values of parameters, by name; these are not identified. 0 leaves "
+            "an element out."
+        ),
+    ] = None
 
     def method_block(self, name: str) -> object:
         """Return the settings object of a block of a method."""
@@ -162,10 +169,6 @@ class CaseBlock(Shared):
         Published | None,
         Field(description="Results that the paper reports for this sample, to compare with."),
     ] = None
-    fixed: Annotated[
-        Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
-        Field(description="Known values of parameters, by name; these are not identified."),
-    ] = None
     contact: Annotated[
         Literal["bilateral", "unilateral"] | None,
         Field(
@@ -212,7 +215,10 @@ class CaseBlock(Shared):
             for path, text in self.sample.missing():
                 yield ("sample", *path), text
             yield from self._unreachable_problems()
-        yield from self._fixed_problems()
+        yield from (
+            (("fixed", *path), text)
+            for path, text in fixed_problems(self.sample.sample.model, self.known)
+        )
         yield from self._contact_problems()
         yield from self._design_problems()
         yield from self._method_problems()
@@ -282,17 +288,6 @@ class CaseBlock(Shared):
         model = self.sample.sample.model
         for path, text in self.posterior.problems_of(model, list(self.known)):
             yield ("posterior", *path), text
-
-    def _fixed_problems(self) -> Iterator[Problem]:
-        model = self.sample.sample.model
-        for name in self.known:
-            if name not in model.names:
-                text = f"is no parameter of the sample, which has {', '.join(model.names)}."
-                yield ("fixed", name), text + nearest(name, model.names)
-        for path, text in parameter_problems(model, self.known):
-            yield ("fixed", *path), text
-        if set(model.names) <= set(self.known):
-            yield ("fixed",), "leaves nothing to identify; allowed are fewer parameters."
 
     def _unreachable_problems(self) -> Iterator[Problem]:
         """Find true values outside the decades that are searched."""

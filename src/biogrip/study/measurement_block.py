@@ -10,12 +10,15 @@ from biogrip.experiment.noise import Noise
 from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.keys import Block, OneOf, Problem
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS
+from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
+
+_COLUMNS = ("time", "rotation", "time_unit", "rotation_unit", "skip", "scale")
+_OF_FILE = (*_COLUMNS, *KNOWN_NOISE, "start_s", "fit_start")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,13 +38,23 @@ class MeasurementBlock(Block):
     """A recorded trace, CSV, instead of a simulated one; relative to where Snakemake runs. See
     "Your own measurement"."""
     time: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
-    """Name of the file's column of times, counted from the start of the protocol."""
+    """Name of the file's column of times; its clock starts with the protocol, or before."""
     rotation: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
     """Name of the file's column of the left arm's closing rotation."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
     rotation_unit: Annotated[str | None, OneOf(ROTATION_UNITS)] = None
     """Unit of the rotations, where the column's name does not end in it."""
+    skip: Annotated[int | None, Field(ge=0, le=1_000_000)] = None
+    """Number of lines in the file before its header, as programs of instruments write them."""
+    scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
+    """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
+    rotation that is positive where the arm opens. By default 1."""
+    start_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    """Time of the file's clock at which the protocol starts. Readings before it tell of the zero
+    only. By default 0, before which there may be none."""
+    fit_start: bool = False
+    """If true, fit that time along; the limits allow for its uncertainty. By default false."""
     noise_rad: Annotated[float | None, Field(ge=1e-15, le=10)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
@@ -71,6 +84,22 @@ class MeasurementBlock(Block):
         return self.noise_model == COLOURED
 
     @property
+    def columns(self) -> Columns:
+        """Columns of a recorded trace's file."""
+        assert self.time is not None
+        assert self.rotation is not None
+        return Columns(
+            self.time,
+            self.rotation,
+            self.time_unit,
+            self.rotation_unit,
+            self.skip or 0,
+            1.0 if self.scale is None else self.scale,
+            self.start_s,
+            sd=self.sd,
+        )
+
+    @property
     def fits_offset(self) -> bool:
         """True if a constant offset is fitted along."""
         return self.coloured if self.offset is None else self.offset
@@ -93,11 +122,14 @@ class MeasurementBlock(Block):
                 yield (key,), text
             if self.sd is not None and key != "sd" and getattr(self, key) is not None:
                 yield (key,), "does not go with sd, which says all of the noise."
+        if self.fit_start and self.start_s is not None:
+            yield ("fit_start",), "does not go with start_s; allowed is one of them."
         if self.bursts and self.times_s:
             yield ("bursts",), "does not go with times_s; allowed is one of them."
         if self.file is None:
-            for key in ("time", "rotation", "time_unit", "rotation_unit", *KNOWN_NOISE):
-                if getattr(self, key) is not None:
+            for key in _OF_FILE:
+                given = getattr(self, key)
+                if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
         for key in ("time", "rotation"):

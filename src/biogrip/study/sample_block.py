@@ -98,3 +98,14 @@ def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Itera
         elif not value < parameter.below:
             text = f"found {value:g}, allowed is above 0 and below {parameter.below:g}."
             yield (parameter.name,), text
+
+
+def fixed_problems(model: SampleModel, values: Mapping[str, float]) -> Iterator[Problem]:
+    """Find fixed parameters that the model does not have, or whose values it does not allow."""
+    for name in values:
+        if name not in model.names:
+            text = f"is no parameter of the sample, which has {', '.join(model.names)}."
+            yield (name,), text + nearest(name, model.names)
+    yield from parameter_problems(model, values)
+    if set(model.names) <= set(values):
+        yield (), "leaves nothing to identify; allowed are fewer parameters."

@@ -167,11 +167,7 @@ class Case:
     @property
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
-        block = self.block.measurement
-        assert block.time is not None
-        assert block.rotation is not None
-        units = block.time_unit, block.rotation_unit
-        return Columns(block.time, block.rotation, *units, sd=block.sd)
+        return self.block.measurement.columns
 
     @property
     def ranges(self) -> dict[str, GeneRange]:
@@ -208,6 +204,7 @@ class Case:
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
             uncertainty=self.block.gripper.uncertainties(self.actuator),
+            fit_start=measurement.fit_start,
         )
 
     def method(self, name: str) -> object:

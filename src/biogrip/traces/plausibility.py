@@ -6,15 +6,10 @@ and to its integral (a damper). So the trace is fitted by linear least squares w
 lagged by three relaxation times: a negligible one, a tenth of the protocol, and ten protocols.
 Three lags are too few to identify a sample, but enough to find its response under noise. The
 peak of the readings would be a peak of the noise, and block means would lose a sinusoid.
-
-References
-----------
-.. [1] C. L. Lawson and R. J. Hanson, Solving Least Squares Problems, Prentice-Hall, 1974,
-   chapter 23: non-negative least squares.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,8 +19,9 @@ from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.linear import StepResponse, rotation
 from biogrip.response.nuisance import without
+from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
+from biogrip.traces.onset import begins_constant, estimate_onset
 from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
 
 LARGEST_SHARE = 1.5
@@ -122,6 +118,7 @@ def check_recording(
     nuisance: Array,
     noise_rad: float | None = None,
     typical_rad: float | None = None,
+    onset_s: float | None = None,
 ) -> str | None:
     """Refuse a trace that is impossible with the gripper and protocol.
 
@@ -134,7 +131,7 @@ def check_recording(
     Parameters
     ----------
     recording
-        Trace that was read from `path`.
+        Trace that was read from `path`, its times counted from the start of the protocol.
     gripper, torque
         Gripper and protocol it was recorded with.
     path, columns
@@ -146,6 +143,9 @@ def check_recording(
         of the fit.
     typical_rad
         Standard deviation of the noise where it is given in any way.
+    onset_s
+        Time of the trace's clock at which the protocol starts; readings before it are allowed if
+        it is given.
 
     Returns
     -------
@@ -158,10 +158,10 @@ def check_recording(
         With file, line, column, what was found and allowed, and the unit that would be
         plausible.
     """
-    _check_times(recording, torque.end_s, path, columns)
+    _check_times(recording, gripper, torque, path, columns, onset_s)
     trace, lagged, free = (
         recording.rotation_rad,
-        lagged_torques(torque),
+        lagged_torques(torque, _LAG_SHARES),
         free_rotation(gripper, torque),
     )
     largest = float(np.abs(trace).max())
@@ -180,8 +180,8 @@ def check_recording(
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.rotation}': found a rotation that goes "
             "against the torque, allowed is the closing rotation, positive where the arm closes. "
-            "It would fit if it were -1 times (is opening counted as positive?), or if an offset "
-            "or drift of the instrument, where it has one, were declared."
+            "It would fit if it were -1 times (is opening counted as positive? Then scale it by "
+            "-1), or if an offset or drift of the instrument, where it has one, were declared."
         )
     turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
@@ -202,47 +202,53 @@ def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
     return float(max(alone.max(), pushed.max()))
 
 
-def _check_times(recording: Recording, end_s: float, path: Path, columns: Columns) -> None:
-    time_s, slack = recording.time_s, _TIME_SLACK * end_s
-    first, last = time_s[0], time_s[-1]
+def _check_times(
+    recording: Recording,
+    gripper: Gripper,
+    torque: TorqueHistory,
+    path: Path,
+    columns: Columns,
+    onset_s: float | None,
+) -> None:
+    end_s, slack = torque.end_s, _TIME_SLACK * torque.end_s
+    begins = onset_s or 0.0
+    time_s, earliest = recording.time_s, -slack if onset_s is None else -np.inf
+    clock_s = time_s + begins
     shortest = SHORTEST_SHARE * end_s
 
     def fits(factor: float) -> bool:
-        inside = factor * first >= -slack and factor * last <= end_s + slack
-        return bool(inside and factor * (last - first) >= shortest)
+        first, last = factor * clock_s[[0, -1]] - begins
+        return bool(first >= earliest and shortest + max(first, 0) <= last <= end_s + slack)
 
     if fits(1.0):
         return
     unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
     hint = _other_units(unit, TIME_UNITS, fits)
-    for sample in np.flatnonzero((time_s < -slack) | (time_s > end_s + slack))[:1]:
+    for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
+        if not hint and onset_s is None:
+            hint = _hint_on_start(recording, gripper, torque, columns)
         raise BiogripError(
-            f"{place(path, recording.lines[sample], columns.time)}: found {time_s[sample]:.12g} s, "
-            f"allowed is the protocol's time, 0 to {end_s:g} s.{hint}"
+            f"{place(path, recording.lines[sample], columns.time)}: found "
+            f"{clock_s[sample]:.12g} s, allowed is the protocol's time, {begins:g} to "
+            f"{begins + end_s:g} s.{hint}"
         )
     raise BiogripError(
-        f"{_extent(recording, path)}, column '{columns.time}': found only {first:g} to {last:g} s "
-        f"of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of it.{hint}"
+        f"{_extent(recording, path)}, column '{columns.time}': found only {clock_s[0]:g} to "
+        f"{clock_s[-1]:g} s of the protocol's {end_s:g} s, allowed are at least {shortest:g} s of "
+        f"it.{hint}"
     )
 
 
-def lagged_torques(
-    torque: TorqueHistory, shares: Sequence[float] = _LAG_SHARES
-) -> Callable[[Array], Array]:
-    """Return a function of time for lagged torques, of the left arm and the difference of arms.
-
-    Parameters
-    ----------
-    torque
-        The protocol.
-    shares
-        Relaxation times of the lags over the length of the protocol, ascending.
-    """
-    drives = 1 if torque.symmetric else 2
-    rates = -1 / (torque.end_s * np.tile(shares, drives))
-    static = np.repeat(np.eye(drives), len(shares), axis=0)[:, None, :]
-    lags = StepResponse(static, rates[:, None], -static[..., None])
-    return lambda time_s: rotation(lags, torque, time_s)
+def _hint_on_start(
+    recording: Recording, gripper: Gripper, torque: TorqueHistory, columns: Columns
+) -> str:
+    """Return a hint on the option that says when a clock's protocol starts, with an estimate."""
+    time_s, rotation_rad = recording.time_s, recording.rotation_rad
+    onset_s = estimate_onset(time_s, rotation_rad, gripper, torque, offset=True, drift=False)
+    moves = begins_constant(time_s, rotation_rad, onset_s)
+    still = f" The trace moves only from {onset_s:.4g} s on." if moves else ""
+    how = "--start" if columns.by_options else "start_s under measurement"
+    return f"{still} If the protocol starts at another time of the clock than 0, {how} says when."
 
 
 def _functions(
@@ -312,7 +318,7 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     also = np.vstack((nuisance, rest / norm)) if norm > _NO_CONSTANT else nuisance
     responses = extreme_responses(functions.lagged, gripper, len(_LAG_SHARES))
     declared, freed = (
-        [_left_over(without(basis, trace), sign * _cleared(basis, responses)) for sign in (1, -1)]
+        [left_over(without(basis, trace), sign * _cleared(basis, responses)) for sign in (1, -1)]
         for basis in (nuisance, also)
     )
     if noise_rad is not None:
@@ -320,34 +326,6 @@ def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) 
     else:
         likelier = declared[0] > declared[1] * math.exp(_FAR_LIKELIER / functions.samples)
     return bool(likelier and freed[0] > freed[1])
-
-
-def extreme_responses(lagged: Array, gripper: Gripper, lags: int) -> Array:
-    """Return extreme responses, (n, n_rows), of which all samples' are non-negative combinations.
-
-    A sample turns the left arm by phi_2 = tau_2/k_2 - x (tau_2/k_2 - (tau_2 - tau_4)/(k_2 + k_4)),
-    where x is the sample's rigidity and decreases, as it relaxes, from at most 1 to at least 0.
-    The extremes are: no sample, rigid ones that relax with one of the lags, and a rigid one.
-    `lagged` has that many lags of each torque, see `lagged_torques`.
-    """
-    k_2, k_4 = gripper.left.stiffness_Nm_per_rad, gripper.right.stiffness_Nm_per_rad
-    alone = lagged[:lags] / k_2
-    if len(lagged) == lags:
-        return alone
-    pushed = lagged[lags:] / (k_2 + k_4)
-    # The shortest lag is negligible.
-    return np.vstack((alone - pushed + pushed[0], pushed[0]))
-
-
-def _left_over(trace: Array, responses: Array) -> float:
-    """Return the residual sum of squares of a non-negative least-squares fit of the responses."""
-    from scipy.optimize import nnls
-
-    scale = np.linalg.norm(responses, axis=1)
-    scaled = scale > 0
-    if not np.any(scaled):
-        return float(trace @ trace)
-    return float(nnls((responses[scaled] / scale[scaled, None]).T, trace)[1] ** 2)
 
 
 def _check_turn(

@@ -40,6 +40,8 @@ _SEPARATORS = (",", ";", "\t")
 _GAPS = ("", "-", "na", "n/a", "nan", "#n/a", "#nv")
 _ROWS_AT_ONCE = 100_000
 _MOST_LISTED = 50
+# Lines among which a header is looked for, where the first has not the columns.
+_LONGEST_PREAMBLE = 200
 # Spreadsheet errors like #REF!, #DIV/0! or #NAME? followed by a separator are cells, not comments.
 _COMMENT = re.compile(r" *#(?!(?:[A-Z0-9/_]+[!?]|N/A|NV)\s*[,;\t])")
 _UNIT_AT_END = re.compile(r"(?:_(\w+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
@@ -55,6 +57,12 @@ class Columns:
         Names of the columns.
     time_unit, rotation_unit
         Keys of `TIME_UNITS` and `ROTATION_UNITS`; None if the column's name ends with the unit.
+    skip
+        Number of lines before the header.
+    scale
+        Rotation in its unit over the number in the column.
+    start_s
+        Time of the clock at which the protocol starts, if it is known.
     by_options
         True if command-line options set them, false for config keys; used in messages.
     sd
@@ -65,6 +73,9 @@ class Columns:
     rotation: str
     time_unit: str | None = None
     rotation_unit: str | None = None
+    skip: int = 0
+    scale: float = 1.0
+    start_s: float | None = None
     by_options: bool = False
     sd: str | None = None
 
@@ -121,10 +132,11 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     """Read a recorded trace.
 
     The file is text in UTF-8, in UTF-16 with a byte order mark, or else in Windows-1252, as older
-    programs write it, with any usual line ends. Empty lines and lines that start with ``#`` are
-    ignored. The first other line is the header, which decides the separator: comma, semicolon or
-    tab. With the last two, numbers may have a decimal comma. Cells may be quoted and padded with
-    blanks, but a quoted cell ends on its line. Other columns may hold anything.
+    programs write it, with any usual line ends. The first ``skip`` lines are ignored, and so are
+    empty lines and lines that start with ``#``. The first other line is the header, which decides
+    the separator: comma, semicolon or tab. With the last two, numbers may have a decimal comma.
+    Cells may be quoted and padded with blanks, but a quoted cell ends on its line. Other columns
+    may hold anything.
 
     The unit is that of `columns`, or else the end of the column's name, as in ``rotation_urad``,
     ``phi (mrad)`` or ``time [s]``; it is never guessed. The micro sign may replace the u.
@@ -174,7 +186,8 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     _check_order(path, columns, kept[:, 0], kept_lines)
     if columns.sd is not None:
         _check_positive(path, columns.sd, kept[:, 2], kept_lines)
-    time_s, rotation_rad, *sd_rad = (own * size for own, size in zip(kept.T, sizes, strict=True))
+    factors = sizes * np.array([1.0, columns.scale, abs(columns.scale)][: len(sizes)])
+    time_s, rotation_rad, *sd_rad = (own * size for own, size in zip(kept.T, factors, strict=True))
     return Recording(time_s, rotation_rad, kept_lines, without_number, *sd_rad)
 
 
@@ -289,8 +302,8 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
     The columns are time, rotation and standard deviation, in the file's units, with NaN for gaps.
     """
     at: list[int] = []
-    lines = _significant(path, stream, at)
-    layout = _layout(path, next(lines, None), at, columns)
+    lines = _significant(path, stream, at, columns.skip)
+    layout = _layout(path, lines, at, columns)
     time_unit, rotation_unit = (
         unit_of(path, column, given, allowed, by_options=columns.by_options)
         for column, given, allowed in (
@@ -318,9 +331,9 @@ def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, A
     return sizes, np.concatenate(values), np.concatenate(row_lines)
 
 
-def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[str]:
+def _significant(path: Path, stream: Iterator[str], at: list[int], skip: int) -> Iterator[str]:
     """Yield lines that are neither empty nor comments, appending their numbers to `at`."""
-    for number, line in enumerate(stream, 1):
+    for number, line in islice(enumerate(stream, 1), skip, None):
         if "\0" in line:
             raise BiogripError(f"{place(path, number)}: found binary data, allowed is text.")
         if line.strip(" \r\n") and not _COMMENT.match(line):
@@ -328,13 +341,18 @@ def _significant(path: Path, stream: Iterator[str], at: list[int]) -> Iterator[s
             yield line
 
 
-def _layout(path: Path, header: str | None, at: list[int], columns: Columns) -> _Layout:
+def _layout(path: Path, lines: Iterator[str], at: list[int], columns: Columns) -> _Layout:
+    header = next(lines, None)
     if header is None:
         raise BiogripError(f"{place(path)}: found no header, allowed is a line with column names.")
     needed = columns.named
     separator, names = _header(path, at[0], header, list(needed.values()))
     which = _said_by(columns.by_options, *needed)
-    indices = [_index(path, at[0], names, column, which) for column in needed.values()]
+    try:
+        indices = [_index(path, at[0], names, column, which) for column in needed.values()]
+    except BiogripError as error:
+        first = [header, *islice(lines, _LONGEST_PREAMBLE)]
+        raise BiogripError(f"{error}{_later_header(path, first, at, columns)}") from error
     for (one, i), (other, j) in combinations(zip(needed, indices, strict=True), 2):
         if i == j:
             raise BiogripError(
@@ -361,6 +379,24 @@ def _header(path: Path, at: int, line: str, needed: Sequence[str]) -> tuple[str,
 
     separator = max(readings, key=merit)
     return separator, readings[separator]
+
+
+def _later_header(path: Path, lines: list[str], at: list[int], columns: Columns) -> str:
+    """Return a hint on the first line that names the columns, or has numbers below its names."""
+    needed = [*columns.named.values()]
+    rows = [_header(path, *row, needed)[1] for row in zip(at, lines, strict=True)]
+    for line, names, below in zip(at, rows, [*rows[1:], []], strict=True):
+        named = {*map(_plain, needed)} <= {*map(_plain, names)}
+        if named or (len(names) == len(below) > 1 and _numeric(below) > _numeric(names) == 0):
+            how = f"--skip {line - 1}" if columns.by_options else f"skip: {line - 1} there"
+            return f" Line {line} looks like the header: {how}." if line > at[0] else ""
+    return ""
+
+
+def _numeric(cells: list[str]) -> int:
+    """Count cells that are numbers, with a decimal point or comma."""
+    found = (_number_or_inf(cell.replace(",", ".")) for cell in cells)
+    return sum(bool(np.isfinite(number)) for number in found)
 
 
 def _index(path: Path, line: int, names: list[str], column: str, which: str) -> int:

@@ -44,6 +44,8 @@ class Measurements:
     """Standard deviations of the readings, (n_samples,), where they are known."""
     suspicion: str | None = None
     """Sentence on a rotation of a recording that is hardly plausible."""
+    onset_s: float | None = None
+    """Time of a recording's clock from which the sampling instants count, if it was given."""
 
 
 def write_target(

@@ -11,6 +11,7 @@ from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import HARMLESS, REJECTION, Note
 from biogrip.identifiability.likelihood import MISSED
+from biogrip.identifiability.onset_profiles import profile_over_onset
 from biogrip.identifiability.valley import compute_valley
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
@@ -28,6 +29,9 @@ from biogrip.study.study import Case
 
 TRACE = 0
 """Seed of the trace that is judged."""
+
+ONSET_AS_FITTED = "The limits take the fitted onset as exact."
+"""Note where they do."""
 
 JUDGED_TRACE = Reads(
     lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
@@ -58,6 +62,8 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     case_problem = case.problem.calibrated(calibrated).weighted(recorded.sd_rad)
     fit = fit_judged(case, case_problem, recorded.time_s, recorded.rotation_rad[TRACE], TRACE)
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
+    if case_problem.fit_start:
+        diagnosis = profile_over_onset(diagnosis, recorded.time_s)
     said = diagnosis_data(diagnosis, notes_on_fit(fit))
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 

@@ -1,13 +1,16 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.fitted_onset import fit_onset
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
 from biogrip.products.product import Product, Reads, wildcards_of
@@ -16,6 +19,7 @@ from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.noise_share import proportional_deviations
+from biogrip.traces.onset import estimate_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.recordings import Columns, Recording, place, read_recording
 
@@ -29,6 +33,7 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
         With file, line and column, if the trace cannot be used.
     """
     trace = read_checked(recorded, case.gripper, case.problem, case.columns)
+    trace = with_fitted_onset(trace, case.problem)
     for note in notes_on_recording(trace):
         warn(f"{place(recorded)}: {note}")
     write_measurements(measurements, trace)
@@ -46,6 +51,11 @@ def read_checked(
             f"{MOST_SAMPLES} with {'weights' if weighted else 'a coloured noise model'}: average "
             "neighbouring ones."
         )
+    onset_s = columns.start_s
+    if problem.fit_start:
+        onset_s = guess_onset(problem, trace.time_s, trace.rotation_rad)
+    if onset_s is not None:
+        trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
     nuisance = problem.nuisance(trace.time_s)
     suspicion = check_recording(
         trace,
@@ -56,6 +66,7 @@ def read_checked(
         nuisance,
         None if weighted else problem.noise_rad,
         _typical_noise(trace, problem),
+        onset_s,
     )
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
@@ -69,7 +80,45 @@ def read_checked(
             problem.noise_rad,
         )
     rotations = {0: trace.rotation_rad}
-    return Measurements(trace.time_s, None, rotations, trace.without_number, sd_rad, suspicion)
+    gaps = trace.without_number
+    return Measurements(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s)
+
+
+def without_padding(trace: Recording) -> Recording:
+    """Leave out the same number again and again before the protocol, which is no measurement.
+
+    The last of them stays: it tells that the protocol had not yet started.
+    """
+    differs = np.flatnonzero(trace.rotation_rad != trace.rotation_rad[0])
+    first = max(min([*differs[:1], np.count_nonzero(trace.time_s < 0)]) - 1, 0)
+    return Recording(
+        trace.time_s[first:],
+        trace.rotation_rad[first:],
+        trace.lines[first:],
+        trace.without_number + first,
+        None if trace.sd_rad is None else trace.sd_rad[first:],
+    )
+
+
+def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
+    return estimate_onset(
+        time_s,
+        rotation_rad,
+        problem.gripper,
+        problem.torque,
+        offset=problem.offset,
+        drift=problem.drift,
+    )
+
+
+def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements:
+    """Return a recording with its estimated onset replaced by that of a fit, if that is wanted."""
+    if not problem.fit_start or trace.onset_s is None:
+        return trace
+    problem = problem.weighted(trace.sd_rad)
+    later_s = fit_onset(problem, trace.time_s, trace.rotation_rad[0], 0.0)
+    return replace(trace, time_s=trace.time_s - later_s, onset_s=trace.onset_s + later_s)
 
 
 def _typical_noise(trace: Recording, problem: CaseProblem) -> float | None:

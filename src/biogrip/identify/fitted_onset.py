@@ -1,0 +1,128 @@
+"""Onset of the protocol in a recorded trace, fitted along with the sample.
+
+The fit of the sample is repeated for onsets that a pattern search proposes. Where the rotation
+jumps between two readings, the misfit as a function of the onset has a step at every reading: it
+is smooth only between neighbouring ones, and is minimised there.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from biogrip.arrays import Array
+from biogrip.identify.answer import silent
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
+from biogrip.identify.multi_start import fit_from
+
+_BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
+# Steps of the pattern search in sampling intervals: first, and last, and most of them.
+_FIRST_STEP, _LAST_STEP, _MOST_STEPS = 8.0, 0.5, 200
+# Intervals that are looked at around the onset of that search, and those of rounding errors.
+_NEAR, _ROUNDING = 3.0, 1e-6
+
+
+@dataclass(frozen=True)
+class OnsetFit:
+    """Best fit of a trace for one onset.
+
+    Parameters
+    ----------
+    onset_s
+        The onset, on the trace's clock.
+    log_parameters : (n_parameters,)
+        Sample parameters.
+    misfit_rad
+        RMS misfit.
+    """
+
+    onset_s: float
+    log_parameters: Array
+    misfit_rad: float
+
+
+class OnsetFits:
+    """Fits of a trace for given onsets, linear and in white noise.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending on any clock.
+    """
+
+    def __init__(self, case_problem: CaseProblem, time_s: Array, rotation_rad: Array) -> None:
+        self._case_problem = replace(case_problem.to_identify(), nonlinear=False)
+        self._time_s, self._rotation_rad = time_s, rotation_rad
+        self.interval_s = float(np.median(np.diff(time_s)))
+
+    def best(self, guess_s: float) -> OnsetFit:
+        """Fit the onset along, beginning with a guess in s."""
+        problem = self._case_problem.of(self._time_s - guess_s, self._rotation_rad)
+        (found,) = identify_many([problem], _BUDGET, [np.random.default_rng(0)], silent)
+        start = OnsetFit(guess_s, np.log(found.parameters), found.misfit_rad)
+        return self._between_readings(self._searched(start))
+
+    def at(self, onset_s: float, near: Array) -> OnsetFit:
+        """Fit the sample for an onset by a local fit from log-parameters, (n_parameters,)."""
+        # A copy, since problems keep the rows of all times that they were posed for.
+        case_problem = replace(self._case_problem)
+        problem = case_problem.of(self._time_s - onset_s, self._rotation_rad)
+        fit = fit_from([problem], near)
+        return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
+
+    def _searched(self, best: OnsetFit) -> OnsetFit:
+        """Search the onset in steps, halved where neither direction is better."""
+        step_s = _FIRST_STEP * self.interval_s
+        for _ in range(_MOST_STEPS):
+            if step_s < _LAST_STEP * self.interval_s:
+                break
+            sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
+            lower = min(sides, key=lambda fit: fit.misfit_rad)
+            if lower.misfit_rad < best.misfit_rad:
+                best = lower
+            else:
+                step_s /= 2
+        return best
+
+    def _between_readings(self, best: OnsetFit) -> OnsetFit:
+        """Minimise the misfit in each neighbouring interval in which it is smooth."""
+        for low, high in self._smooth_intervals(best.onset_s):
+            found = minimize_scalar(
+                lambda onset_s, x=best.log_parameters: self.at(onset_s, x).misfit_rad,
+                bounds=(low, high),
+                method="bounded",
+            )
+            best = min(best, self.at(found.x, best.log_parameters), key=lambda fit: fit.misfit_rad)
+        return best
+
+    def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
+        """Yield intervals of onsets within which no reading passes a change of torque."""
+        torque = self._case_problem.torque
+        changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
+        edges = np.unique(np.subtract.outer(self._time_s, changes_s))
+        near = edges[np.abs(edges - onset_s) < _NEAR * self.interval_s]
+        yield from (
+            (low, high) for low, high in pairwise(near) if high - low > _ROUNDING * self.interval_s
+        )
+
+
+def fit_onset(
+    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, guess_s: float
+) -> float:
+    """Fit the time of a trace's clock at which the protocol starts, in s.
+
+    Parameters
+    ----------
+    case_problem
+        Assumptions of the identification.
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    guess_s
+        Where to begin.
+    """
+    return OnsetFits(case_problem, time_s, rotation_rad).best(guess_s).onset_s

@@ -1,0 +1,87 @@
+"""Onset of a recorded trace: the time of its clock from which it follows the torque.
+
+The trace is fitted by any sample's possible responses to the delayed torque, and the delay with
+the least residual sum of squares is found on ever finer grids. That needs no sample model and some
+hundred small fits; `biogrip.identify.fitted_onset` refines it with the sample model.
+"""
+
+import numpy as np
+
+from biogrip.arrays import Array, BoolArray, IntArray
+from biogrip.experiment.protocol import TorqueHistory
+from biogrip.instrument.gripper import Gripper
+from biogrip.response.nuisance import nuisance_basis, without
+from biogrip.response.residuals import estimate_noise
+from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
+
+# Relaxation times over the protocol's duration.
+_LAG_SHARES = tuple(np.geomspace(1e-6, 10.0, 16))
+# Delays on the first grid; finer ones have as many between the neighbours of the best.
+_DELAYS = 65
+# Most readings that a fit takes of the whole trace, and as many of what the grid spans.
+_MOST_READINGS = 2000
+# Least share of the protocol that has to be after the onset.
+_LEAST_AFTER = 0.02
+# Standard deviation of readings that are constant, in noise, and in peaks of noise-free traces.
+_CONSTANT, _CONSTANT_OF_PEAK = 2.0, 1e-3
+
+FEWEST_BEFORE = 3
+"""Fewest readings before an onset by which a late one is recognised."""
+
+
+def estimate_onset(
+    time_s: Array,
+    rotation_rad: Array,
+    gripper: Gripper,
+    torque: TorqueHistory,
+    *,
+    offset: bool,
+    drift: bool,
+) -> float:
+    """Estimate from when a trace follows the torque, in s of its clock.
+
+    Parameters
+    ----------
+    time_s, rotation_rad : (n_samples,)
+        The trace, times ascending.
+    gripper, torque
+        Gripper and protocol.
+    offset, drift
+        True if the instrument may have added it.
+    """
+    lagged = lagged_torques(torque, _LAG_SHARES)
+
+    def square_sum(onset_s: float, some: BoolArray) -> float:
+        nuisance = nuisance_basis(time_s[some], offset=offset, drift=drift)
+        own = extreme_responses(lagged(time_s[some] - onset_s), gripper, len(_LAG_SHARES))
+        return left_over(without(nuisance, rotation_rad[some]), without(nuisance, own))
+
+    low, high = time_s[0], max(time_s[0], time_s[-1] - _LEAST_AFTER * torque.end_s)
+    shortest = float(np.min(np.diff(time_s)))
+    while True:
+        onsets = np.linspace(low, high, _DELAYS)
+        some = _thinned(len(time_s), np.searchsorted(time_s, [low, high]))
+        best = int(np.argmin([square_sum(onset, some) for onset in onsets]))
+        low, high = onsets[max(best - 1, 0)], onsets[min(best + 1, _DELAYS - 1)]
+        if high - low < shortest:
+            return float(onsets[best])
+
+
+def _thinned(samples: int, within: IntArray) -> BoolArray:
+    """Choose readings of the whole trace, and more of those within, (2,) indices."""
+    first, last = max(within[0] - 1, 0), min(within[1], samples - 1)
+    some = np.zeros(samples, dtype=bool)
+    for start, end in ((0, samples - 1), (first, last)):
+        some[np.linspace(start, end, _MOST_READINGS).astype(np.int64)] = True
+    return some
+
+
+def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
+    """Return whether the readings before an onset are constant within the noise of the trace.
+
+    Without an onset, the first `FEWEST_BEFORE` readings are looked at.
+    """
+    before = rotation_rad[:FEWEST_BEFORE] if onset_s is None else rotation_rad[time_s < onset_s]
+    noise_rad, peak_rad = estimate_noise(rotation_rad), float(np.ptp(rotation_rad))
+    size = max(_CONSTANT * noise_rad, _CONSTANT_OF_PEAK * peak_rad)
+    return len(before) >= FEWEST_BEFORE and float(np.std(before)) < size

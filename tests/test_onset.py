@@ -1,0 +1,207 @@
+"""Traces that start before their torque: given onsets, fitted ones, and what is said without."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from biogrip.arrays import Array
+from biogrip.cli import main
+from biogrip.experiment.protocol import Phase, hold, load
+from biogrip.identify.fitted_onset import OnsetFits
+from biogrip.library import Sample, set_up, simulate
+from biogrip.traces.onset import begins_constant, estimate_onset
+from tests.helpers.default import STUDY
+
+PHASES = (hold(20.0, 1e-9), hold(20.0, 0.4e-9), hold(20.0, 1.2e-9))
+TRUTH = {"k": 29.0, "k_p": 6.0, "c": 100.0, "c_p": 20.0}
+EXPERIMENT = set_up(STUDY.gripper, PHASES, Sample("generalized_maxwell"))
+NOISE_RAD, ONSET_S = 3e-7, 8.07
+CONFIG = """
+protocol:
+  phases:
+    - {duration_s: 20, torque_Nm: 1.0e-9}
+    - {duration_s: 20, torque_Nm: 0.4e-9}
+    - {duration_s: 20, torque_Nm: 1.2e-9}
+least_squares: {candidates: 100, starts: 4}
+model_selection: {models: []}
+"""
+
+
+def late(seed: int, onset_s: float = ONSET_S, *, flat: bool = False) -> tuple[Array, Array]:
+    """Simulate a trace of 60 s at 5 Hz, with noise all over, or not before the onset."""
+    times = np.arange(301) / 5
+    before = times < onset_s
+    noise = NOISE_RAD * np.random.default_rng(seed).standard_normal(len(times))
+    response = np.zeros(len(times))
+    response[~before] = simulate(EXPERIMENT, TRUTH, times[~before] - onset_s)
+    return times, response + np.where(flat & before, 0.0, noise)
+
+
+def written(path: Path, times: Array, values: Array) -> Path:
+    rows = (f"{t:.6g},{v:.10e}" for t, v in zip(times, values, strict=True))
+    path.write_text("\n".join(["time_s,rotation_rad", *rows]) + "\n")
+    return path
+
+
+def identified(folder: Path, times: Array, values: Array, *options: str) -> dict[str, Any]:
+    trace = written(folder / "trace.csv", times, values)
+    (folder / "lab.yaml").write_text(CONFIG)
+    output = folder / "found.json"
+    given = ["--config", str(folder / "lab.yaml"), "--output", str(output)]
+    assert main(["identify", str(trace), *given, *options]) == 0
+    found: dict[str, Any] = json.loads(output.read_text())
+    return found
+
+
+def holding(found: dict[str, Any]) -> list[str]:
+    """Name the quantities whose limits hold the truth."""
+    truth = TRUTH | {"c + c_p": TRUTH["c"] + TRUTH["c_p"]}
+    return [
+        each["quantity"]
+        for each in found["quantities"]
+        if (each["low"] or 0.0) <= truth[each["quantity"]] <= (each["high"] or np.inf)
+    ]
+
+
+RAMP = (Phase(30.0, load(30.0, 0.0, 1e-9), load(30.0, 0.0, 1e-9)), hold(30.0, 0.3e-9))
+
+
+@pytest.mark.parametrize("phases", [PHASES, RAMP])
+@pytest.mark.parametrize(
+    ("model", "parameters", "options"),
+    [
+        ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {}),
+        ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {"offset": True, "drift": True}),
+        ("generalized_maxwell", (29.0, 6.0, 100.0, 20.0), {"nonlinear": True}),
+        ("fractional_kelvin_voigt", None, {}),
+    ],
+)
+def test_before_the_protocol_nothing_responds(
+    phases: tuple[Phase, ...], model: str, parameters: Any, options: dict[str, Any]
+) -> None:
+    """Times before it are those of a first phase without torque."""
+    own = replace(set_up(STUDY.gripper, phases, Sample(model)), **options)
+    padded = replace(own, phases=(hold(8.0, 0.0), *phases))
+    times = np.arange(-40, 301) / 5
+    values = 1e-5 * np.random.default_rng(0).standard_normal(len(times))
+    x = np.log(own.model.example if parameters is None else parameters)
+    one, other = own.of(times, values), padded.of(times + 8.0, values)
+    for got, expected in zip(one.residuals(x), other.residuals(x), strict=True):
+        assert got == pytest.approx(expected, abs=1e-12 * np.abs(expected).max())
+    misfits = [problem.misfit(np.exp(x)[None]) for problem in (one, other)]
+    assert misfits[0] == pytest.approx(misfits[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("onset_s", [-3.0, 0.5, 8.07, 21.3])
+@pytest.mark.parametrize("flat", [True, False])
+def test_an_onset_is_estimated_within_a_reading(onset_s: float, flat: bool) -> None:
+    times, values = late(3, onset_s + 5.0, flat=flat)
+    known = STUDY.gripper, EXPERIMENT.torque
+    found = estimate_onset(times - 5.0, values, *known, offset=True, drift=False)
+    assert found == pytest.approx(onset_s, abs=0.2)
+    assert begins_constant(times - 5.0, values, found)
+
+
+def test_a_fitted_onset_has_the_lowest_misfit() -> None:
+    times, values = late(1)
+    fits = OnsetFits(EXPERIMENT, times, values)
+    best = fits.best(8.3)
+    assert best.onset_s == pytest.approx(ONSET_S, abs=0.1)
+    for onset_s in np.linspace(7.8, 8.4, 31):
+        assert fits.at(onset_s, best.log_parameters).misfit_rad >= best.misfit_rad
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_late_protocol_is_said(
+    tmp_path: Path, flat: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = identified(tmp_path, *late(2, flat=flat))
+    assert found["fit"] == "rejected"
+    (said,) = [text for text in found["reasons"] if "The trace is constant until 8." in text]
+    assert "--start fit" in said
+    assert said in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("start", [f"{ONSET_S}", "fit"])
+def test_limits_hold_the_truth_from_the_onset_on(
+    tmp_path: Path, start: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = identified(tmp_path, *late(2), "--start", start)
+    assert found["fit"] == "ok"
+    assert len(holding(found)) == 5
+    assert found["samples"] == 301
+    if start == "fit":
+        assert found["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
+        assert "The protocol starts at 8.0" in capsys.readouterr().out
+    else:
+        assert found["assumed"]["measurement"]["start_s"] == ONSET_S
+
+
+def test_padding_before_the_onset_is_no_measurement(tmp_path: Path) -> None:
+    """All but the last zero; with noise-free readings, the noise would seem too small."""
+    found = identified(tmp_path, *late(2, flat=True), "--start", f"{ONSET_S}")
+    assert found["samples"] == 301 - 40
+    (left_out,) = [note for note in found["notes"] if note["text"].startswith("Left out")]
+    assert left_out["text"] == "Left out for want of a number: 40 rows of 301."
+    assert found["fit"] == "ok"
+
+
+def test_a_fitted_onset_widens_limits(tmp_path: Path) -> None:
+    times, values = late(2)
+    given, fitted = (
+        {q["quantity"]: q["high"] - (q["low"] or 0) for q in found["quantities"]}
+        for found in (
+            identified(tmp_path, times, values, "--start", start) for start in (f"{ONSET_S}", "fit")
+        )
+    )
+    assert fitted["c_p"] > 1.05 * given["c_p"]
+    assert all(fitted[name] > 0.99 * width for name, width in given.items())
+
+
+def test_readings_before_the_onset_tell_the_zero(tmp_path: Path) -> None:
+    times, values = late(2)
+    declared = ("--offset", "--start")
+    whole = identified(tmp_path, times, values + 2e-6, *declared, f"{ONSET_S}")
+    cut = times >= ONSET_S
+    without = identified(tmp_path, times[cut], values[cut] + 2e-6, *declared, f"{ONSET_S}")
+    assert whole["offset_rad"] == pytest.approx(2e-6, abs=5 * NOISE_RAD / np.sqrt(40))
+    widths = [
+        next(q["high"] - q["low"] for q in found["quantities"] if q["quantity"] == "k_p")
+        for found in (whole, without)
+    ]
+    assert widths[0] < 0.9 * widths[1]
+
+
+def test_a_clock_with_negative_times_needs_the_start(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, values = late(2)
+    trace = written(tmp_path / "trace.csv", times - ONSET_S, values)
+    (tmp_path / "lab.yaml").write_text(CONFIG)
+    assert main(["identify", str(trace), "--config", str(tmp_path / "lab.yaml")]) == 1
+    said = capsys.readouterr().err
+    assert "found -8.07 s, allowed is the protocol's time, 0 to 60 s. The trace moves only " in said
+    assert "--start says when." in said
+    assert len(holding(identified(tmp_path, times - ONSET_S, values, "--start", "0"))) == 5
+
+
+def test_a_protocol_that_is_over_is_refused_on_the_clock(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    trace = written(tmp_path / "trace.csv", *late(2))
+    (tmp_path / "lab.yaml").write_text(CONFIG)
+    config = ["--config", str(tmp_path / "lab.yaml")]
+    assert main(["identify", str(trace), *config, "--start", "-5"]) == 1
+    said = capsys.readouterr().err
+    assert "found 55.2 s, allowed is the protocol's time, -5 to 55 s." in said
+
+
+@pytest.mark.parametrize("given", ["soon", ""])
+def test_a_start_that_is_no_time_is_refused(given: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["identify", "trace.csv", "--start", given])
+    assert f"found '{given}', allowed are seconds, or fit" in capsys.readouterr().err
