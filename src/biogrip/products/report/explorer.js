@@ -1,13 +1,22 @@
 // The explorer: controls, and plots that follow them.
-(() => {
-  const INK = "#000000", MEASURED = "#56B4E9", FITTED = "#D55E00", BLUE = "#0072B2", GREY = "#999999";
-  const POINTS = 41, DRAWN = 801;
+(async () => {
+  await new Promise((resolve) => {
+    const packed = Uint8Array.from(atob(document.getElementById("plotly").textContent), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    new Response(stream).text().then((text) => {
+      document.head.append(Object.assign(document.createElement("script"), { textContent: text }));
+      resolve();
+    });
+  });
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const INK = colour("--ink"), LINE = colour("--line"), MEASURED = "#56B4E9", FITTED = "#D55E00", BLUE = colour("--blue"), GREY = "#999999";
+  const POINTS = 41, DRAWN = 801, MOST_DRAWN = 1000;
   const cases = JSON.parse(document.getElementById("data").textContent).map(unpacked);
   const element = (id) => document.getElementById(id);
 
   function unpacked(given) {
     const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
-    const single = (text) => Array.from(new Float32Array(bytes(text)));
+    const single = ({ step, counts }) => Array.from(new Int16Array(bytes(counts)), (count) => count * step);
     const times = Array.from(new Float64Array(bytes(given.time_s)));
     return {
       ...given, times, target: given.target_rad && single(given.target_rad),
@@ -20,14 +29,23 @@
   }
 
   function draw(id, title, x, y, traces, layout = {}) {
-    const axis = { zeroline: false, automargin: true, linecolor: GREY, ticks: "outside", exponentformat: "power" };
+    const axis = { zeroline: false, automargin: true, linecolor: GREY, gridcolor: LINE, ticks: "outside", exponentformat: "power" };
     Plotly.react(id, traces, {
-      title: { text: title, font: { size: 13 }, x: 0.02 }, font: { size: 11 },
+      title: { text: title, font: { size: 13 }, x: 0.02 }, font: { size: 11, color: INK },
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
       margin: { l: 58, r: 10, t: 34, b: 42 }, showlegend: traces.length > 1,
       legend: { orientation: "h", x: 1, xanchor: "right", y: 1.02, yanchor: "bottom", font: { size: 10 } },
       xaxis: { ...axis, title: { text: x }, ...layout.xaxis }, yaxis: { ...axis, title: { text: y }, ...layout.yaxis },
       shapes: layout.shapes || [], annotations: layout.annotations || [],
     }, { responsive: true, displaylogo: false, displayModeBar: false });
+    element(id).setAttribute("role", "img");
+    element(id).setAttribute("aria-label", `${title}: ${traces.map((t) => t.name).join(", ")}; ${y} over ${x}`);
+  }
+
+  // As many points as a screen shows, for browsers that draw without a graphics processor.
+  function dots(x, y, name) {
+    const stride = Math.ceil(x.length / MOST_DRAWN), few = (values) => values.filter((_, i) => i % stride === 0);
+    return { x: few(x), y: few(y), name, mode: "markers", type: "scatter", marker: { size: 2, color: MEASURED } };
   }
 
   function options(id, pairs) {
@@ -62,7 +80,7 @@
     const trace = item.trace(item.seeds.indexOf(seed)), times = item.times;
     const without = inference.projection(times, item.offset, item.drift);
     const respond = (sample) => Array.from(mechanics.rotation(item.gripper, sample, item.torque, times));
-    const lines = [{ x: times, y: trace, mode: "markers", marker: { size: 2, color: MEASURED }, name: item.target ? "noisy trace" : "recorded trace", type: "scattergl" }];
+    const lines = [dots(times, trace, item.target ? "noisy trace" : "recorded trace")];
     if (item.target) lines.push({ x: times, y: item.target, mode: "lines", line: { color: INK, width: 1.5 }, name: "target" });
     let residual = [];
     if (fit && item.closed_form) {
@@ -71,7 +89,7 @@
       lines.push({ x: times, y: trace.map((value, i) => value - left[i]), mode: "lines", line: { color: FITTED, width: 1.5, dash: "dash" }, name: "fit" });
     }
     draw("plot-trace", "Trace and fit", "time (s)", "closing rotation (rad)", lines);
-    draw("plot-residual", "What the fit leaves", "time (s)", "trace − fit (rad)", [{ x: times, y: residual, mode: "markers", marker: { size: 2, color: MEASURED }, name: "residual", type: "scattergl" }]);
+    draw("plot-residual", "What the fit leaves", "time (s)", "trace − fit (rad)", [dots(times, residual, "residual")]);
     const history = fit ? fit.history : [];
     draw("plot-history", history.length ? "How it was found" : "This method has no generations", "generation", "lowest misfit (rad)",
       history.length ? [{ x: history[0], y: history[1], mode: "lines", line: { color: FITTED, shape: "hv" }, name: "lowest misfit" }] : [],
@@ -153,7 +171,8 @@
     const label = document.createElement("label"), input = document.createElement("input"), output = document.createElement("output");
     Object.assign(input, { type: "range", min: low, max: high, step: (high - low) / 2000, id });
     input.value = value;
-    const say = (log) => { output.textContent = `${name} = ${short(Math.exp(log))} ${unit}`; };
+    input.setAttribute("aria-label", `${name} (${unit})`);
+    const say = (log) => { input.setAttribute("aria-valuetext", `${short(Math.exp(log))} ${unit}`); output.textContent = `${name} = ${short(Math.exp(log))} ${unit}`; };
     input.addEventListener("input", () => { tried.moved = true; moved(Number(input.value)); say(Number(input.value)); showTried(); });
     say(value);
     label.append(output, input);
@@ -230,5 +249,5 @@
     if (tried.index >= 0) startFrom();
     else element("force-words").textContent = "The page has no sliders for power-law samples.";
   }
-  window.biogrip = { cases, mechanics, inference, profileOf };
+  window.biogrip = { cases, mechanics, inference, profileOf, dots };
 })();

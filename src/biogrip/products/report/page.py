@@ -1,18 +1,20 @@
 """The report of a study: one self-contained HTML file with tables, figures and an explorer."""
 
 import base64
+import gzip
 import json
 import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import yaml
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
@@ -22,7 +24,7 @@ from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.files.verdicts import PATH as VERDICTS
 from biogrip.products.files.verdicts import read_verdicts
-from biogrip.products.pages.summary import embedded
+from biogrip.products.pages.png_address import png_address
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight, of_cases
 from biogrip.products.report.answers import (
@@ -42,14 +44,15 @@ from biogrip.study.study import Case, Study
 
 PAGE = "results/report.html"
 
-# Characters left for images in a report of at most 15 MB.
-_MOST_PICTURE_LETTERS = 6_600_000
+# Characters left for images in a report of at most 8 MB.
+_MOST_PICTURE_LETTERS = 2_800_000
 _SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
 _FOLDERS = ("results/figures/", "results/tables/")
 # Category, and which of a product's files is shown.
 _FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
-_STORY = "moduli"
+_STORY = ("moduli",)
+_SHOWN = ("overview", "linkage", "torque")
 _FIRST = ("errors", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
@@ -171,7 +174,7 @@ def write(
     ]
     data = explorer_data(cases, files, list(shown.study.identifiers.values()))
     shown_tables = [
-        {"entry": entry, "html": _table(path), "download": _download(csv)}
+        {"entry": entry, "html": _table(path, entry.caption), "download": _download(csv)}
         for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
     ]
     errors, judged, compared = (
@@ -188,7 +191,7 @@ def write(
     parts = environment.from_string(shown.sources["report.html.j2"]).stream(
         style=shown.sources["report.css"],
         scripts=[shown.sources[name] for name in _SOURCES[2:]],
-        plotly=_plotly(),
+        plotly=_compressed(_plotly()),
         # Prevent text of a case from closing the script element.
         data=json.dumps(data).replace("<", "\\u003c"),
         answers=[
@@ -198,8 +201,9 @@ def write(
         ],
         compared=compared_rows(errors, judged),
         cases=[_card(case, v) for case, v in zip(cases, verdicts, strict=True)],
-        story=[item for item in shown_figures if _is_named(item, _STORY)],
-        figures=[item for item in shown_figures if not _is_named(item, _STORY)],
+        story=_named(shown_figures, _STORY),
+        figures=_named(shown_figures, _SHOWN),
+        folded=_by_sample(shown_figures, {case.name: case.title for case in cases}),
         first_tables=_named(shown_tables, _FIRST),
         evidence_tables=_named(shown_tables, _EVIDENCE),
         other_tables=[
@@ -259,12 +263,32 @@ def _images(paths: Sequence[Path]) -> Iterable[str | None]:
     """Yield images as data URLs, None when there is no more room."""
     room = _MOST_PICTURE_LETTERS
     for path in paths:
-        image = embedded(path)
+        image = png_address(_in_few_colours(path))
         room -= len(image)
         yield image if room >= 0 else None
 
 
-def _table(path: Path) -> Markup:
+def _in_few_colours(path: Path) -> bytes:
+    """Return an opaque PNG file with at most 256 colours, a third as large.
+
+    Raises
+    ------
+    BiogripError
+        If it cannot be read.
+    """
+    import PIL.Image
+
+    packed = BytesIO()
+    try:
+        with PIL.Image.open(path) as image:
+            few = image.convert("RGB").quantize(256, dither=PIL.Image.Dither.NONE)
+    except OSError as error:
+        raise BiogripError(f"{path}: cannot be read: {error.strerror or error}.") from error
+    few.save(packed, "png", optimize=True)
+    return packed.getvalue()
+
+
+def _table(path: Path, caption: str) -> Markup:
     """Return the table element of an HTML file written by `biogrip.products.tables.layout`."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -273,7 +297,8 @@ def _table(path: Path) -> Markup:
     found = re.search(r"<table.*</table>", text, re.DOTALL)
     if found is None:
         raise BiogripError(f"{path}: holds no table.")
-    return Markup(found[0])
+    columns = found[0].replace("<th>", '<th scope="col">')
+    return Markup(re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns))
 
 
 def _download(path: Path) -> str:
@@ -295,13 +320,30 @@ def _card(case: Case, path: Path) -> dict[str, Any]:
     return {"title": case.title, "recorded": case.recorded, **found}
 
 
-def _named(tables: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
-    return [table for name in names for table in tables if _is_named(table, name)]
+def _named(items: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
+    return [item for name in names for item in items if _is_named(item, name)]
+
+
+def _by_sample(
+    figures: Sequence[Mapping[str, Any]], titles: Mapping[str, str]
+) -> dict[str, list[Mapping[str, Any]]]:
+    """Return the figures that are not shown at once, by title of their sample."""
+    found: dict[str, list[Mapping[str, Any]]] = {}
+    for item in figures:
+        if item["entry"].name not in (*_STORY, *_SHOWN):
+            whose = item["entry"].whose
+            found.setdefault(titles.get(whose, whose or "The study"), []).append(item)
+    return found
 
 
 def _is_named(item: Mapping[str, Any], name: str) -> bool:
     found: bool = item["entry"].name == name
     return found
+
+
+def _compressed(text: str) -> str:
+    """Return a text as base64 of gzip, which browsers unpack."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode()
 
 
 def _plotly() -> str:
