@@ -31,7 +31,7 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs site pinned lock clean
+.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -105,8 +105,17 @@ report: $(READY)
 docs: $(TEST_READY)
 	$(BIN)/python -m tests.generated_docs
 
+# Written from CITATION.cff, after it is checked by its schema.
+citation: $(SITE_READY)
+	$(SITE_BIN)/cffconvert --validate
+	$(SITE_BIN)/cffconvert --format codemeta --outfile codemeta.json
+	$(SITE_BIN)/cffconvert --format zenodo --outfile .zenodo.json
+
 # A link or an anchor that leads nowhere is an error; not with --quiet, which counts no warnings.
 site: $(SITE_READY)
+	$(SITE_BIN)/cffconvert --validate
+	$(SITE_BIN)/cffconvert --format codemeta | cmp - codemeta.json
+	$(SITE_BIN)/cffconvert --format zenodo | cmp - .zenodo.json
 	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
 
 # The pictures that figures are compared with; look at what has changed before committing them.

@@ -1,5 +1,6 @@
 """The package as others install it: built, put where nothing else is, and used far from here."""
 
+import json
 import os
 import subprocess
 import sys
@@ -37,7 +38,11 @@ def called(*command: str | Path, folder: Path) -> str:
 def test_the_version_is_the_same_everywhere() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
-    assert project["version"] == citation["version"] == biogrip.__version__
+    deposited = [
+        json.loads((ROOT / name).read_text()) for name in ("codemeta.json", ".zenodo.json")
+    ]
+    versions = {about["version"] for about in (project, citation, *deposited)}
+    assert versions == {biogrip.__version__}
 
 
 @pytest.fixture(scope="module")

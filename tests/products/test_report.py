@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Browser
 
@@ -26,6 +27,7 @@ from biogrip.products.report.answers import (
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.browser import chromium, executable
+from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
 
 MOST_BYTES = 8_000_000
@@ -96,9 +98,24 @@ def test_the_page_says_how_everything_in_it_was_made(report: Path) -> None:
     assert len(made) > 30
     said = (
         r"<summary>How it was made</summary>\s*Rule <code>\w+</code>, file "
-        r"<code>results/[\w./-]+</code>; again by <code>biogrip make [\w -]+</code>\.\s*"
+        r'<a href="([\w./-]+)"><code>results/\1</code></a>; again by '
+        r"<code>biogrip make [\w -]+</code>\.\s*"
     )
-    assert [text for text in made if not re.fullmatch(said, text)] == []
+    found = [re.fullmatch(said, text) for text in made]
+    assert [text for text, match in zip(made, found, strict=True) if match is None] == []
+    files = [report.parent / match[1] for match in found if match is not None]
+    assert [file for file in files if not file.is_file()] == []
+
+
+def test_the_page_says_how_to_cite_it_as_the_citation_file_does(opened: Opened) -> None:
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    (paper,) = citation["references"]
+    said = " ".join(opened.page.locator("#cite ~ pre").inner_text().split())
+    (author,) = citation["authors"]
+    names = [f"{author['given-names']} {author['family-names']}" for author in paper["authors"]]
+    assert f"{', '.join(names)}: {paper['title']}." in said
+    assert f"{author['name']}: {citation['title']}, version {citation['version']}. " in said
+    assert f"{citation['abstract']}. Software, {citation['license']} licence." in said
 
 
 def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:
