@@ -3,11 +3,13 @@
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from html import unescape
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,7 @@ from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.words import side_by_side
+from biogrip.own_traces.words import for_a_paper, side_by_side
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
@@ -408,10 +410,9 @@ def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
     """Its mark stands at the end of a header that may be long."""
     table = tmp_path / "table.csv"
     found = {"trace": "a.csv", "model": "m", "samples": 1, "noise_rad": 1.0, "misfit_rad": 1.0}
-    quantity = {"verdict": "determined", "value": 1.0, "low": 0.5, "high": 2.0}
+    quantity = {"verdict": "determined", "unit": "N/m", "value": 1.0, "low": 0.5, "high": 2.0}
     quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
-    rest = {"quantities": quantities, "notes": [], "advice": None, WRITTEN_BY: "1"}
-    rest |= {"fit": "ok", "reasons": [], "limits": "Limits are statistical only."}
+    rest = {"quantities": quantities, "models": [], "fit": "ok", WRITTEN_BY: "1"}
     write_table(Outcome([{**found, **rest}], {}), table)
     check_output(table, force=False)
     table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
@@ -443,11 +444,17 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     assert "Traceback" not in done.stderr
     rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
     assert list(rows.index) == [*map(str, good), str(bad), str(missing), "/"]
-    assert list(rows["problem"] != "") == [False, False, True, True, True]
+    assert list(rows["fit"]) == ["ok", "ok", "none", "none", "none"]
     told = json.loads((tmp_path / "a.identified.json").read_text())
-    assert rows.loc[str(good[0]), "k value"] == str(told["quantities"][0]["value"])
+    assert rows.loc[str(good[0]), "k value (N/m)"] == str(told["quantities"][0]["value"])
+    assert rows.loc[str(good[0]), "c + c_p high (N s/m)"] == str(told["quantities"][-1]["high"])
+    (lowest,) = (row["model"] for row in told["models"] if row["delta_bic"] == 0)
+    assert rows.loc[str(good[0]), "preferred_model"] == lowest
+    # Cells are numbers or names, and a verdict is at most three words.
+    longest = rows.drop(columns="written_by_biogrip").map(lambda cell: len(str(cell).split()))
+    assert longest.max().max() <= 3
     # The same trace under another name is the same trace.
-    assert list(rows.loc[str(good[0])])[4:-4] == list(rows.loc[str(good[1])])[4:-4]
+    assert list(rows.loc[str(good[0])]) == list(rows.loc[str(good[1])])
     for text in (done.stdout, page.read_text()):
         assert "Not identified" in text
         assert "bad.csv, line" in text
@@ -642,3 +649,40 @@ def test_weights_from_a_column_or_a_share_reach_the_fit(tmp_path: Path, few: str
     assert by_column["noise_rad"] == pytest.approx(np.sqrt(np.mean(deviations**2)), rel=1e-4)
     assert by_share["noise_rad"] == pytest.approx(by_column["noise_rad"], rel=0.01)
     assert by_share["assumed"]["measurement"]["noise_share"] == 0.04
+
+
+def test_the_page_begins_with_status_value_and_interval(tmp_path: Path, few: str) -> None:
+    """Then come a picture and lines for a paper; residuals, profiles and notes are folded."""
+    page = tmp_path / "page.html"
+    done = identify(EXAMPLE, "--config", few, "--output", tmp_path / "a.json", "--report", page)
+    assert done.returncode == 0, done.stderr
+    told = json.loads((tmp_path / "a.json").read_text())
+    text = unescape(page.read_text())
+    parts = ("Fit ok", "What the trace tells", "<img", "For a paper")
+    places = [text.index(part) for part in parts]
+    assert places == sorted(places)
+    assert re.sub("<details>.*?</details>", "", text, flags=re.DOTALL).count("<img") == 1
+    for item in told["quantities"]:
+        limits = f"{item['low'] or 0:.3g} to {item['high'] or 0:.3g}"
+        line = f"<p>{item['quantity']} = {item['value']:.3g} {item['unit']} (95 % "
+        line += f"profile-likelihood interval {limits}, n = 1 trace)</p>"
+        assert (line in text) == (item["verdict"] == "determined")
+    assert r"$k_{p} = 5.01\,\mathrm{N/m}$ (95\,\% profile-likelihood interval $" in text
+
+
+@pytest.mark.parametrize(
+    ("fit", "value", "said"),
+    [
+        ("ok", 35.0, r"$c + c_{p} = 35\,\mathrm{N\,s/m}$ (95\,\% "),
+        ("ok", 2e-9, r"$c + c_{p} = 2 \times 10^{-9}\,\mathrm{N\,s/m}$ (95\,\% "),
+        ("doubtful", 35.0, None),
+        ("rejected", 35.0, None),
+    ],
+)
+def test_only_what_can_be_published_is_said_for_a_paper(
+    fit: str, value: float, said: str | None
+) -> None:
+    both = {"quantity": "c + c_p", "symbol": "$c + c_{p}$", "unit": "N s/m", "value": value}
+    quantities = [{**both, "low": 1e-9, "high": 40.0}, {**both, "low": None, "high": 40.0}]
+    lines = for_a_paper({"fit": fit, "confidence": 0.95, "quantities": quantities})
+    assert [latex.startswith(str(said)) for _, latex in lines] == [True] * (said is not None)

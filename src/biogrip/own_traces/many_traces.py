@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from biogrip.digits import rounded_numbers
+from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY
-from biogrip.own_traces.words import labels_of
 from biogrip.products.files.rows import write_rows
 from biogrip.terminal import visible
 
@@ -66,34 +65,30 @@ def identify_traces(
 
 
 def write_table(outcome: Outcome, table: Path) -> None:
-    """Write one row per trace as CSV."""
-    quantities = labels_of(outcome.found)
-    columns = ["trace", "problem", "fit", "model", "samples", "noise_rad", "misfit_rad"]
-    fixed = ["fixed"] if any("fixed" in each for each in outcome.found) else []
-    columns += fixed
-    columns += [f"{quantity} {what}" for quantity in quantities for what in _OF_QUANTITY]
+    """Write one row per trace as CSV: numbers, their units in the header, and no sentences."""
+    units = {q["quantity"]: q["unit"] for each in outcome.found for q in each["quantities"]}
+    columns = ["trace", "fit", "model", "preferred_model", "samples", "noise_rad", "misfit_rad"]
+    columns += [
+        with_unit(f"{quantity} {what}", unit if what != "verdict" else "")
+        for quantity, unit in units.items()
+        for what in _OF_QUANTITY
+    ]
     rows = [
         (
-            each["trace"],
-            "",
-            each["fit"],
-            each["model"],
-            each["samples"],
-            each["noise_rad"],
-            each["misfit_rad"],
-            *(", ".join(each[name]) for name in fixed),
-            *_of_quantities(each, quantities),
-            each["limits"],
-            " ".join(each["reasons"]),
-            each["advice"] or "",
+            *(each["trace"], each["fit"], each["model"], _preferred(each)),
+            *(each["samples"], each["noise_rad"], each["misfit_rad"]),
+            *_of_quantities(each, units),
             each[WRITTEN_BY],
         )
         for each in map(rounded_numbers, outcome.found)
     ]
-    rows += [
-        (trace, problem, *[""] * (len(columns) + 2)) for trace, problem in outcome.refused.items()
-    ]
-    write_rows(table, (*columns, "limits", "reasons", "advice", WRITTEN_BY), rows)
+    rows += [(trace, "none", *[""] * (len(columns) - 1)) for trace in outcome.refused]
+    write_rows(table, (*columns, WRITTEN_BY), rows)
+
+
+def _preferred(found: Mapping[str, Any]) -> str:
+    """Return the model of the lowest BIC; "" if none were compared."""
+    return next((row["model"] for row in found["models"] if row["delta_bic"] == 0), "")
 
 
 def _of_quantities(found: Mapping[str, Any], quantities: Iterable[str]) -> list[object]:

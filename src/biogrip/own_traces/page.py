@@ -15,6 +15,7 @@ from biogrip.own_traces.one_trace import Identified
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.words import (
     evidence_in_words,
+    for_a_paper,
     further_notes,
     labels_of,
     limits_in_short,
@@ -49,6 +50,7 @@ class Page:
                 "trace": visible(data["trace"]),
                 "figures": figures,
                 "further_notes": further_notes(data),
+                "for_a_paper": for_a_paper(data),
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
                 "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
                 "evidence_in_words": evidence_in_words(compared),

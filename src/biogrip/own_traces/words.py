@@ -9,6 +9,7 @@ import numpy as np
 from tabulate import tabulate
 
 from biogrip.digits import with_unit
+from biogrip.identifiability.fit_status import OK
 from biogrip.identifiability.marginals import AGREES
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
@@ -72,6 +73,43 @@ def one_sided_in_words(found: Sequence[Mapping[str, Any]]) -> list[str]:
     if all((item["low"] is None) == (item["high"] is None) for item in quantities):
         return []
     return [f"One-sided limits hold with {50 * (1 + found[0]['confidence']):g} % confidence."]
+
+
+def for_a_paper(found: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return sentences for a paper, as text and as LaTeX: one per quantity with two limits.
+
+    Nothing if the fit is doubtful or rejected.
+    """
+    if found["fit"] != OK:
+        return []
+    return [
+        (_for_a_paper(each, found["confidence"]), _in_latex(each, found["confidence"]))
+        for each in found["quantities"]
+        if each["low"] is not None and each["high"] is not None
+    ]
+
+
+def _for_a_paper(found: Mapping[str, Any], confidence: float) -> str:
+    unit = f" {found['unit']}" if found["unit"] else ""
+    return (
+        f"{found['quantity']} = {found['value']:.3g}{unit} ({100 * confidence:g} % "
+        f"profile-likelihood interval {found['low']:.3g} to {found['high']:.3g}, n = 1 trace)"
+    )
+
+
+def _in_latex(found: Mapping[str, Any], confidence: float) -> str:
+    value, low, high = (_number_in_latex(found[name]) for name in ("value", "low", "high"))
+    unit = rf"\,\mathrm{{{found['unit'].replace(' ', chr(92) + ',')}}}" if found["unit"] else ""
+    symbol = found["symbol"].replace("$", "")
+    return (
+        rf"${symbol} = {value}{unit}$ ({100 * confidence:g}\,\% profile-likelihood interval "
+        rf"${low}$ to ${high}$, $n = 1$ trace)"
+    )
+
+
+def _number_in_latex(value: float) -> str:
+    digits, _, exponent = f"{value:.3g}".partition("e")
+    return rf"{digits} \times 10^{{{int(exponent)}}}" if exponent else digits
 
 
 def further_notes(found: Mapping[str, Any]) -> list[str]:
