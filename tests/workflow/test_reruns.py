@@ -158,7 +158,7 @@ def tree(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
 @pytest.mark.parametrize(
     ("file", "jobs"),
     [
-        ("src/biogrip/products/figures/fit.py", {"case_figures": 1, "report": 1}),
+        ("src/biogrip/products/figures/scatter.py", {"case_figures": 1, "report": 1}),
         ("src/biogrip/products/tables/models.py", {"tables": 1, "report": 1}),
     ],
 )
