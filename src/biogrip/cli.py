@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext, suppress
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from biogrip import __version__
@@ -66,11 +67,28 @@ def _refuse_others(path: Path, scratch: Path) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Argument parser whose error messages are safe to print on a terminal."""
+    """Argument parser with safe error messages, and examples at the end of its help."""
+
+    examples = ""
+    lists_models = False
+
+    def format_help(self) -> str:
+        """Return the help, with the sample models where one is to be named."""
+        models = _models() if self.lists_models else ""
+        return f"{super().format_help()}{models}{self.examples}"
 
     def error(self, message: str) -> NoReturn:
         """Print a usage error and exit."""
         super().error(visible_lines(message))
+
+
+def _models() -> str:
+    """Return the names and titles of the sample models."""
+    from biogrip.experiment.models import MODELS
+
+    width = max(map(len, MODELS))
+    lines = [f"  {name:<{width}}  {model.title}" for name, model in MODELS.items()]
+    return "\n".join(["\nsample models:", *lines, ""])
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -92,6 +110,12 @@ def _parser() -> argparse.ArgumentParser:
         usage="biogrip run [CONFIG.yaml ...] [options of Snakemake ...]",
     )
     run.set_defaults(command=_run)
+    run.examples = _examples(
+        "run",
+        "run my.yaml --directory my_study -j4",
+        cost="The default study takes about a minute on two cores: some 0.01 s of a processor for "
+        "each seed of each case, by the nonlinear model 2 s.",
+    )
 
     _identify_parser(commands)
     _groups_parser(commands)
@@ -100,6 +124,10 @@ def _parser() -> argparse.ArgumentParser:
     text = "make products of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
     make.set_defaults(command=_make, recorded=True)
+    make.examples = _examples(
+        "make errors_of_case --case liquid_drop_1",
+        "make identification --case liquid_drop_1 --method genetic --batch seeds_0-49",
+    )
     make.add_argument(
         "products", nargs="+", metavar="PRODUCT", help="name of a product, e.g. errors"
     )
@@ -119,6 +147,7 @@ def _parser() -> argparse.ArgumentParser:
     ):
         parser_of = commands.add_parser(name, help=text, description=text)
         parser_of.set_defaults(command=command)
+        parser_of.examples = _examples(name, f"{name} my_study/results")
         parser_of.add_argument(
             "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
         )
@@ -126,27 +155,46 @@ def _parser() -> argparse.ArgumentParser:
     text = "pack a finished study, with what it was run on, as a Workflow Run RO-Crate"
     crate = commands.add_parser("crate", help=text, description=text)
     crate.set_defaults(command=_crate, recorded=True)
+    crate.examples = _examples("crate", "crate --output study.zip")
     crate.add_argument(
         "--output", type=Path, default=RESULTS / "crate.zip", help="ZIP file [%(default)s]"
     )
 
     publish = commands.add_parser("publish", help="renew published tables and figures")
     publish.set_defaults(command=_publish)
+    publish.examples = _examples(
+        "publish results published", 'publish results published --only "errors*"'
+    )
     publish.add_argument("results", type=Path, help="results of a finished study")
     publish.add_argument("published", type=Path, help="folder to publish in")
     publish.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
 
     compare = commands.add_parser("compare", help="compare regenerated tables with published ones")
     compare.set_defaults(command=_compare)
+    compare.examples = _examples(
+        "compare published/tables results/tables", "compare old/tables my_study/results/tables"
+    )
     compare.add_argument("published", type=Path, help="folder of published tables")
     compare.add_argument("now", type=Path, help="folder of regenerated tables")
     return parser
+
+
+def _examples(*commands: str, cost: str = "") -> str:
+    """Return examples of a command, and a sentence on what takes long."""
+    lines = ["\nexamples:", *(f"  biogrip {command}" for command in commands), ""]
+    return "\n".join([*lines, fill(cost, 80), ""] if cost else lines)
 
 
 def _identify_parser(stages: Any) -> None:
     text = "identify the sample in recorded traces, without a workflow"
     identify = stages.add_parser("identify", help=text, description=text)
     identify.set_defaults(command=_identify)
+    identify.examples = _examples(
+        "identify cell.csv --config my_gripper.yaml",
+        "identify dish/*.csv --config my_gripper.yaml --model liquid_drop --report page.html",
+        cost="A trace takes seconds, most of them for comparing the sample models; --posterior "
+        "takes some more.",
+    )
     identify.add_argument(
         "traces", type=Path, nargs="+", metavar="TRACE", help="CSV file with a header"
     )
@@ -170,6 +218,11 @@ def _groups_parser(stages: Any) -> None:
     text = "identify the cells of several groups in recorded traces, and compare the groups"
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
+    groups.examples = _examples(
+        "groups dishes.csv --config my_gripper.yaml",
+        "groups dishes.csv --config my_gripper.yaml --noise-model coloured --exclude c07",
+        cost="A cell takes some seconds.",
+    )
     groups.add_argument(
         "table",
         type=Path,
@@ -190,6 +243,11 @@ def _design_parser(stages: Any) -> None:
     text = "design torque and sampling times that determine every parameter"
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design, noise_model=None, sd=None, noise_share=None)
+    design.examples = _examples(
+        "design my_design.yaml",
+        "design my_design.yaml --after first.csv --output second.yaml",
+        cost="The search for the torque takes most, and grows with most_steps.",
+    )
     design.add_argument(
         "configs",
         type=Path,
@@ -263,8 +321,9 @@ def _parameter(text: str) -> tuple[str, float]:
     raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
 
 
-def _trace_options(command: argparse.ArgumentParser) -> None:
+def _trace_options(command: _Parser) -> None:
     """Add options for reading and identifying recorded traces."""
+    command.lists_models = True
     _reading_options(command)
     command.add_argument(
         "--sd", metavar="COLUMN", help="column of the rotations' standard deviations"
