@@ -32,11 +32,11 @@ class Parameter:
     meaning: str
     """A few words for tables."""
     range_name: str
-    """Which entry of the search range holds for it."""
+    """Entry of the search range that holds for the parameter."""
     may_vanish: bool = False
-    """Whether zero is a possible value: the element is then not there."""
+    """True if zero is a possible value: the element is then absent."""
     below: float = inf
-    """What all its values are below, if anything."""
+    """Upper bound of all values, if there is one."""
 
     @property
     def unit(self) -> str:
@@ -68,7 +68,7 @@ class SampleModel:
     title: str
     """Name in print."""
     parameters: tuple[Parameter, ...]
-    """What there is to identify, in the order of the columns of a population."""
+    """Parameters to identify, in the order of the columns of a population."""
     network: Callable[[ArrayLike], Network]
     """Turns parameters of shape (n, n_parameters) into a `Network`."""
     example: tuple[float, ...]

@@ -43,7 +43,7 @@ class Published(Block):
 
 
 UNPUBLISHED = Published(table=None, identified={}, error_percent={})
-"""What the paper reports of a sample that it does not have."""
+"""Record of a sample that the paper does not have."""
 
 
 @dataclass(frozen=True)

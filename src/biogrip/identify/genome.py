@@ -29,7 +29,7 @@ class GeneRange(Block):
     """Lowest and highest value of the digits g₂, g₃ and so on (eq. 10). The first is never below 1,
     for numbers with leading zeros would be encoded twice."""
     digits: Annotated[int, Field(ge=1, le=6)] = 2
-    """How many digits; in eq. (10) two."""
+    """Number of digits; in eq. (10) two."""
 
     def problems(self) -> Iterator[Problem]:
         """Find bounds in the wrong order, and a range of a single value."""

@@ -26,7 +26,7 @@ class Method:
     blocks: Mapping[str, str]
     """Names of its config blocks, and of the settings class of each in its module."""
     step: str
-    """What a row of its history follows."""
+    """Name of a step of the method, after each of which its history has a row."""
     color: str
     """Colour of its lines in figures, as no other method's: a name in
     `biogrip.products.figures.style.COLORS`."""
@@ -35,9 +35,9 @@ class Method:
     settings: str = ""
     """Class in its module that puts several blocks together, in their order."""
     exact: bool = False
-    """Whether it promises all digits of the optimum where it ends; tests hold it to that."""
+    """True if the method ends at an optimum to all digits; tests hold it to that."""
     sure: bool = False
-    """Whether it promises the global optimum of (nearly) every trace; likewise."""
+    """True if the method finds the global optimum of (nearly) every trace; likewise."""
 
     @property
     def module(self) -> str:

@@ -16,7 +16,7 @@ _AT_ONCE = 20
 
 
 USED = "gripper searched parameters design.noise_rad experiment study.experiment"
-"""What bounds of a case in its own experiment and in that of the study depend on."""
+"""Settings that the bounds of a case in its own experiment and in that of the study depend on."""
 
 
 def designed_cases(study: Study) -> list[str]:

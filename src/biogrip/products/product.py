@@ -73,7 +73,7 @@ class Product:
     files of `reads` and `writes` (lists if there may be several), and ``method``, ``seeds`` or
     ``seed`` if any."""
     uses: Uses
-    """What it uses of the config: the function can read nothing else."""
+    """Parts of the config that the function uses: it can read nothing else."""
     jobs: Callable[[Plan], Iterable[Wildcards]]
     """Function that returns the wildcards of every job in a plan."""
     message: str

@@ -1,4 +1,4 @@
-"""How often whole profiles reach each verdict on a quantity, and how often it is true."""
+"""Counts of the verdicts of whole profiles on each quantity, and of the true ones."""
 
 from collections.abc import Iterator
 from pathlib import Path
