@@ -42,6 +42,9 @@ class JointResiduals(Residuals):
         self.weights = np.array([whole / own for own in noise_rad])
         peaks = (w * part.peak_rad for w, part in zip(self.weights, parts, strict=True))
         self.peak_rad = float(max(peaks))
+        self.rounding_rad = max(
+            float(w * part.rounding_rad) for w, part in zip(self.weights, parts, strict=True)
+        )
         scales = (w * part.noise_scale_rad for w, part in zip(self.weights, parts, strict=True))
         squares = (part.samples * s**2 for part, s in zip(parts, scales, strict=True))
         self.noise_scale_rad = sqrt(fsum(squares) / self.samples)

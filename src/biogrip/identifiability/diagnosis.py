@@ -18,7 +18,7 @@ from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.outliers import outliers_of
 from biogrip.identify.problem import Problem
 from biogrip.response.grip import Grip
-from biogrip.response.residuals import estimate_noise
+from biogrip.response.noise_estimate import estimate_noise
 
 # A misfit larger than the scatter of neighbouring readings by this factor is not noise.
 _TOO_MUCH = 1.2
@@ -136,7 +136,7 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
         return
     residual = residuals.left(likelihood.best)
     growth = compute_growth(residual, residuals.rotation(likelihood.best))
-    doubts = list(doubts_about_noise(residual, growth))
+    doubts = list(doubts_about_noise(residual, growth, residuals.rounding_rad))
     yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
         yield Note(
@@ -153,8 +153,8 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     # Outliers are noise of the recording: they make a fit doubtful, not wrong.
     scale, even = residuals.noise_scale_rad, residual / growth
     if np.ptp(growth):
-        scale = max(scale, estimate_noise(even))
-    bulk = even[~outliers_of(even)]
+        scale = max(scale, estimate_noise(even, residuals.rounding_rad))
+    bulk = even[~outliers_of(even, residuals.rounding_rad)]
     bulk_rad = float(np.sqrt(np.mean(bulk**2)))
     if bulk_rad > _TOO_MUCH * scale:
         yield Note(

@@ -17,7 +17,7 @@ _CORRELATED = 5.0
 _STRETCHES, _SHORTEST = 20, 5
 
 
-def doubts_about_noise(residual: Array, growth: Array) -> Iterator[str]:
+def doubts_about_noise(residual: Array, growth: Array, rounding_rad: float = 0.0) -> Iterator[str]:
     """Yield a sentence for each test of white noise that the residuals of a fit fail.
 
     Parameters
@@ -27,6 +27,8 @@ def doubts_about_noise(residual: Array, growth: Array) -> Iterator[str]:
     growth : (n_samples,)
         Growth of the noise with the rotation, see `compute_growth`. All other tests are of what
         it leaves.
+    rounding_rad
+        Step of the readings.
     """
     if np.ptp(growth):
         low, high = np.quantile(growth, (0.05, 0.95))
@@ -57,7 +59,7 @@ def doubts_about_noise(residual: Array, growth: Array) -> Iterator[str]:
             f"of white noise do only {one_in(chance)} traces. It contains something slow that the "
             "model lacks, perhaps a drift of the instrument: the intervals are too narrow."
         )
-    far = int(np.count_nonzero(outliers_of(residual)))
+    far = int(np.count_nonzero(outliers_of(residual, rounding_rad)))
     chance = _chance_of_far(far, len(residual))
     if chance < FALSE_ALARM:
         yield (

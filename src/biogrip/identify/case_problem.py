@@ -18,8 +18,8 @@ from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
 from biogrip.response.misfit import Misfit
 from biogrip.response.misfit_series import SeriesMisfit
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
-from biogrip.response.residuals import estimate_noise
 from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from biogrip.arrays import Array, BoolArray
+from biogrip.response.noise_estimate import ROOT_12
 
 FAR = 4.5
 """Threshold in standard deviations of the noise, exceeded by one Gaussian reading in 150,000."""
@@ -14,19 +15,22 @@ GAUSSIAN = 0.6744897501960817
 _AROUND = 11
 
 
-def outliers_of(residual: Array) -> BoolArray:
+def outliers_of(residual: Array, rounding_rad: float = 0.0) -> BoolArray:
     """Find outliers among residuals by a Hampel filter [1]_.
 
     Parameters
     ----------
     residual : (n_samples,)
         Residuals of a fit, over the noise's standard deviation where that is not the same.
+    rounding_rad
+        Step of the readings: a reading on the next step is no outlier.
 
     Returns
     -------
     (n_samples,)
         True where a residual is further than `FAR` from the median of eleven, in standard
-        deviations estimated from the median of all such distances.
+        deviations estimated from the median of all such distances, and no less than those of
+        rounding errors.
 
     References
     ----------
@@ -38,7 +42,8 @@ def outliers_of(residual: Array) -> BoolArray:
     others = apart[apart > 0]
     if not len(others):
         return np.zeros(len(residual), dtype=bool)
-    found: BoolArray = apart > FAR * np.median(others) / GAUSSIAN
+    scale = max(float(np.median(others)) / GAUSSIAN, rounding_rad / ROOT_12)
+    found: BoolArray = apart > FAR * scale
     return found
 
 

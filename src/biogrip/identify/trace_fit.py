@@ -167,7 +167,8 @@ def _without_outliers(
         plain = case_problem.of(time_s[kept], rotation_rad[kept])
         found = find(plain)
         residual = plain.residuals.left(logs := np.log(found.parameters))
-        struck = outliers_of(residual / compute_growth(residual, plain.residuals.rotation(logs)))
+        growth = compute_growth(residual, plain.residuals.rotation(logs))
+        struck = outliers_of(residual / growth, plain.residuals.rounding_rad)
         if not struck.any():
             break
         kept[np.flatnonzero(kept)[struck]] = False

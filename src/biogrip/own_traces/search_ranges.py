@@ -9,7 +9,7 @@ from biogrip.arrays import Array
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.products.files.traces import Measurements
-from biogrip.response.residuals import estimate_noise
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.study.load import read_configs
 from biogrip.study.study import Case
 

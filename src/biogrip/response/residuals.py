@@ -14,6 +14,7 @@ from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
 from biogrip.response.linear import LEFT
 from biogrip.response.modes import compute_modes
+from biogrip.response.noise_estimate import estimate_noise, measure_rounding
 from biogrip.response.nuisance import taken_out
 from biogrip.response.sensitivity import (
     corrections,
@@ -62,11 +63,12 @@ class Residuals:
         self.nonlinear = condensed.nonlinear
         self._condensed = condensed
         self._rotation_rad = condensed.cleared(rotation_rad)
+        self.rounding_rad = measure_rounding(rotation_rad)
         self.samples = len(time_s)
         self.peak_rad = float(np.max(np.abs(self._rotation_rad)))
         self.duration_s = float(time_s[-1])
         if noise_rad is None:
-            noise_rad = estimate_noise(self._rotation_rad)
+            noise_rad = estimate_noise(self._rotation_rad, self.rounding_rad)
         self.noise_scale_rad = noise_rad
         self._freedom = np.inf
         # Rows of the trace by inclusion of inertia, shared by all models.
@@ -296,15 +298,3 @@ class Residuals:
             nonlinear=self.nonlinear,
             inertia=self.inertia,
         )
-
-
-def estimate_noise(rotation_rad: Array) -> float:
-    """Estimate the standard deviation of white noise on a smooth trace without a model.
-
-    The median of second differences is used, on which slopes and jumps of a protocol have
-    next to no effect. Of a trace without noise it is tiny.
-    """
-    second = np.abs(np.diff(rotation_rad, 2))
-    # Gaussian: the median is 0.6745 standard deviations, and those of second differences sqrt 6.
-    noise = float(np.median(second)) / (0.6745 * np.sqrt(6.0)) if len(second) else 0.0
-    return max(noise, 1e-9 * float(np.max(np.abs(rotation_rad))))

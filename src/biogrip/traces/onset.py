@@ -10,8 +10,8 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Gripper
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, without
-from biogrip.response.residuals import estimate_noise
 from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
 
 # Relaxation times over the protocol's duration.
