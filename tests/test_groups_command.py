@@ -98,6 +98,8 @@ def test_groups_are_compared(compared: tuple[dict[str, Any], str]) -> None:
     for word in ("treated over control", f"{apart['ratio']:.3g}", "3 of 3", "control_0_1.csv"):
         assert word in said
     assert found["skipped"] == []
+    assert "Limits are statistical only" in found["limits"]
+    assert found["limits"] in said
 
 
 def test_a_cell_is_what_identify_says_of_its_trace(

@@ -264,6 +264,10 @@ def test_a_trace_that_is_no_file_is_refused(
             ("--noise-share", "3"),
             "--noise-share: found 3.0, allowed is greater than 0 and at most 1.",
         ),
+        (("--scale", "0"), "--scale: found 0, allowed is another number."),
+        (("--scale", "-1e-400"), "--scale: found 0, allowed is another number."),
+        (("--fix", "k=1e300"), "--fix: k: found 1e+300, allowed is above 0 and at most 1e+12 N/m."),
+        (("--fix", "k=4", "--fix", "k=5"), "--fix: found k repeated, allowed is each parameter"),
         (("--sd", "sd"), "found no such column, allowed are time_s, rotation_rad."),
         (("--time", ""), "--time: found '' of 0 characters, allowed are at least 1."),
         (("--rotation", "x" * 5000), "of 5000 characters, allowed are at most 4000."),
@@ -482,6 +486,45 @@ def test_what_is_said_is_enough_to_repeat_it(
     again = json.loads(second.read_text())
     assert (told["by_default"], again["by_default"]) == (["gripper", "protocol"], [])
     assert again["quantities"] == told["quantities"]
+
+
+@pytest.mark.parametrize(
+    ("options", "noise"),
+    [
+        (("--sd", "sd", "--scale", "-2e-3", "--start", "5", "--skip", "1"), "noise as given"),
+        (("--scale", "-2e-3", "--start", "fit", "--skip", "1"), "scatter of neighbours"),
+        (("--scale", "-2e-3", "--start", "5", "--noise-model", "coloured"), "noise as modelled"),
+    ],
+)
+def test_how_a_file_was_read_is_enough_to_repeat_it(
+    tmp_path: Path, few: str, options: tuple[str, ...], noise: str
+) -> None:
+    """All assumed blocks as a config do what the options did, and options replace its keys."""
+    times, rotation = clean("endothelial_cell", 0.5)
+    size = 0.02 * rotation.max()
+    measured = rotation + size * np.random.default_rng(1).standard_normal(len(times))
+    rows = zip(times + 5, measured / -2e-3, np.full(len(times), size / 2e-3), strict=True)
+    file, again = tmp_path / "volts.csv", tmp_path / "again.yaml"
+    header = ["rig 2", "clock,volts,sd"][("--skip" not in options) :]
+    file.write_text("\n".join([*header, *(",".join(map(repr, map(float, row))) for row in rows)]))
+    units = ("--time", "clock", "--time-unit", "s", "--rotation", "volts", "--rotation-unit", "rad")
+    arguments = (file, "--model", "liquid_drop", "--output", tmp_path / "found.json")
+    run = identify(*arguments, *units, *options, "--config", few)
+    assert run.returncode == 0, run.stderr
+    assert noise in run.stdout
+    found = json.loads((tmp_path / "found.json").read_text())
+    few_models = yaml.safe_load(FEW)["model_selection"]
+    again.write_text(yaml.safe_dump({**found["assumed"], "model_selection": few_models}))
+    run = identify(*arguments, "--config", again)
+    assert run.returncode == 0, run.stderr
+    repeated = json.loads((tmp_path / "found.json").read_text())
+    assert repeated["quantities"] == found["quantities"]
+    assert repeated["assumed"] == found["assumed"]
+    run = identify(*arguments, "--start", "5.0", "--config", again)
+    assert run.returncode == 0, run.stderr
+    replaced = json.loads((tmp_path / "found.json").read_text())["assumed"]["measurement"]
+    assert replaced["start_s"] == 5
+    assert not replaced.get("fit_start")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import argparse
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -71,6 +72,11 @@ class _Parser(argparse.ArgumentParser):
 
     examples = ""
     lists_models = False
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        # argparse takes a negative number with an exponent for an option.
+        self._negative_number_matcher = re.compile(r"-(\d+\.?\d*|\.\d+)(e[-+]?\d+)?$", re.I)
 
     def format_help(self) -> str:
         """Return the help, with the sample models where one is to be named."""
@@ -282,10 +288,8 @@ def _design_parser(stages: Any) -> None:
 
 def _reading_options(command: argparse.ArgumentParser) -> None:
     """Add options for columns, noise and nuisance terms of recorded traces."""
-    command.add_argument("--time", default="time_s", help="column of times [%(default)s]")
-    command.add_argument(
-        "--rotation", default="rotation_rad", help="column of rotations [%(default)s]"
-    )
+    command.add_argument("--time", help="column of times [time_s]")
+    command.add_argument("--rotation", help="column of rotations [rotation_rad]")
     command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
     command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
     command.add_argument("--skip", type=int, metavar="N", help="lines before the header [0]")
@@ -310,6 +314,14 @@ def _start(text: str) -> float | str:
     with suppress(ValueError):
         return text if text == FIT else float(text)
     raise argparse.ArgumentTypeError(f"found '{text}', allowed are seconds, or {FIT}")
+
+
+def _fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
+    """Return the values of all ``--fix`` by name, each of which may come once."""
+    for number, (name, _) in enumerate(given):
+        if name in dict(given[:number]):
+            raise BiogripError(f"--fix: found {name} repeated, allowed is each parameter once.")
+    return dict(given)
 
 
 def _parameter(text: str) -> tuple[str, float]:
@@ -374,7 +386,7 @@ def _identify(options: argparse.Namespace) -> None:
         report=options.report,
         table=options.csv,
         posterior=options.posterior,
-        fixed=dict(options.fix),
+        fixed=_fixed(options.fix),
         strict=options.strict,
         force=options.force,
     )
@@ -389,7 +401,7 @@ def _groups(options: argparse.Namespace) -> None:
         _read_as(options),
         options.config,
         exclude=options.exclude,
-        fixed=dict(options.fix),
+        fixed=_fixed(options.fix),
         output=options.output,
         force=options.force,
     )

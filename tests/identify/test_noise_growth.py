@@ -39,6 +39,23 @@ def test_outliers_are_judged_by_the_noise_around_them() -> None:
     np.testing.assert_array_equal(np.flatnonzero(outliers_of(residual / growth)), [40, 350])
 
 
+def test_a_first_reading_without_rotation_does_not_make_its_noise_vanish() -> None:
+    """It has a floor of noise, as all have: 1 % of what the largest rotations have."""
+    rotation = np.concatenate(([0.0], ROTATION))
+    for seed in range(20):
+        noise = np.random.default_rng(seed).standard_normal(401)
+        residual = np.hypot(0.01, rotation) * noise
+        even = residual / compute_growth(residual, rotation)
+        assert np.abs(even[0]) < 10 * np.sqrt(np.mean(even[1:] ** 2))
+
+
+@pytest.mark.parametrize("index", [0, -1])
+def test_outliers_are_seen_at_the_ends(index: int) -> None:
+    residual = np.random.default_rng(3).standard_normal(400)
+    residual[index] = 50.0
+    assert outliers_of(residual)[index]
+
+
 def test_what_does_not_vary_does_not_grow() -> None:
     np.testing.assert_array_equal(compute_growth(np.zeros(50), np.arange(50.0)), 1.0)
     np.testing.assert_array_equal(compute_growth(np.arange(50.0) % 7, np.zeros(50)), 1.0)

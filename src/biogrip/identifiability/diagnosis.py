@@ -22,8 +22,8 @@ from biogrip.response.noise_estimate import estimate_noise
 
 # A misfit larger than the scatter of neighbouring readings by this factor is not noise.
 _TOO_MUCH = 1.2
-# A misfit below this share of the noise is that of a trace without noise.
-_NOISE_FREE = 0.01
+# A misfit below these shares of the noise and of the peak is that of a trace without noise.
+_NOISE_FREE, _NOISE_FREE_OF_PEAK = 0.01, 1e-3
 # A misfit below this share of the given noise is reported: noise is rarely known better.
 _TOO_LITTLE = 0.5
 
@@ -132,7 +132,8 @@ def _pulling(grip: Grip, last_s: float) -> Iterator[Note]:
 def _noise(likelihood: Likelihood) -> Iterator[Note]:
     """Yield doubts about the residuals and about the noise that was given."""
     residuals, misfit_rad = likelihood.problem.residuals, likelihood.misfit_rad
-    if misfit_rad < _NOISE_FREE * likelihood.noise_rad:
+    least_rad = min(_NOISE_FREE * likelihood.noise_rad, _NOISE_FREE_OF_PEAK * residuals.peak_rad)
+    if misfit_rad < least_rad:
         return
     residual = residuals.left(likelihood.best)
     growth = compute_growth(residual, residuals.rotation(likelihood.best))

@@ -51,5 +51,5 @@ def measure_distances(residual: Array) -> Array:
     """Measure how far residuals are from the median of the eleven around, (n_samples,)."""
     from scipy.ndimage import median_filter
 
-    apart: Array = np.abs(residual - median_filter(residual, _AROUND, mode="nearest"))
+    apart: Array = np.abs(residual - median_filter(residual, _AROUND, mode="mirror"))
     return apart

@@ -34,8 +34,7 @@ from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.search_ranges import with_own_ranges
+from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.words import fixed_in_words
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
@@ -43,6 +42,11 @@ from biogrip.progress import Progress
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
+
+_LIMITS = (
+    "Limits are statistical only: all cells share the gripper, whose uncertainty changes their "
+    "values alike, and ratios hardly."
+)
 
 
 @dataclass(frozen=True)
@@ -185,6 +189,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         "model_title": case_problem.model.title,
         "confidence": confidence,
         **fixed_data(case_problem),
+        "limits": _LIMITS,
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
@@ -203,7 +208,7 @@ def in_words(found: dict[str, Any]) -> str:
     """Return the result of `compare_groups` as tables in plain text."""
     percent = f"{100 * found['confidence']:g} %"
     parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
-    parts += fixed_in_words(found)
+    parts += [found["limits"], *fixed_in_words(found)]
     parts += [_cell_in_words(cell) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
@@ -269,8 +274,7 @@ class _Traces:
     def _trace_problem(self, trace: Path) -> _TraceProblem:
         study = study_of(replace(self._options, trace=trace))
         (case,) = study.cases.values()
-        recorded = self._options.read_as.read(trace, case.gripper, case.problem)
-        case = with_own_ranges(case, recorded, self._options.config)
+        recorded, case = read_trace(trace, case, self._options.config)
         rotation_rad = recorded.rotation_rad[0]
         # Noise never repeats: equal rotations are a copied file, and would feign agreement.
         same = sha256(rotation_rad.tobytes()).digest()

@@ -30,8 +30,7 @@ from biogrip.own_traces.assumed import (
 from biogrip.own_traces.fitted_models import judge_again, models_tried
 from biogrip.own_traces.late_onset import late_onset
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
-from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.search_ranges import with_own_ranges
+from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
@@ -127,8 +126,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     (case,) = study.cases.values()
     pieces = 5 + (case.posterior is not None)
     with Progress(str(options.trace), pieces, live=True) as progress:
-        recorded = options.read_as.read(options.trace, case.gripper, case.problem)
-        case = with_own_ranges(case, recorded, options.config)
+        recorded, case = read_trace(options.trace, case, options.config)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
         case_problem = case.problem.weighted(recorded.sd_rad)
@@ -235,7 +233,8 @@ def study_of(options: IdentifyOptions) -> Study:
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    measurement = {**options.read_as.block, "file": str(options.trace)}
+    if isinstance(given := merged.get("measurement"), dict):
+        merged["measurement"] = options.read_as.over(given) | {"file": str(options.trace)}
     # Cases of the config are meant for the workflow.
     merged.pop("only", None)
     if options.posterior:
@@ -243,7 +242,6 @@ def study_of(options: IdentifyOptions) -> Study:
     merged["cases"] = {
         case: {
             "sample": {"model": sample.name, "branches": sample.branches},
-            "measurement": measurement,
             "fixed": dict(options.fixed),
         }
     }

@@ -19,6 +19,7 @@ from biogrip.own_traces.words import (
     further_notes,
     labels_of,
     limits_in_short,
+    noise_in_words,
     one_sided_in_words,
     taken_for_granted,
 )
@@ -49,6 +50,7 @@ class Page:
                 **data,
                 "trace": visible(data["trace"]),
                 "figures": figures,
+                "noise_in_words": noise_in_words(data),
                 "further_notes": further_notes(data),
                 "for_a_paper": for_a_paper(data),
                 "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},

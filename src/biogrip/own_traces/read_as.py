@@ -1,16 +1,23 @@
 """Command-line options for reading the file of a recorded trace."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
+from biogrip.own_traces.search_ranges import with_own_ranges
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages import recording
 from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE
+from biogrip.study.study import Case
 from biogrip.study.validation import measurement_problem
 from biogrip.traces.recordings import Columns
+
+USUAL_COLUMNS = {"time": "time_s", "rotation": "rotation_rad"}
+"""Names of the columns where neither option nor config has others."""
 
 _OPTIONS = {"noise_rad": "noise", "start_s": "start"}
 
@@ -22,7 +29,7 @@ class ReadAs:
     Parameters
     ----------
     time, rotation
-        Names of the columns.
+        Names of the columns, by default those of `USUAL_COLUMNS`.
     time_unit, rotation_unit
         Units of the columns, where their names have none.
     skip, scale
@@ -41,8 +48,8 @@ class ReadAs:
         Standard deviation of the noise as a share of the rotation.
     """
 
-    time: str = "time_s"
-    rotation: str = "rotation_rad"
+    time: str | None = None
+    rotation: str | None = None
     time_unit: str | None = None
     rotation_unit: str | None = None
     skip: int | None = None
@@ -61,12 +68,22 @@ class ReadAs:
         """Keys of the ``measurement`` block that are given."""
         return {key: value for key, value in asdict(self).items() if value is not None}
 
+    def over(self, measurement: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the ``measurement`` block of a config with the options laid over it.
+
+        An onset that is given replaces one that is fitted, and the reverse.
+        """
+        one_of = {"start_s", "fit_start"}
+        replaced = one_of if one_of & self.block.keys() else set()
+        kept = {key: value for key, value in measurement.items() if key not in replaced}
+        return USUAL_COLUMNS | kept | self.block
+
     @property
     def columns(self) -> Columns:
         """Names and units of the file's columns."""
         return Columns(
-            self.time,
-            self.rotation,
+            self.time or USUAL_COLUMNS["time"],
+            self.rotation or USUAL_COLUMNS["rotation"],
             self.time_unit,
             self.rotation_unit,
             self.skip or 0,
@@ -114,3 +131,35 @@ class ReadAs:
                 )
             if problem := measurement_problem(key, value):
                 raise BiogripError(f"--{option}: {problem}")
+        if self.scale == 0:
+            raise BiogripError("--scale: found 0, allowed is another number.")
+
+
+def read_trace(file: Path, case: Case, config: Path | None) -> tuple[Measurements, Case]:
+    """Read a trace by the options and the config that a case holds, and find its search ranges.
+
+    Parameters
+    ----------
+    file
+        CSV file.
+    case
+        The case of the trace.
+    config
+        The user's config file, if there is one.
+
+    Returns
+    -------
+    Measurements
+        The trace, from its onset on; that is fitted, if at all, in the search ranges of the case.
+    Case
+        The case with search ranges that follow from the trace, where the config gives none.
+
+    Raises
+    ------
+    BiogripError
+        With file, line and column, if the trace cannot be used.
+    """
+    columns = replace(case.columns, by_options=True)
+    trace = recording.read_checked(file, case.gripper, case.problem, columns)
+    case = with_own_ranges(case, trace, config)
+    return recording.with_fitted_onset(trace, case.problem), case

@@ -18,6 +18,7 @@ from biogrip.identifiability.verdicts import (
     NOT_DETERMINED,
 )
 from biogrip.products.files.verdicts import FIT_REJECTED
+from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import visible, visible_lines
 
 STRONG = 3.0
@@ -38,7 +39,7 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines = [
         f"{visible(found['trace'])}: fit {found['fit']}",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
-        f"{found['samples']} samples, scatter of neighbours {found['scatter_rad']:.3g} rad, "
+        f"{found['samples']} samples, {noise_in_words(found)}, "
         f"misfit {found['misfit_rad']:.3g} rad",
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
@@ -60,6 +61,15 @@ def in_words(found: Mapping[str, Any]) -> str:
     lines += _posterior(found["posterior"]) if "posterior" in found else []
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
+
+
+def noise_in_words(found: Mapping[str, Any]) -> str:
+    """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
+    given = found["assumed"]["measurement"]
+    what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
+    if any(given.get(key) is not None for key in KNOWN_NOISE):
+        what = "noise as given"
+    return f"{what} {found['scatter_rad']:.3g} rad"
 
 
 def fixed_in_words(found: Mapping[str, Any]) -> list[str]:

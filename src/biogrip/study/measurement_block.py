@@ -122,6 +122,8 @@ class MeasurementBlock(Block):
                 yield (key,), text
             if self.sd is not None and key != "sd" and getattr(self, key) is not None:
                 yield (key,), "does not go with sd, which says all of the noise."
+        if self.scale == 0:
+            yield ("scale",), "found 0, allowed is another number."
         if self.fit_start and self.start_s is not None:
             yield ("fit_start",), "does not go with start_s; allowed is one of them."
         if self.bursts and self.times_s:

@@ -95,8 +95,11 @@ def parameter_problems(model: SampleModel, values: Mapping[str, float]) -> Itera
             zero = "0 or " if parameter.may_vanish else ""
             text = f"found {value:g}, allowed is {zero}at least {_LEAST_PARAMETER:g}"
             yield (parameter.name,), f"{text} {parameter.unit}".rstrip() + "."
-        elif not value < parameter.below:
-            text = f"found {value:g}, allowed is above 0 and below {parameter.below:g}."
+        elif not value < parameter.below or not value <= LARGEST_PARAMETER:
+            most = f"at most {LARGEST_PARAMETER:g} {parameter.unit}"
+            if parameter.below < LARGEST_PARAMETER:
+                most = f"below {parameter.below:g}"
+            text = f"found {value:g}, allowed is above 0 and {most}."
             yield (parameter.name,), text
 
 
