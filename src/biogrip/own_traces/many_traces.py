@@ -68,6 +68,8 @@ def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and no sentences."""
     units = {q["quantity"]: q["unit"] for each in outcome.found for q in each["quantities"]}
     columns = ["trace", "fit", "model", "preferred_model", "samples", "noise_rad", "misfit_rad"]
+    fixed = any("fixed" in each for each in outcome.found)
+    columns += ["fixed"] if fixed else []
     columns += [
         with_unit(f"{quantity} {what}", unit if what != "verdict" else "")
         for quantity, unit in units.items()
@@ -77,6 +79,7 @@ def write_table(outcome: Outcome, table: Path) -> None:
         (
             *(each["trace"], each["fit"], each["model"], _preferred(each)),
             *(each["samples"], each["noise_rad"], each["misfit_rad"]),
+            *(["; ".join(each["fixed"])] if fixed else []),
             *_of_quantities(each, units),
             each[WRITTEN_BY],
         )
