@@ -68,8 +68,9 @@ def test_limits_hold_the_truth_of_a_wrong_gripper_only_with_its_uncertainty(
         for said in (capsys.readouterr().out, page.read_text()):
             assert said.count(told[name]["limits"]) == 1
     assert told["exact"]["limits"] == STATISTICAL
+    assert "gripper" in told["torque"]["by_default"]
     assert told["torque"]["limits"] == told["comb"]["limits"]
-    assert told["comb"]["limits"].endswith("gripper.arm_length_m, torque.share.")
+    assert told["comb"]["limits"].endswith("gripper.arm_length_m, torque.")
     truth = CASE.parameters["c"] + CASE.parameters["c_p"]
     for name, found in told.items():
         held = next(q for q in found["quantities"] if q["quantity"] == "c + c_p")

@@ -25,13 +25,18 @@ def gripper_in_limits(case_problem: CaseProblem) -> str:
     """Return a sentence on the part that the gripper's uncertainty has in the limits."""
     if not case_problem.uncertain_keys:
         return "Limits are statistical only: the gripper is taken as exact."
-    return f"Limits include uncertainties of the gripper: {', '.join(case_problem.uncertain_keys)}."
+    keys = ", ".join(key.removesuffix(".share") for key in case_problem.uncertain_keys)
+    return f"Limits include uncertainties of the gripper: {keys}."
 
 
 def by_default(config: Path | None) -> list[str]:
-    """Return which of ``gripper`` and ``protocol`` the config omits, so that defaults hold."""
+    """Return which of ``gripper`` and ``protocol`` the config omits, so that defaults hold.
+
+    Uncertainties alone are no gripper.
+    """
     given = read_configs([config]) if config else {}
-    return [name for name in ("gripper", "protocol") if name not in given]
+    blocks = ("gripper", "protocol")
+    return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]
 
 
 def names_models(config: Path | None) -> bool:
