@@ -94,29 +94,27 @@ def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     # the gap to the next one, bounds of the distance, the distance, and whether it has converged.
     which = np.arange(len(level))
     search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start])
-    refine_optima = np.zeros(pole.shape, dtype=bool)
+    converged = np.zeros(pole.shape, dtype=bool)
     for _ in range(_MOST_SWEEPS):
         origin, sign, whole, low, high, at = search
         sides = _sides(weights, poles, Zeros(origin, sign * at))
         value = sides.below + sides.above - level
-        refine_optima |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
+        converged |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
         np.copyto(low, at, where=sign * value > 0)
         np.copyto(high, at, where=sign * value < 0)
         moved = _nearer(value, sides, sign, whole, at, level)
         outside = ~((moved > low) & (moved < high))
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
-        np.copyto(moved, at, where=refine_optima)
+        np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
-        refine_optima |= np.abs(moved - at) <= _SHORT * moved
+        converged |= np.abs(moved - at) <= _SHORT * moved
         at[:] = found[:, which] = moved
-        left_over = ~np.all(refine_optima, axis=0)
-        if not np.any(left_over):
+        unfinished = ~np.all(converged, axis=0)
+        if not np.any(unfinished):
             break
-        if not np.all(left_over):
-            which, level, search = which[left_over], level[left_over], search[..., left_over]
-            weights, poles, refine_optima = (
-                of[:, left_over] for of in (weights, poles, refine_optima)
-            )
+        if not np.all(unfinished):
+            which, level, search = which[unfinished], level[unfinished], search[..., unfinished]
+            weights, poles, converged = (of[:, unfinished] for of in (weights, poles, converged))
     return Zeros(pole, side * found)
 
 

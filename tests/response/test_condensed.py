@@ -28,8 +28,8 @@ DENSE = {
 
 def products(rows: Array, slopes: Array) -> Array:
     """Sum of squares, gradients and information: all that least squares sees."""
-    combine_misfits = np.vstack((rows, slopes))
-    found: Array = combine_misfits @ combine_misfits.T
+    together = np.vstack((rows, slopes))
+    found: Array = together @ together.T
     return found
 
 

@@ -153,8 +153,8 @@ def test_power_laws_ring_whoever_else_does(gripper: Gripper, name: str) -> None:
     time_s = np.sort(np.concatenate([start + np.geomspace(1e-7, 0.4, 15) for start in (0, 0.5)]))
     ringing = while_ringing(gripper, step, time_s)
     allowed = np.where(ringing, 1e-12, 3.1e-8 / ringing_s(gripper) ** 2)
-    combine_misfits = linear_responses(gripper, model, step, time_s, np.exp(logs), inertia=True)
-    for own, rows in zip(np.exp(logs), combine_misfits, strict=True):
+    together = linear_responses(gripper, model, step, time_s, np.exp(logs), inertia=True)
+    for own, rows in zip(np.exp(logs), together, strict=True):
         alone = linear_responses(gripper, model, step, time_s, own[None], inertia=True)[0]
         np.testing.assert_array_equal(alone, rows)
         network = model.network(own[None])

@@ -100,10 +100,8 @@ def test_rows_do_not_depend_on_who_else_is_there(
     model = MANY_BRANCHES[2] if name == "two branches" else MODELS[name]
     residuals = case_problem(request.getfixturevalue(arms), model, "steps", "few")
     x = samples(model, 40)
-    combine_misfits = residuals.condensed_responses(x)
+    together = residuals.condensed_responses(x)
     rng = np.random.default_rng(7)
     for count in (1, 1, 1, 2, 3, 7, 23, 40):
         chosen = rng.permutation(40)[:count]
-        np.testing.assert_array_equal(
-            residuals.condensed_responses(x[chosen]), combine_misfits[chosen]
-        )
+        np.testing.assert_array_equal(residuals.condensed_responses(x[chosen]), together[chosen])

@@ -130,10 +130,10 @@ def test_many_steps(gripper: Gripper) -> None:
 def test_a_sample_does_not_depend_on_the_others(gripper: Gripper) -> None:
     samples = np.concatenate(([CELL, DROP], random_samples(40, seed=4)))
     samples[7] = _critically_damped(gripper, CELL)
-    combine_misfits = ringing_responses(gripper, MODEL, STEPS, TIMES, samples)
+    together = ringing_responses(gripper, MODEL, STEPS, TIMES, samples)
     for index in range(len(samples)):
         alone = ringing_responses(gripper, MODEL, STEPS, TIMES, samples[index][None])[0]
-        np.testing.assert_array_equal(combine_misfits[index], alone)
+        np.testing.assert_array_equal(together[index], alone)
 
 
 def test_when_the_ring_is_over_it_is_as_without_inertia(

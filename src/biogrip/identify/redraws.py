@@ -62,9 +62,9 @@ def _side_by_side(
         rng.integers(_WORDS, size=2 * times * count, dtype=np.uint32).reshape(times, 2, count)
         for count, rng in zip(counts, rngs, strict=True)
     ]
-    combine_misfits = np.concatenate(words, axis=2)
-    drawn, doubtful = np.empty(combine_misfits.shape, dtype=np.int64), False
-    for (of_gene, of_value), (gene, value) in zip(combine_misfits, drawn, strict=True):
+    joined = np.concatenate(words, axis=2)
+    drawn, doubtful = np.empty(joined.shape, dtype=np.int64), False
+    for (of_gene, of_value), (gene, value) in zip(joined, drawn, strict=True):
         doubtful |= _scaled(of_gene, genome.genes, gene)
         doubtful |= _scaled(of_value, genome.values.take(gene), value)
         value += genome.low.take(gene)

@@ -186,7 +186,7 @@ def modes_of_many(
 
 
 def modes_with_slopes(
-    gripper: Gripper, complex_step_network: Network, tilt: float, count: int, *, symmetric: bool
+    gripper: Gripper, network: Network, tilt: float, count: int, *, symmetric: bool
 ) -> tuple[Array, Array, Array, Array]:
     """Compute rates and weights of the left arm, with derivatives by the log-parameters.
 
@@ -202,7 +202,7 @@ def modes_with_slopes(
     weight_slopes : (n_parameters, n_drives, n_modes, n)
     """
     arms = Arms(gripper, alike=symmetric and gripper.left == gripper.right)
-    given = arms.with_sample(separated(complex_step_network))
+    given = arms.with_sample(separated(network))
     parts = [
         of.reshape(*of.shape[:-1], count + 1, -1)
         for of in (given.weights, given.rates, given.level)

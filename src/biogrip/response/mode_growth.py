@@ -90,19 +90,19 @@ def _from_phase_to_phase(
         # The end of a phase is the initial state of the next.
         elapsed = np.append(time_s[here], starts[k + 1]) - start
         decay = 1 + _expm1(rate * elapsed)
-        grown, complex_step_network = reached * decay, (slanted + reached * elapsed) * decay
+        grown, grown_slope = reached * decay, (slanted + reached * elapsed) * decay
         for order, heights in enumerate(powers[k].T[..., None, None]):
             if heights.any():
                 one, its_slope = _growth(order, rate, elapsed)
-                grown, complex_step_network = (
+                grown, grown_slope = (
                     grown + heights * one,
-                    complex_step_network + heights * its_slope,
+                    grown_slope + heights * its_slope,
                 )
         for omega, amplitudes in swings[k]:
             swung = _swing(omega, rate, elapsed, amplitudes[:, None, None])
-            grown, complex_step_network = grown + swung[0], complex_step_network + swung[1]
-        growth[..., here], slope[..., here] = grown[..., :-1], complex_step_network[..., :-1]
-        reached, slanted = grown[..., -1:], complex_step_network[..., -1:]
+            grown, grown_slope = grown + swung[0], grown_slope + swung[1]
+        growth[..., here], slope[..., here] = grown[..., :-1], grown_slope[..., :-1]
+        reached, slanted = grown[..., -1:], grown_slope[..., -1:]
     return growth, slope
 
 

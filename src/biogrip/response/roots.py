@@ -81,7 +81,7 @@ def find_zeros(
     """
     off_diagonal = ~np.eye(z.shape[1], dtype=bool)
     with np.errstate(divide="ignore", invalid="ignore"):
-        refine_optima = resting = np.zeros((len(z), 1), dtype=bool)
+        converged = resting = np.zeros((len(z), 1), dtype=bool)
         for _ in range(_SWEEPS):
             newton = newton_step(z)
             distance = z[:, :, None] - z[:, None, :]
@@ -92,11 +92,11 @@ def find_zeros(
             # Converged points rest, so that their last bits do not depend on other functions.
             step = np.where(np.isfinite(step) & ~resting, step, 0)
             z = z - step
-            if np.all(refine_optima):
+            if np.all(converged):
                 break
             # The error is cubed in a sweep, so one more takes it below rounding.
-            resting = refine_optima
-            refine_optima = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
+            resting = converged
+            converged = np.all(np.abs(step) <= 1e-8 * np.abs(z), axis=1, keepdims=True)
     return z
 
 

@@ -296,14 +296,14 @@ def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool
 
     trace = without(functions.nuisance, functions.trace)
     explained = np.sum(fit.response**2)
-    left_over = np.sum((trace - fit.response) ** 2)
-    if np.sum(without(functions.constant, trace) ** 2) <= left_over:
+    rest = np.sum((trace - fit.response) ** 2)
+    if np.sum(without(functions.constant, trace) ** 2) <= rest:
         return False
     if noise_rad is not None:
         return bool(explained > noise_rad**2 * chdtri(fit.unknowns, FALSE_ALARM))
     freedom = functions.samples - fit.unknowns
     ratio = fdtri(fit.unknowns, freedom, 1 - FALSE_ALARM)
-    return bool(explained / fit.unknowns > ratio * left_over / freedom)
+    return bool(explained / fit.unknowns > ratio * rest / freedom)
 
 
 def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) -> bool:
