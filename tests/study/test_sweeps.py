@@ -182,6 +182,8 @@ def test_the_shipped_sweeps_cover_what_they_say() -> None:
     file = ROOT / "config" / "robustness.yaml"
     sweeps = yaml.safe_load(file.read_text())["sweeps"]
     study = load_study(yaml.safe_load(DEFAULT.read_text()) | {"sweeps": sweeps}, [DEFAULT, file])
-    count = {name: len(sweep.points("endothelial_cell")) for name, sweep in study.sweeps.items()}
+    count = {
+        name: len(sweep.points(name, "endothelial_cell")) for name, sweep in study.sweeps.items()
+    }
     assert count == {"noise": 28, "sampling": 15, "gripper": 25}
     assert len(study.points) == 3 * sum(count.values())

@@ -14,7 +14,7 @@ from biogrip.products.product import Reads
 from biogrip.products.stages.sweep_points import POINTS
 from biogrip.products.uses import marked
 from biogrip.study.study import Study
-from biogrip.study.sweeps import Axis
+from biogrip.study.sweeps import AxisBlock
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ def heat_maps(study: Study, job: Wildcards) -> HeatMaps:
     sweep = study.sweeps[job["sweep"]]
     titles = {name: study.cases[name].title for name in sweep.cases}
     return HeatMaps(
-        sweep.title,
+        sweep.title or job["sweep"],
         titles,
         study.identifiers,
         _shown(study, sweep.rows),
@@ -60,10 +60,10 @@ def heat_maps(study: Study, job: Wildcards) -> HeatMaps:
     )
 
 
-def _shown(study: Study, axis: Axis) -> ShownAxis:
-    keys = {key for value in axis.values for key in value.overrides}
-    title = axis.label + ", reconstructed" * any(map(study.is_reconstructed, keys))
-    return ShownAxis(title, {value.text: value.shown for value in axis.values})
+def _shown(study: Study, axis: AxisBlock) -> ShownAxis:
+    keys = {key for value in axis.levels for key in value.overrides}
+    title = axis.title + ", reconstructed" * any(map(study.is_reconstructed, keys))
+    return ShownAxis(title, {value.text: value.shown for value in axis.levels})
 
 
 POINTS_OF_CASES = Reads(

@@ -25,7 +25,7 @@ from biogrip.study.config import StudyConfig
 from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
 from biogrip.study.source import overlaid
-from biogrip.study.sweeps import Sweep, make_sweeps, point_blocks
+from biogrip.study.sweeps import SweepBlock, point_blocks
 from biogrip.traces.recordings import Columns
 
 if TYPE_CHECKING:
@@ -298,10 +298,10 @@ class Study:
         blocks = point_blocks(self.sweeps, self.config.cases)
         return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
 
-    @cached_property
-    def sweeps(self) -> dict[str, Sweep]:
+    @property
+    def sweeps(self) -> Mapping[str, SweepBlock]:
         """Sweeps by name."""
-        return make_sweeps(self.config.sweeps)
+        return self.config.sweeps
 
     @cached_property
     def interpretations(self) -> dict[str, dict[str, Case]]:

@@ -10,12 +10,9 @@ from biogrip.study.sweeps import (
     MOST_POINTS,
     AxisBlock,
     Point,
-    Sweep,
     SweepBlock,
     ValueBlock,
     list_points,
-    make_axis,
-    make_sweeps,
 )
 
 _AXES = ("rows", "columns")
@@ -31,19 +28,20 @@ def sweep_problems(
         for name, block in blocks.items()
         for path, text in _block_problems(block, cases)
     ]
-    sweeps = make_sweeps(blocks)
     points = sum(
-        len(sweep.cases) * len(sweep.rows.values) * len(sweep.columns.values)
-        for sweep in sweeps.values()
+        len(block.cases) * len(block.rows.values) * len(block.columns.values)
+        for block in blocks.values()
     )
     if not problems and points > MOST_POINTS:
         problems = [(("sweeps",), f"found {points} points, allowed are {MOST_POINTS} together.")]
     yield from problems
     if not problems:
-        yield from _name_problems(sweeps, cases)
+        yield from _name_problems(blocks, cases)
 
 
-def placed(by_name: Mapping[str, tuple[Sweep, Point]], problem: Problem) -> Problem:
+def placed(
+    sweeps: Mapping[str, SweepBlock], by_name: Mapping[str, tuple[str, Point]], problem: Problem
+) -> Problem:
     """Return a problem of a point's case, ``cases`` and its name leading the path, as the sweep's.
 
     It is one of the value that causes it.
@@ -54,11 +52,10 @@ def placed(by_name: Mapping[str, tuple[Sweep, Point]], problem: Problem) -> Prob
     for axis, value in zip(_AXES, (point.row, point.column), strict=True):
         for changed in value.overrides:
             if key == changed or key.startswith(f"{changed}."):
-                values = getattr(sweep, axis).values
-                index = next(i for i, other in enumerate(values) if other.name == value.name)
-                return ("sweeps", sweep.name, axis, "values", index), f"gives {key}: {text}"
+                index = getattr(sweeps[sweep], axis).levels.index(value)
+                return ("sweeps", sweep, axis, "values", index), f"gives {key}: {text}"
     shown = f"{point.row.text} and {point.column.text} for {point.case}"
-    return ("sweeps", sweep.name), f"{shown}: gives {key}: {text}"
+    return ("sweeps", sweep), f"{shown}: gives {key}: {text}"
 
 
 def _block_problems(block: SweepBlock, cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
@@ -71,13 +68,12 @@ def _block_problems(block: SweepBlock, cases: Mapping[str, CaseBlock]) -> Iterat
     for name, axis in axes.items():
         for path, text in _key_problems(axis):
             yield (name, *path), text
-        shown = [value.text for value in make_axis(axis).values]
+        shown = [value.text for value in axis.levels]
         for index, value in enumerate(shown):
             if value in shown[:index]:
                 yield (name, "values", index), f"is called '{value}' like one before it."
-    rows, columns = (make_axis(axis) for axis in axes.values())
-    ours = {key for value in rows.values for key in value.overrides}
-    for index, changing in enumerate(columns.values):
+    ours = {key for value in block.rows.levels for key in value.overrides}
+    for index, changing in enumerate(block.columns.levels):
         for key in changing.overrides:
             if key in ours:
                 yield ("columns", "values", index), f"sets {key}, which the rows do too."
@@ -109,18 +105,18 @@ def _dotted(block: Schema, path: str = "") -> Iterator[tuple[str, bool]]:
 
 
 def _name_problems(
-    sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
+    sweeps: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> Iterator[Problem]:
     found_before: set[str] = set()
     for sweep, point in list_points(sweeps):
         if point.name in cases:
-            text = f"is the name of a point of the sweep {sweep.name}; allowed is another name."
+            text = f"is the name of a point of the sweep {sweep}; allowed is another name."
             yield ("cases", point.name), text
         if point.name in found_before:
             text = f"has the point {point.name} twice; allowed is every combination once."
-            yield ("sweeps", sweep.name), text
+            yield ("sweeps", sweep), text
         found_before.add(point.name)
         if len(point.name) > _LONGEST_NAME:
             text = f"has the point {point.name[:60]}..., a name of {len(point.name)} characters; "
-            yield ("sweeps", sweep.name), f"{text}allowed are {_LONGEST_NAME} (it names files)."
+            yield ("sweeps", sweep), f"{text}allowed are {_LONGEST_NAME} (it names files)."
             return

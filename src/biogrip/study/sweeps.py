@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field, Tag
@@ -31,6 +32,20 @@ class ValueBlock(BaseModel):
     def changes(self) -> dict[str, float | str]:
         """Values by their keys."""
         return self.__pydantic_extra__
+
+
+@dataclass(frozen=True)
+class Value:
+    """A value on an axis of a sweep's grid."""
+
+    name: str
+    """Text for case names."""
+    text: str
+    """Text for files; numbers as in the config."""
+    shown: str
+    """Text for the axis; numbers in the axis' unit."""
+    overrides: dict[str, float | str]
+    """Values that replace those of the case, by dotted key."""
 
 
 @dataclass(frozen=True)
@@ -67,41 +82,23 @@ class AxisBlock(Block):
         """Dotted keys that change together."""
         return (self.key,) if isinstance(self.key, str) else self.key
 
+    @property
+    def title(self) -> str:
+        """Label with the unit."""
+        return self.label if self.unit is None else f"{self.label} ({self.unit})"
 
-@dataclass(frozen=True)
-class SweepBlock(Block):
-    """A grid of cases that differ from given cases in two values."""
+    @property
+    def levels(self) -> tuple[Value, ...]:
+        """Values with their texts, in the order of the config."""
+        return tuple(map(self._level, self.values))
 
-    cases: Annotated[tuple[str, ...], Field(min_length=1, max_length=16), Distinct()]
-    """Cases of the study that the grid is laid over."""
-    rows: AxisBlock
-    columns: AxisBlock
-    title: Printed | None = None
-    """Name in print; by default the sweep's name."""
-
-
-@dataclass(frozen=True)
-class Value:
-    """A value on an axis of a sweep's grid."""
-
-    name: str
-    """Text for case names."""
-    text: str
-    """Text for files; numbers as in the config."""
-    shown: str
-    """Text for the axis; numbers in the axis' unit."""
-    overrides: dict[str, float | str]
-    """Values that replace those of the case, by dotted key."""
-
-
-@dataclass(frozen=True)
-class Axis:
-    """One axis of a sweep's grid, with its values."""
-
-    label: str
-    """Title with unit."""
-    values: tuple[Value, ...]
-    """Values in the order of the config."""
+    def _level(self, value: float | str | ValueBlock) -> Value:
+        if isinstance(value, ValueBlock):
+            inner = {name: value.changes[name] for name in sorted(value.changes)}
+            overrides = {f"{key}.{name}": inner[name] for key in self.keys for name in inner}
+            return Value("-".join(map(_word, inner.values())), value.label, value.label, overrides)
+        shown = value if isinstance(value, str) else f"{value / self.unit_in_si:.4g}"
+        return Value(_word(value), _text(value), shown, dict.fromkeys(self.keys, value))
 
 
 @dataclass(frozen=True)
@@ -125,52 +122,34 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Sweep:
-    """A grid of values, laid over each of some cases."""
+class SweepBlock(Block):
+    """A grid of cases that differ from given cases in two values."""
 
-    name: str
-    """Name used in files."""
-    title: str
-    cases: tuple[str, ...]
-    """Names of cases of the study."""
-    rows: Axis
-    columns: Axis
+    cases: Annotated[tuple[str, ...], Field(min_length=1, max_length=16), Distinct()]
+    """Cases of the study that the grid is laid over."""
+    rows: AxisBlock
+    columns: AxisBlock
+    title: Printed | None = None
+    """Name in print; by default the sweep's name."""
 
-    def points(self, case: str) -> list[Point]:
-        """Return the points of one case, row by row."""
+    def points(self, name: str, case: str) -> list[Point]:
+        """Return the points of one case, row by row, of the sweep of a name."""
         return [
-            Point(f"{case}--{self.name}--{row.name}--{column.name}", case, row, column)
-            for row in self.rows.values
-            for column in self.columns.values
+            Point(f"{case}--{name}--{row.name}--{column.name}", case, row, column)
+            for row, column in product(self.rows.levels, self.columns.levels)
         ]
 
 
-def make_sweeps(blocks: Mapping[str, SweepBlock]) -> dict[str, Sweep]:
-    """Return the sweeps that a study's config defines."""
-    return {
-        name: Sweep(
-            name, block.title or name, block.cases, make_axis(block.rows), make_axis(block.columns)
-        )
-        for name, block in blocks.items()
-    }
-
-
-def make_axis(block: AxisBlock) -> Axis:
-    """Return the axis that a config block defines."""
-    unit = f" ({block.unit})" if block.unit is not None else ""
-    return Axis(block.label + unit, tuple(_values(block)))
-
-
-def list_points(sweeps: Mapping[str, Sweep]) -> Iterator[tuple[Sweep, Point]]:
-    """Yield every point of all sweeps with its sweep."""
-    for sweep in sweeps.values():
+def list_points(sweeps: Mapping[str, SweepBlock]) -> Iterator[tuple[str, Point]]:
+    """Yield every point of all sweeps with its sweep's name."""
+    for name, sweep in sweeps.items():
         for case in sweep.cases:
-            for point in sweep.points(case):
-                yield sweep, point
+            for point in sweep.points(name, case):
+                yield name, point
 
 
 def point_blocks(
-    sweeps: Mapping[str, Sweep], cases: Mapping[str, CaseBlock]
+    sweeps: Mapping[str, SweepBlock], cases: Mapping[str, CaseBlock]
 ) -> dict[str, dict[str, Any]]:
     """Return the config block of every point's case by name, as plain data, for checked sweeps."""
     found = {}
@@ -183,18 +162,6 @@ def point_blocks(
             block = _changed(block, key, int(value) if whole else value)
         found[point.name] = block
     return found
-
-
-def _values(axis: AxisBlock) -> Iterator[Value]:
-    for value in axis.values:
-        if isinstance(value, ValueBlock):
-            inner = {name: value.changes[name] for name in sorted(value.changes)}
-            overrides = {f"{key}.{name}": inner[name] for key in axis.keys for name in inner}
-            name = "-".join(map(_word, inner.values()))
-            yield Value(name, value.label, value.label, overrides)
-        else:
-            shown = value if isinstance(value, str) else f"{value / axis.unit_in_si:.4g}"
-            yield Value(_word(value), _text(value), shown, dict.fromkeys(axis.keys, value))
 
 
 def _text(value: float | str) -> str:

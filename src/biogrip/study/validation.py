@@ -18,7 +18,7 @@ from biogrip.study.messages import MOST_EXPLAINED, checked, inside, unknown
 from biogrip.study.plain import plain
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
-from biogrip.study.sweeps import list_points, make_sweeps, point_blocks
+from biogrip.study.sweeps import list_points, point_blocks
 
 T = TypeVar("T", bound=Shared)
 _SHOWN = 6
@@ -139,14 +139,15 @@ def _assumed_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
 
 def _point_problems(study: StudyConfig) -> Iterator[Problem]:
     """Check every point of every sweep as if it were a case of the config."""
-    sweeps = make_sweeps(study.sweeps)
-    by_name = {point.name: (sweep, point) for sweep, point in list_points(sweeps)}
-    for name, block in point_blocks(sweeps, study.cases).items():
+    by_name = {point.name: (sweep, point) for sweep, point in list_points(study.sweeps)}
+    for name, block in point_blocks(study.sweeps, study.cases).items():
         case, found = _with_methods(CaseBlock, block)
         if case and not found:
             found = list(case.comb_problems(study.actuator))
             found += [(path[2:], text) for path, text in _assumed_problems({name: case})]
-        yield from (placed(by_name, (("cases", name, *path), text)) for path, text in found)
+        yield from (
+            placed(study.sweeps, by_name, (("cases", name, *path), text)) for path, text in found
+        )
 
 
 def _reading_problems(study: StudyConfig) -> Iterator[Problem]:

@@ -106,7 +106,7 @@ def judged(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     files = []
     for n, case in enumerate(sweep.cases):
         rows = []
-        grid = list(all_pairs(sweep.rows.values, sweep.columns.values))
+        grid = list(all_pairs(sweep.rows.levels, sweep.columns.levels))
         for i, (row, column) in enumerate(grid):
             for j, method in enumerate(("genetic", "least_squares")):
                 for q, quantity in enumerate(("k", "k_p", "c", "c_p", "c + c_p")):

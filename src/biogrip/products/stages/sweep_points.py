@@ -54,7 +54,7 @@ class SweepContent:
 
 def describe_sweep(study: Study, job: Wildcards) -> SweepContent:
     """Return the sweep of a job's case."""
-    points = study.sweeps[job["sweep"]].points(job["case"])
+    points = study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
     places = {point.name: (point.row.text, point.column.text) for point in points}
     shown = each(lambda _: places, "problem noise sampling")
     view = using("methods near_noise_tolerance", points=shown)
@@ -187,17 +187,17 @@ def _text(number: float) -> str:
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:
-    sweeps = plan.study.sweeps.values()
-    return [{"sweep": sweep.name, "case": case} for sweep in sweeps for case in sweep.cases]
+    sweeps = plan.study.sweeps.items()
+    return [{"sweep": name, "case": case} for name, sweep in sweeps for case in sweep.cases]
 
 
 def _identifications(plan: Plan, job: Wildcards) -> list[str]:
-    points = plan.study.sweeps[job["sweep"]].points(job["case"])
+    points = plan.study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
     return [PATH.format(case=point.name) for point in points]
 
 
 def _calibrations(plan: Plan, job: Wildcards) -> list[str]:
-    points = plan.study.sweeps[job["sweep"]].points(job["case"])
+    points = plan.study.sweeps[job["sweep"]].points(job["sweep"], job["case"])
     relying = [point.name for point in points if plan.study.points[point.name].is_calibrated]
     return [CALIBRATIONS.format(case=name) for name in relying]
 
