@@ -1,35 +1,42 @@
 """Typed access to a checked config: the study and its cases."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from biogrip.design.settings import DesignSettings
-from biogrip.experiment.noise import Noise
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
 from biogrip.experiment.sampling import Sampling
-from biogrip.experiment.truth import UNPUBLISHED, Published, Truth
-from biogrip.identifiability.posterior_settings import PosteriorSettings
+from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS, Method
-from biogrip.instrument.actuator import CombDrive
-from biogrip.instrument.calibration import CalibrationTest
 from biogrip.instrument.gripper import Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
 from biogrip.study.source import overlaid
-from biogrip.study.sweeps import SweepBlock, point_blocks
-from biogrip.traces.recordings import Columns
+from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
     from biogrip.identify.least_squares import LeastSquaresSettings
+
+_Part = TypeVar("_Part")
+
+
+def _of_case(part: Callable[["Case"], _Part]) -> cached_property[_Part]:
+    """Make an attribute of a case, with the type of what the function returns."""
+    return cached_property(part)
+
+
+def _of_study(part: Callable[["Study"], _Part]) -> cached_property[_Part]:
+    """Make an attribute of a study, with the type of what the function returns."""
+    return cached_property(part)
 
 
 @dataclass(frozen=True)
@@ -42,30 +49,48 @@ class Case:
     """Config block, with the study's blocks merged in."""
     study: "Study"
 
+    recorded = _of_case(lambda case: case.block.recorded)
+    """True if the trace was recorded, not simulated."""
+    actuator = _of_case(lambda case: case.study.config.actuator)
+    """Comb drive of the study."""
+    sample = _of_case(lambda case: case.block.sample.sample)
+    """Constitutive model."""
+    size_m = _of_case(lambda case: case.block.sample.size_m)
+    """Diameter of the sample, if it is given."""
+    published = _of_case(lambda case: case.block.published or UNPUBLISHED)
+    """Results that the paper reports for the sample."""
+    noise = _of_case(lambda case: case.block.measurement.noise)
+    """Noise to add to the simulated rotation."""
+    sampling = _of_case(lambda case: case.block.measurement.sampling)
+    """Sampling of the rotation."""
+    nonlinear_target = _of_case(lambda case: case.block.models.target == "nonlinear")
+    """True if the target is simulated with the nonlinear equations."""
+    unilateral = _of_case(lambda case: case.block.contact == "unilateral")
+    """True if the target's jaws cannot pull: contact is lost where the force turns tensile."""
+    file = _of_case(lambda case: case.block.measurement.file or "")
+    """Path of the recorded trace; empty for a simulated case."""
+    columns = _of_case(lambda case: case.block.measurement.columns)
+    """Columns of a recorded trace's file."""
+    is_calibrated = _of_case(lambda case: case.block.assumed_gripper == CALIBRATED)
+    """True if identification takes the gripper's arms from a calibration."""
+    calibration = _of_case(lambda case: case.block.calibration)
+    """Settings of the calibration test without sample."""
+    confidence = _of_case(lambda case: case.block.identifiability.confidence)
+    """Confidence level of all intervals."""
+    posterior = _of_case(lambda case: case.block.posterior)
+    """Settings of posterior sampling, if the posterior is sampled."""
+    verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
+    """Seeds of the coverage test that are multiples of this get verdicts, too."""
+
     @property
     def title(self) -> str:
         """Title in tables and figures."""
         return self.name if self.block.title is None else self.block.title
 
     @property
-    def recorded(self) -> bool:
-        """True if the trace was recorded, not simulated."""
-        return self.block.recorded
-
-    @property
     def seeds(self) -> int:
         """Number of traces; 1 for a recorded trace."""
         return 1 if self.recorded else self.study.config.seeds
-
-    @property
-    def actuator(self) -> CombDrive:
-        """Comb drive of the study."""
-        return self.study.actuator
-
-    @cached_property
-    def sample(self) -> Sample:
-        """Constitutive model."""
-        return self.block.sample.sample
 
     @property
     def parameters(self) -> dict[str, float]:
@@ -77,19 +102,9 @@ class Case:
         return searched.named_in_order(known) if whole else known
 
     @property
-    def size_m(self) -> float | None:
-        """Diameter of the sample, if it is given."""
-        return self.block.sample.size_m
-
-    @property
     def fixed(self) -> dict[str, float]:
         """Parameters that are not identified, by name."""
         return {name: float(value) for name, value in self.block.known.items()}
-
-    @property
-    def published(self) -> Published:
-        """Results that the paper reports for the sample."""
-        return self.block.published or UNPUBLISHED
 
     @property
     def truth(self) -> Truth:
@@ -135,54 +150,14 @@ class Case:
         return self.block.design
 
     @property
-    def noise(self) -> Noise:
-        """Noise to add to the simulated rotation."""
-        return self.block.measurement.noise
-
-    @property
-    def sampling(self) -> Sampling:
-        """Sampling of the rotation."""
-        return self.block.measurement.sampling
-
-    @property
     def samples(self) -> int:
         """Number of samples in a simulated trace."""
         return len(self.sampling.over(torque_history(self.phases).end_s))
 
     @property
-    def nonlinear_target(self) -> bool:
-        """True if the target is simulated with the nonlinear equations."""
-        return self.block.models.target == "nonlinear"
-
-    @property
-    def unilateral(self) -> bool:
-        """True if the target's jaws cannot pull: contact is lost where the force turns tensile."""
-        return self.block.contact == "unilateral"
-
-    @property
-    def file(self) -> str:
-        """Path of the recorded trace; empty for a simulated case."""
-        return self.block.measurement.file or ""
-
-    @property
-    def columns(self) -> Columns:
-        """Columns of a recorded trace's file."""
-        return self.block.measurement.columns
-
-    @property
     def ranges(self) -> dict[str, GeneRange]:
         """Search ranges by name."""
         return dict(vars(self.block.search_range))
-
-    @property
-    def is_calibrated(self) -> bool:
-        """True if identification takes the gripper's arms from a calibration."""
-        return self.block.assumed_gripper == CALIBRATED
-
-    @property
-    def calibration(self) -> CalibrationTest:
-        """Settings of the calibration test without sample."""
-        return self.block.calibration
 
     @cached_property
     def problem(self) -> CaseProblem:
@@ -246,16 +221,6 @@ class Case:
         return {name: CANDIDATES[name] for name in names}
 
     @property
-    def confidence(self) -> float:
-        """Confidence level of all intervals."""
-        return self.block.identifiability.confidence
-
-    @property
-    def posterior(self) -> PosteriorSettings | None:
-        """Settings of posterior sampling, if the posterior is sampled."""
-        return self.block.posterior
-
-    @property
     def compared_models(self) -> dict[str, Sample]:
         """Sample models whose evidence is compared, by name; none if it is not asked for."""
         compared = self.posterior and self.posterior.evidence and not self.fixed
@@ -266,11 +231,6 @@ class Case:
         """Number of seeds to test the coverage of intervals with; 0 without noise."""
         tried = not self.recorded and not self.noise.absent
         return self.block.identifiability.coverage_seeds if tried else 0
-
-    @property
-    def verdicts_every(self) -> int:
-        """Seeds of the coverage test that are multiples of this get verdicts, too."""
-        return self.block.identifiability.verdicts_every
 
     @property
     def has_valley(self) -> bool:
@@ -287,6 +247,27 @@ class Study:
     config: StudyConfig
     """The whole config, with the study's blocks merged into every case."""
 
+    sweeps = _of_study(lambda study: study.config.sweeps)
+    """Sweeps by name."""
+    study_seed = _of_study(lambda study: study.config.study_seed)
+    """Seed from which all random streams are derived."""
+    selects_models = _of_study(lambda study: bool(study.config.model_selection.models))
+    """True if every trace is fitted with several sample models."""
+    batch_size = _of_study(lambda study: study.config.batch_size)
+    """Number of seeds per job, if the config sets it."""
+    near_noise_tolerance = _of_study(lambda study: study.config.evaluation.near_noise_tolerance)
+    """Share by which the misfit may exceed the noise, to count as near the noise."""
+    optimum_tolerance = _of_study(lambda study: study.config.evaluation.optimum_tolerance)
+    """Increase of chi^2 over the lowest known that still counts as the global optimum."""
+    gripper = _of_study(lambda study: study.config.gripper.neutral)
+    """The gripper in its neutral configuration."""
+    jaw_gap_m = _of_study(lambda study: study.config.gripper.jaw_gap_m)
+    """Distance between the jaws in the neutral configuration."""
+    actuator = _of_study(lambda study: study.config.actuator)
+    """The comb drive of both arms."""
+    reconstructed = _of_study(lambda study: study.config.reconstructed)
+    """Dotted keys, or whole blocks, whose values the paper omits."""
+
     @cached_property
     def cases(self) -> dict[str, Case]:
         """Cases by name, in the order of the config."""
@@ -297,11 +278,6 @@ class Study:
         """Cases of all points of the sweeps, by name."""
         blocks = point_blocks(self.sweeps, self.config.cases)
         return self._cases({name: built(CaseBlock, block) for name, block in blocks.items()})
-
-    @property
-    def sweeps(self) -> Mapping[str, SweepBlock]:
-        """Sweeps by name."""
-        return self.config.sweeps
 
     @cached_property
     def interpretations(self) -> dict[str, dict[str, Case]]:
@@ -319,11 +295,6 @@ class Study:
     def case(self, name: str) -> Case:
         """Return a case of the study or of a sweep's point."""
         return self.cases[name] if name in self.cases else self.points[name]
-
-    @property
-    def study_seed(self) -> int:
-        """Seed from which all random streams are derived."""
-        return self.config.study_seed
 
     @property
     def methods(self) -> list[str]:
@@ -356,41 +327,6 @@ class Study:
         return {name: block.title for name, block in self.config.interpretations.items()}
 
     @property
-    def selects_models(self) -> bool:
-        """True if every trace is fitted with several sample models."""
-        return bool(self.config.model_selection.models)
-
-    @property
-    def batch_size(self) -> int | None:
-        """Number of seeds per job, if the config sets it."""
-        return self.config.batch_size
-
-    @property
-    def near_noise_tolerance(self) -> float:
-        """Share by which the misfit may exceed the noise, to count as near the noise."""
-        return self.config.evaluation.near_noise_tolerance
-
-    @property
-    def optimum_tolerance(self) -> float:
-        """Increase of chi^2 over the lowest known that still counts as the global optimum."""
-        return self.config.evaluation.optimum_tolerance
-
-    @property
-    def gripper(self) -> Gripper:
-        """The gripper in its neutral configuration."""
-        return self.config.gripper.neutral
-
-    @property
-    def jaw_gap_m(self) -> float:
-        """Distance between the jaws in the neutral configuration."""
-        return self.config.gripper.jaw_gap_m
-
-    @property
-    def actuator(self) -> CombDrive:
-        """The comb drive of both arms."""
-        return self.config.actuator
-
-    @property
     def phases(self) -> tuple[Phase, ...]:
         """Protocol of all cases if it is the same, else of the study."""
         own = {case.phases for case in self.cases.values()}
@@ -406,11 +342,6 @@ class Study:
     def ranges(self) -> dict[str, GeneRange]:
         """Search ranges of the study, for cases that do not change them."""
         return dict(vars(self.config.search_range))
-
-    @property
-    def reconstructed(self) -> tuple[str, ...]:
-        """Dotted keys, or whole blocks, whose values the paper omits."""
-        return self.config.reconstructed
 
     def is_reconstructed(self, key: str) -> bool:
         """Return whether a dotted key is marked as reconstructed, i.e. omitted in the paper."""
