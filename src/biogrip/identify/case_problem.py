@@ -25,49 +25,37 @@ from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
 
 @dataclass(frozen=True)
 class CaseProblem:
-    """Assumptions of the identification that all traces of a case share.
-
-    Parameters
-    ----------
-    gripper, ranges, noise_rad
-        As in `make_problem`.
-    nonlinear
-        True to simulate the nonlinear model.
-    offset, drift
-        True if the instrument may have added a constant, or a drift linear in time.
-    noise_share
-        Standard deviation of the noise as a share of the rotation; read by `read_checked`.
-    sd_rad : (n_samples,), optional
-        Standard deviations of the readings of a trace, see `weighted`.
-    coloured
-        True if the noise of a trace may be autocorrelated, see `trace_fit`.
-    uncertainty
-        Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
-        ``gripper`` itself; and ``share`` of the ``torque``.
-    phases
-        The protocol.
-    sample
-        Constitutive model.
-    fixed
-        Parameters that are known, by name.
-    fit_start
-        True if the time at which the protocol started is fitted along, see `fitted_onset`.
-    """
+    """Assumptions of the identification that all traces of a case share."""
 
     gripper: Gripper
+    """Gripper of the simulated responses."""
     phases: tuple[Phase, ...]
+    """The protocol."""
     ranges: Mapping[str, GeneRange]
+    """Search ranges by `Parameter.range_name`."""
     sample: Sample
+    """Constitutive model."""
     fixed: Mapping[str, float]
+    """Parameters that are known, by name."""
     nonlinear: bool = False
+    """True to simulate the nonlinear model."""
     offset: bool = False
+    """True if the instrument may have added a constant."""
     drift: bool = False
+    """True if it may have added a drift linear in time."""
     noise_rad: float | None = None
+    """Standard deviation of the noise, if it is known."""
     noise_share: float | None = None
+    """Standard deviation of the noise as a share of the rotation; read by `read_checked`."""
     sd_rad: Array | None = field(default=None, compare=False)
+    """Standard deviations of the readings of a trace, see `weighted`, (n_samples,)."""
     coloured: bool = False
+    """True if the noise of a trace may be autocorrelated, see `trace_fit`."""
     uncertainty: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """Standard uncertainties by part and key: of ``left`` and ``right``, the arms; of the
+    ``gripper`` itself; and ``share`` of the ``torque``."""
     fit_start: bool = False
+    """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
     _condensed: dict[tuple[bytes, bool], Condensed] = field(
         default_factory=dict, init=False, compare=False
     )

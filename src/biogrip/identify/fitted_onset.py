@@ -27,21 +27,14 @@ _NEAR, _ROUNDING = 3.0, 1e-6
 
 @dataclass(frozen=True)
 class OnsetFit:
-    """Best fit of a trace for one onset.
-
-    Parameters
-    ----------
-    onset_s
-        The onset, on the trace's clock.
-    log_parameters : (n_parameters,)
-        Sample parameters.
-    misfit_rad
-        RMS misfit.
-    """
+    """Best fit of a trace for one onset."""
 
     onset_s: float
+    """The onset, on the trace's clock."""
     log_parameters: Array
+    """Sample parameters, (n_parameters,)."""
     misfit_rad: float
+    """RMS misfit."""
 
 
 class OnsetFits:

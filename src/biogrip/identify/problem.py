@@ -17,25 +17,18 @@ from biogrip.response.residuals import Residuals
 
 @dataclass(frozen=True)
 class Problem:
-    """The identification of one trace, in the form that every method takes.
-
-    Parameters
-    ----------
-    misfit
-        RMS misfit in rad of parameters of shape (n, n_parameters).
-    residuals
-        Residuals and exact derivatives, as functions of log-parameters.
-    genome
-        Encoding of the parameters for the genetic algorithm.
-    low, high : (n_parameters,)
-        Logarithms of the ends of the search range (Table 4).
-    """
+    """The identification of one trace, in the form that every method takes."""
 
     misfit: Misfit
+    """RMS misfit in rad of parameters of shape (n, n_parameters)."""
     residuals: Residuals
+    """Residuals and exact derivatives, as functions of log-parameters."""
     genome: Genome
+    """Encoding of the parameters for the genetic algorithm."""
     low: Array
+    """Logarithms of the lower ends of the search range (Table 4), (n_parameters,)."""
     high: Array
+    """Those of the upper ends."""
 
     def without_inertia(self) -> "Problem":
         """Return the same problem with the inertia of the arms neglected."""

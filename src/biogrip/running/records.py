@@ -29,31 +29,22 @@ _LONGEST_NAME, _LONGEST_PATH = 255, 4095
 
 @dataclass(frozen=True)
 class Record:
-    """Record of a file at the time it was written.
-
-    Parameters
-    ----------
-    path
-        Path relative to the results folder, with forward slashes.
-    size, sha256
-        Number of bytes, and hash; the hash is empty while a log or a scratch file is written.
-    modified_ns
-        Modification time of the file.
-    recorded_ns
-        Time of this record.
-    settings
-        Digest of settings and code that made it; empty if it was not made by a job.
-    inputs
-        Digest of its input files.
-    """
+    """Record of a file at the time it was written."""
 
     path: str
+    """Path relative to the results folder, with forward slashes."""
     size: int
+    """Number of bytes."""
     sha256: str
+    """Hash; empty while a log or a scratch file is written."""
     modified_ns: int
+    """Modification time of the file."""
     recorded_ns: int
+    """Time of this record."""
     settings: str = ""
+    """Digest of settings and code that made it; empty if it was not made by a job."""
     inputs: str = ""
+    """Digest of its input files."""
 
     def __post_init__(self) -> None:
         """Refuse values that biogrip does not write."""

@@ -32,24 +32,16 @@ GROUPS = {
 
 @dataclass(frozen=True)
 class ProductRule:
-    """A Snakemake rule: products that one job makes.
-
-    Parameters
-    ----------
-    name
-        Name of the rule.
-    products
-        Products of each job.
-    plan
-        Plan of the study's jobs.
-    jobs
-        Wildcards of all its jobs.
-    """
+    """A Snakemake rule: products that one job makes."""
 
     name: str
+    """Name of the rule."""
     products: tuple[Product, ...]
+    """Products of each job."""
     plan: Plan
+    """Plan of the study's jobs."""
     jobs: tuple[Wildcards, ...] = ()
+    """Wildcards of all its jobs."""
 
     @property
     def wildcards(self) -> list[str]:

@@ -68,45 +68,30 @@ class _Functions:
 
     All tests need only inner products. The functions themselves would take too much memory for
     a million samples.
-
-    Parameters
-    ----------
-    lagged : (n_lagged, n_rows)
-        Lagged torques, first of the left arm, then of the difference of both.
-    nuisance : (n_functions, n_rows)
-        Orthonormal nuisance functions of the instrument.
-    constant : (1, n_rows)
-        Constant function of norm 1.
-    trace : (n_rows,)
-        Measured rotation in rad.
-    samples
-        Number of samples that the vectors stand for.
     """
 
     lagged: Array
+    """Lagged torques, first of the left arm, then of the difference of both, (n_lagged, n_rows)."""
     nuisance: Array
+    """Orthonormal nuisance functions of the instrument, (n_functions, n_rows)."""
     constant: Array
+    """Constant function of norm 1, (1, n_rows)."""
     trace: Array
+    """Measured rotation in rad, (n_rows,)."""
     samples: int
+    """Number of samples that the vectors stand for."""
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """Fit of a trace by lagged torques.
-
-    Parameters
-    ----------
-    response : (n_rows,)
-        Fitted part of the trace, without nuisance functions.
-    weights : (n_lagged,)
-        Weights of the lagged torques.
-    unknowns
-        Number of linearly independent lagged torques.
-    """
+    """Fit of a trace by lagged torques."""
 
     response: Array
+    """Fitted part of the trace, without nuisance functions, (n_rows,)."""
     weights: Array
+    """Weights of the lagged torques, (n_lagged,)."""
     unknowns: int
+    """Number of linearly independent lagged torques."""
 
 
 def check_recording(

@@ -49,35 +49,26 @@ _UNIT_AT_END = re.compile(r"(?:_(\w+)|\(([^()]*)\)|\[([^\[\]]*)\])$")
 
 @dataclass(frozen=True)
 class Columns:
-    """Names and units of the columns of a trace.
-
-    Parameters
-    ----------
-    time, rotation
-        Names of the columns.
-    time_unit, rotation_unit
-        Keys of `TIME_UNITS` and `ROTATION_UNITS`; None if the column's name ends with the unit.
-    skip
-        Number of lines before the header.
-    scale
-        Rotation in its unit over the number in the column.
-    start_s
-        Time of the clock at which the protocol starts, if it is known.
-    by_options
-        True if command-line options set them, false for config keys; used in messages.
-    sd
-        Name of the column of the rotations' standard deviations, in their unit, if there is one.
-    """
+    """Names and units of the columns of a trace."""
 
     time: str
+    """Name of the column of times."""
     rotation: str
+    """Name of that of rotations."""
     time_unit: str | None = None
+    """Key of `TIME_UNITS`; None if the column's name ends with the unit."""
     rotation_unit: str | None = None
+    """Key of `ROTATION_UNITS`, likewise."""
     skip: int = 0
+    """Number of lines before the header."""
     scale: float = 1.0
+    """Rotation in its unit over the number in the column."""
     start_s: float | None = None
+    """Time of the clock at which the protocol starts, if it is known."""
     by_options: bool = False
+    """True if command-line options set them, false for config keys; used in messages."""
     sd: str | None = None
+    """Name of the column of the rotations' standard deviations, in their unit, if there is one."""
 
     @property
     def named(self) -> dict[str, str]:
@@ -88,44 +79,30 @@ class Columns:
 
 @dataclass(frozen=True)
 class Recording:
-    """A recorded trace.
-
-    Parameters
-    ----------
-    time_s, rotation_rad : (n_samples,)
-        Strictly increasing times, and the left arm's closing rotation.
-    lines : (n_samples,)
-        Line number of each sample, from 1.
-    without_number
-        Number of rows left out as gaps.
-    sd_rad : (n_samples,) or None
-        Standard deviations of the rotations, where the file has them.
-    """
+    """A recorded trace."""
 
     time_s: Array
+    """Strictly increasing times, (n_samples,)."""
     rotation_rad: Array
+    """Closing rotation of the left arm, (n_samples,)."""
     lines: IntArray
+    """Line number of each sample, from 1, (n_samples,)."""
     without_number: int
+    """Number of rows left out as gaps."""
     sd_rad: Array | None = None
+    """Standard deviations of the rotations, (n_samples,), where the file has them."""
 
 
 @dataclass(frozen=True)
 class _Layout:
-    """Layout of a file, as its header tells it.
-
-    Parameters
-    ----------
-    separator
-        Cell separator.
-    width
-        Number of columns.
-    indices
-        Indices of the columns to read by name, in the order of reading.
-    """
+    """Layout of a file, as its header tells it."""
 
     separator: str
+    """Cell separator."""
     width: int
+    """Number of columns."""
     indices: dict[str, int]
+    """Indices of the columns to read by name, in the order of reading."""
 
 
 def read_recording(path: Path, columns: Columns) -> Recording:

@@ -59,51 +59,33 @@ _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
 @dataclass(frozen=True)
 class Entry:
-    """A figure or table in the report.
-
-    Parameters
-    ----------
-    name, whose
-        Name of the product, and of its case or sweep, if any.
-    caption
-        Caption.
-    file
-        Path among the results.
-    rule
-        Snakemake rule that makes it.
-    command
-        Command that makes it again.
-    """
+    """A figure or table in the report."""
 
     name: str
+    """Name of the product."""
     whose: str
+    """Name of its case or sweep, if any."""
     caption: str
     file: str
+    """Path among the results."""
     rule: str
+    """Snakemake rule that makes it."""
     command: str
+    """Command that makes it again."""
 
 
 @dataclass(frozen=True)
 class Content:
-    """Content of the report, except results.
-
-    Parameters
-    ----------
-    study
-        The study with the cases of the explorer and the methods.
-    figures, tables
-        Other content of the report.
-    config
-        The whole config, YAML.
-    sources
-        Sources of the page, by file name.
-    """
+    """Content of the report, except results."""
 
     study: Study
+    """The study with the cases of the explorer and the methods."""
     figures: tuple[Entry, ...]
     tables: tuple[Entry, ...]
     config: str
+    """The whole config, YAML."""
     sources: Mapping[str, str]
+    """Sources of the page, by file name."""
 
 
 _STUDY = using(
