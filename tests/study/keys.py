@@ -1,7 +1,7 @@
 """The keys that a config may have, as its schema says."""
 
-from biogrip.study.reference import documented
 from biogrip.study.schema import Schema
+from tests.helpers.key_reference import documented
 
 STUDY = Schema(documented(), documented()["$defs"])
 

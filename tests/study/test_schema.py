@@ -10,8 +10,8 @@ from jsonschema import Draft202012Validator
 
 from biogrip.identify.methods import METHODS
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.reference import file_schema
 from biogrip.study.source import read_config
+from tests.helpers.key_reference import file_schema
 from tests.study.keys import STUDY, leaves
 
 CONFIG = Path(__file__).parents[2] / "config"
