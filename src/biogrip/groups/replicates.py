@@ -54,6 +54,11 @@ class JointResiduals(Residuals):
         """Degrees of freedom after the nuisance terms are fitted."""
         return sum(part.free for part in self._parts)
 
+    @property
+    def sampling_s(self) -> None:
+        """None, for each trace has its own times."""
+        return None
+
     def grip(self, log_parameters: Array) -> Grip:
         """Force of the jaws on the sample; the protocol is the same for all traces."""
         return self._parts[0].grip(log_parameters)

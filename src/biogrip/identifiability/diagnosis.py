@@ -10,6 +10,7 @@ from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTION, Note,
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.range_ends import note_range_ends
+from biogrip.identifiability.slow_misfit import has_fast_noise
 from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -158,11 +159,22 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     bulk = even[~outliers_of(even, residuals.rounding_rad)]
     bulk_rad = float(np.sqrt(np.mean(bulk**2)))
     if bulk_rad > _TOO_MUCH * scale:
-        yield Note(
-            REJECTION,
-            f"The misfit is {bulk_rad / scale:.2g} times the noise of the trace: the model, the "
-            "protocol, the gripper or the unit is not the right one.",
+        yield _misfit(likelihood, bulk_rad / scale)
+
+
+def _misfit(likelihood: Likelihood, times: float) -> Note:
+    """Return the note on a misfit that is some times the noise."""
+    if has_fast_noise(likelihood.problem.residuals, likelihood.best):
+        return Note(
+            DOUBT,
+            f"The misfit is {times:.2g} times the noise of neighbouring readings, as of noise that "
+            "is correlated for a short time: the intervals are too narrow.",
         )
+    return Note(
+        REJECTION,
+        f"The misfit is {times:.2g} times the noise of the trace: the model, the protocol, the "
+        "gripper or the unit is not the right one.",
+    )
 
 
 def _too_little(likelihood: Likelihood) -> bool:

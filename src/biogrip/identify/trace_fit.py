@@ -30,9 +30,6 @@ _CONVERGED = 1e-2
 # The same of a fit that moves by less, in standard deviations.
 _STAYED = 0.03
 _WORTH_SAYING = 0.005
-# Noise that is correlated over a longer share of the trace is no noise, if it has a noticeable
-# share of the variance; nor is one that has most of the variance and is slower than the third.
-_LONGEST, _MOST, _SLOW, _NOTICEABLE = 0.2, 0.5, 0.02, 1 / 3
 
 Find = Callable[[Problem], Identification]
 """Function that finds the global optimum of a problem."""
@@ -63,21 +60,6 @@ class TraceFit:
             "degrees_of_freedom": rounded(self.problem.residuals.freedom),
             "outliers": int(np.count_nonzero(self.outliers)),
         }
-
-    def swallowed(self) -> str | None:
-        """Say in a sentence if the noise model holds what looks like misfit; else None."""
-        if self.noise_model is None or self.noise_model.ar1 < _NOTICEABLE:
-            return None
-        share, time_s = self.noise_model.ar1, self.noise_model.time_s
-        duration_s = self.problem.residuals.duration_s
-        long = time_s > _LONGEST * duration_s
-        if not long and not (share > _MOST and time_s > _SLOW * duration_s):
-            return None
-        return (
-            f"What the fit leaves is correlated over {time_s:.2g} s of a trace of "
-            f"{duration_s:.3g} s, {_percent(share)} of its variance: that is misfit, not noise. "
-            "The model, the protocol, the gripper or the unit is not the right one."
-        )
 
     def notes(self) -> list[str]:
         """Describe the estimated noise model in sentences."""

@@ -79,6 +79,11 @@ class Residuals:
         """Number of readings minus that of nuisance functions of free amplitude."""
         return self.samples - taken_out(self._condensed.nuisance)
 
+    @property
+    def sampling_s(self) -> Array | None:
+        """Ascending sampling times, (n_samples,); None of several traces together."""
+        return self._time_s
+
     def grip(self, log_parameters: Array) -> Grip:
         """Return the force with which the jaws press a sample or would have to pull it."""
         network = self.model.network(np.exp(log_parameters))

@@ -9,9 +9,10 @@ from biogrip.experiment.noise import rms, standard_deviation
 from biogrip.experiment.random_streams import stream
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.fit_status import HARMLESS, REJECTION, Note
+from biogrip.identifiability.fit_status import HARMLESS, Note
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identifiability.onset_profiles import profile_over_onset
+from biogrip.identifiability.slow_misfit import find_slow_misfit
 from biogrip.identifiability.valley import compute_valley
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
@@ -70,9 +71,11 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
 
 def notes_on_fit(fit: TraceFit) -> list[Note]:
     """Return notes on the noise model of a fit; one that holds misfit rejects the fit."""
-    swallowed = fit.swallowed()
-    rejected = [Note(REJECTION, swallowed)] if swallowed else []
-    return [*rejected, *(Note(HARMLESS, text) for text in fit.notes())]
+    notes = [Note(HARMLESS, text) for text in fit.notes()]
+    if fit.noise_model is None:
+        return notes
+    misfit = find_slow_misfit(fit.noise_model, fit.problem.residuals.duration_s)
+    return [misfit, *notes] if misfit else notes
 
 
 def _diagnosed(

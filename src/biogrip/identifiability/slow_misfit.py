@@ -1,0 +1,52 @@
+"""Misfit that looks like noise: correlated for too long, or in one stretch of the trace only."""
+
+import numpy as np
+
+from biogrip.arrays import Array
+from biogrip.identifiability.fit_status import DOUBT, REJECTION, Note
+from biogrip.identify.noise_model_fit import NoiseModelLikelihood
+from biogrip.response.residuals import Residuals
+from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
+
+# Autocorrelated noise with most of the variance, and slower than this share of the trace, is
+# misfit. It may be misfit if it has a noticeable share and lasts for longer.
+_MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
+# Of so many stretches of a trace with stationary noise, which is correlated for less than half a
+# stretch, none has so large a share of the sum of squares.
+_STRETCHES, _IN_ONE = 20, 0.3
+
+
+def find_slow_misfit(noise_model: NoiseModel, duration_s: float) -> Note | None:
+    """Return a note if the autocorrelated part of a noise model is, or may be, misfit."""
+    share, time_s = noise_model.ar1, noise_model.time_s
+    misfit = share > _MOST and time_s > _SLOW * duration_s
+    if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
+        return None
+    meaning = (
+        "that is misfit, not noise. The model, the protocol, the gripper or the unit is not the "
+        "right one."
+        if misfit
+        else "that may be misfit, of a model, protocol or gripper that is not the right one."
+    )
+    return Note(
+        REJECTION if misfit else DOUBT,
+        f"What the fit leaves is correlated over {time_s:.2g} s of a trace of {duration_s:.3g} s, "
+        f"{100 * share:.0f} % of its variance: {meaning}",
+    )
+
+
+def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
+    """Return True if what a fit leaves is stationary noise that is correlated for a short time.
+
+    False also where that is not estimated: of several traces together, of very many readings, and
+    of residuals that are white already.
+    """
+    time_s = residuals.sampling_s
+    if time_s is None or residuals.coloured or len(time_s) > MOST_SAMPLES:
+        return False
+    residual, sensitivity = residuals(log_parameters)
+    stretches = np.array_split(np.square(residual), min(_STRETCHES, len(residual)))
+    if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
+        return False
+    noise_model = NoiseModelLikelihood(time_s, residual, sensitivity).best()
+    return find_slow_misfit(noise_model, residuals.duration_s) is None
