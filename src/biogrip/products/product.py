@@ -51,8 +51,14 @@ def the(pattern: str) -> Reads:
 
 
 def of_cases(pattern: str, cases: Callable[[Study], Iterable[str]]) -> Reads:
-    """Return the input that has one file per case."""
-    return Reads(lambda plan, _: [pattern.format(case=name) for name in cases(plan.study)])
+    """Return the input that has one file per case, or one per batch where the pattern has it."""
+    if "{batch}" not in pattern:
+        return Reads(lambda plan, _: [pattern.format(case=name) for name in cases(plan.study)])
+    return Reads(
+        lambda plan, _: [
+            file for name in cases(plan.study) for file in plan.batch_files(pattern, name)
+        ]
+    )
 
 
 def of_batches(pattern: str) -> Reads:

@@ -155,7 +155,7 @@ def write(
         )
     ]
     data = explorer_data(cases, files, list(shown.study.identifiers.values()))
-    shown_tables = [
+    shown_tables: list[dict[str, Any]] = [
         {"entry": entry, "html": _table(path, entry.caption), "download": _download(csv)}
         for entry, path, csv in zip(shown.tables, tables, downloads, strict=True)
     ]
@@ -189,9 +189,7 @@ def write(
         first_tables=_named(shown_tables, _FIRST),
         evidence_tables=_named(shown_tables, _EVIDENCE),
         other_tables=[
-            item
-            for item in shown_tables
-            if not any(_is_named(item, name) for name in (*_FIRST, *_EVIDENCE))
+            item for item in shown_tables if item["entry"].name not in (*_FIRST, *_EVIDENCE)
         ],
         config=shown.config,
         versions={"Python": platform.python_version()}
@@ -303,7 +301,7 @@ def _card(case: Case, path: Path) -> dict[str, Any]:
 
 
 def _named(items: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:
-    return [item for name in names for item in items if _is_named(item, name)]
+    return [item for name in names for item in items if item["entry"].name == name]
 
 
 def _by_sample(
@@ -315,11 +313,6 @@ def _by_sample(
         if item["entry"].name not in (*_STORY, *_SHOWN):
             whose = item["entry"].whose
             found.setdefault(titles.get(whose, whose or "The study"), []).append(item)
-    return found
-
-
-def _is_named(item: Mapping[str, Any], name: str) -> bool:
-    found: bool = item["entry"].name == name
     return found
 
 
@@ -338,10 +331,6 @@ def _calibrated(plan: Plan, _: Wildcards) -> list[str]:
     return [file for name in plan.study.cases for file in CALIBRATED.files(plan, {"case": name})]
 
 
-def _measurements(plan: Plan, _: Wildcards) -> list[str]:
-    return [file for name in plan.study.cases for file in plan.batch_files(MEASUREMENTS, name)]
-
-
 REPORT = Product(
     "report",
     {"page": PAGE},
@@ -356,7 +345,7 @@ REPORT = Product(
         "identifications": of_cases(IDENTIFICATIONS, every),
         "histories": of_cases(HISTORIES, every),
         "verdicts": of_cases(VERDICTS, every),
-        "measurements": Reads(_measurements),
+        "measurements": of_cases(MEASUREMENTS, every),
         "calibrated": Reads(_calibrated),
     },
     weight=Weight(10, 2000),

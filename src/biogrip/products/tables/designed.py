@@ -38,10 +38,6 @@ def covered_cases(study: Study) -> list[str]:
     return [name for name in designed_cases(study) if study.cases[name].coverage_seeds > 0]
 
 
-def _is_covered(case: Case) -> bool:
-    return case.coverage_seeds > 0
-
-
 def designed(study: Study, expected: list[Path], intervals: list[Path]) -> Table:
     """Compare bounds of both experiments with estimates of many seeds."""
     files = iter(intervals)
@@ -104,7 +100,9 @@ DESIGNED = table(
     item="designed experiments",
     caption="Bounds of designed experiments beside those of the study's own, with spread and "
     "coverage over seeds identified in them.",
-    uses=from_study(cases=each(designed_cases, USED, coverage_seeds=_is_covered)),
+    uses=from_study(
+        cases=each(designed_cases, USED, coverage_seeds=lambda case: case.coverage_seeds > 0)
+    ),
     reads={
         "expected": of_cases(EXPECTED, designed_cases),
         "intervals": of_cases(INTERVALS.path, covered_cases),

@@ -16,7 +16,7 @@ from biogrip.products.files.traces import (
     each_trace,
     read_jaw_force,
 )
-from biogrip.products.product import Reads, Weight, of_cases
+from biogrip.products.product import Weight, of_cases
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.uses import each, from_study, published
@@ -137,10 +137,6 @@ def _generation_rows(case: Truth, identified: list[Path]) -> list[tuple[Cell, ..
     return [(quantity, "", str(generation), median, "median generation at which ours stops")]
 
 
-def _measurements(study: Study) -> list[str]:
-    return [name for name in study.published if study.cases[name].published.axis_rad]
-
-
 EVIDENCE = table(
     evidence,
     caption="Statements of the paper beside what the study computes, and what speaks for the "
@@ -152,12 +148,11 @@ EVIDENCE = table(
         "targets": of_cases(
             TARGETS, lambda study: [name for name in study.published if name in study.simulated]
         ),
-        "measurements": Reads(
-            lambda plan, _: [
-                file
-                for case in _measurements(plan.study)
-                for file in plan.batch_files(MEASUREMENTS, case)
-            ]
+        "measurements": of_cases(
+            MEASUREMENTS,
+            lambda study: [
+                name for name in study.published if study.cases[name].published.axis_rad
+            ],
         ),
     },
     when=published,
