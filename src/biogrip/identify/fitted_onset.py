@@ -102,20 +102,3 @@ class OnsetFits:
         yield from (
             (low, high) for low, high in pairwise(near) if high - low > _ROUNDING * self.interval_s
         )
-
-
-def fit_onset(
-    case_problem: CaseProblem, time_s: Array, rotation_rad: Array, guess_s: float
-) -> float:
-    """Fit the time of a trace's clock at which the protocol starts, in s.
-
-    Parameters
-    ----------
-    case_problem
-        Assumptions of the identification.
-    time_s, rotation_rad : (n_samples,)
-        The trace, times ascending.
-    guess_s
-        Where to begin.
-    """
-    return OnsetFits(case_problem, time_s, rotation_rad).best(guess_s).onset_s

@@ -19,15 +19,7 @@ _LEAST, _MOST = -16, 18
 
 
 def with_own_ranges(case: Case, recorded: Measurements, config: Path | None) -> Case:
-    """Return a case whose search ranges follow from its trace, where the config gives none.
-
-    Parameters
-    ----------
-    case, recorded
-        The case and its trace.
-    config
-        The user's config file, if there is one.
-    """
+    """Return a case whose search ranges follow from its trace, where the user gives none."""
     given = (read_configs([config]) if config else {}).get("search_range", {})
     case_problem = case.problem.weighted(recorded.sd_rad)
     found = ranges_of(case_problem, recorded.time_s, recorded.rotation_rad[0])

@@ -10,7 +10,7 @@ from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.fitted_onset import fit_onset
+from biogrip.identify.fitted_onset import OnsetFits
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.traces import MEASUREMENTS, Measurements, write_measurements
 from biogrip.products.product import Product, Reads, wildcards_of
@@ -117,7 +117,7 @@ def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements
     if not problem.fit_start or trace.onset_s is None:
         return trace
     problem = problem.weighted(trace.sd_rad)
-    later_s = fit_onset(problem, trace.time_s, trace.rotation_rad[0], 0.0)
+    later_s = OnsetFits(problem, trace.time_s, trace.rotation_rad[0]).best(0.0).onset_s
     return replace(trace, time_s=trace.time_s - later_s, onset_s=trace.onset_s + later_s)
 
 
