@@ -34,7 +34,7 @@ def test_a_table_of_traces_names_those_that_look_like_formulas(tmp_path: Path) -
     reason = "=1+1.csv: found no header, allowed is a line with column names."
     write_table(Outcome([], {"=1+1.csv": reason}), table)
     with table.open(newline="") as stream:
-        assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", f"'{reason}"]
+        assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", "none"]
     assert read_rows(table)[1][:2] == ["=1+1.csv", reason]
 
 
