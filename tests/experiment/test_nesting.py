@@ -43,9 +43,7 @@ def test_a_richer_model_becomes_the_simpler_one(
 
 
 def test_of_equal_models_one_leads_on() -> None:
-    assert different_in("burgers", list(CANDIDATES)) == [
-        "maxwell",
-        "zener_kelvin",
-        "damper",
-        "kelvin_voigt",
-    ]
+    others = ["liquid_drop", "damper", "kelvin_voigt", "maxwell", "zener_maxwell", "zener_kelvin"]
+    assert set(others) <= set(contained("burgers"))
+    found = different_in("burgers", others)
+    assert found == ["maxwell", "zener_kelvin", "damper", "kelvin_voigt"]

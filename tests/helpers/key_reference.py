@@ -33,7 +33,10 @@ def documented() -> dict[str, Any]:
 
 
 def reference(config: Path) -> str:
-    """Return Markdown tables of all keys: meaning, unit, default in a file, allowed values."""
+    """Return Markdown tables of all keys: meaning, unit, default in a file, allowed values.
+
+    Where a file gives no default it is that of the class.
+    """
     defaults = yaml.safe_load(config.read_text(encoding="utf-8"))
     general: list[_Row] = []
     sections: list[str] = []
@@ -93,7 +96,8 @@ def _rows(path: str, schema: Schema, default: Any) -> Iterator[_Row]:
         for key, inner in items.items():
             yield from _rows(f"{path}[].{key}", inner, None)
     else:
-        yield _row(path, schema, _NO_DEFAULT if default is None else _shown(default))
+        value = schema.get("default") if default is None else default
+        yield _row(path, schema, _NO_DEFAULT if value in (None, [], {}) else _shown(value))
 
 
 def _row(path: str, schema: Schema, default: str) -> _Row:
@@ -134,4 +138,6 @@ def _shown(value: Any) -> str:
     if isinstance(value, list) and value and isinstance(value[0], str):
         listed = ", ".join(value)
         return f"`[{listed}]`" if len(value) <= _MOST_LISTED else f"{len(value)} keys"
+    if isinstance(value, bool):
+        return f"`{value}`".lower()
     return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"

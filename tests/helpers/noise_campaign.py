@@ -63,7 +63,9 @@ def noise(
     drift: Drift | None = None,
     outliers: Outliers | None = None,
 ) -> Noise:
-    return Noise("gaussian", LEVEL, "peak", None, ar1, flicker, drift, outliers)
+    return Noise(
+        "gaussian", LEVEL, "peak", ar1=ar1, flicker=flicker, drift=drift, outliers=outliers
+    )
 
 
 KINDS = {
