@@ -49,4 +49,5 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     if max(float(np.sum(each)) for each in stretches) > _IN_ONE * float(residual @ residual):
         return False
     noise_model = NoiseModelLikelihood(time_s, residual, sensitivity).best()
-    return find_slow_misfit(noise_model, residuals.duration_s) is None
+    fast = noise_model.time_s <= _SLOW * residuals.duration_s
+    return fast and noise_model.ar1 > _NOTICEABLE
