@@ -31,6 +31,7 @@ PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
 VERDICTS = PUBLISHED / "tables"
 NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
+STATUS = PUBLISHED / "status" / "tables" / "status.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 RANKS = DISHES.with_name("ranks.csv")
 SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
@@ -114,6 +115,31 @@ def simulated_noise() -> str:
         }
         for (kind, case), rows in noise.groupby(["noise", "case"], sort=False)
     )
+
+
+def simulated_statuses() -> str:
+    """Statuses of fits and coverage of limits, over the quantities, by set-up."""
+    return _table(
+        {"set-up": str(title)} | _statuses(rows)
+        for title, rows in pd.read_csv(STATUS).groupby("set_up", sort=False)
+    )
+
+
+def _statuses(rows: pd.DataFrame) -> dict[str, str]:
+    white, coloured = (rows[rows["noise_model"] == name] for name in ("white", "coloured"))
+    found = {}
+    for name, of in (("white", white), ("coloured", coloured)):
+        one = of.iloc[0]
+        wrong = one["rejected_percent"] + one["refused_percent"]
+        shares = (one["ok_percent"], one["doubtful_percent"], wrong)
+        found[f"ok / doubtful / rejected, {name}"] = " / ".join(f"{share:.0f}" for share in shares)
+    for name, of in (("white", white), ("coloured", coloured)):
+        held = of["coverage_percent"].dropna()
+        found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""
+    wider = (coloured["width"].to_numpy() / white["width"].to_numpy())
+    known = pd.Series(wider[np.isfinite(wider)])
+    found["times as wide"] = _range(known, ".2g") if len(known) else ""
+    return found
 
 
 def errors_by_noise() -> str:
@@ -339,6 +365,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
     ROOT / "docs" / "identifiability.md": {
         "noise": simulated_noise,
+        "status": simulated_statuses,
         "methods": methods_compared,
     },
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
