@@ -113,7 +113,7 @@ SET_UPS = {
     "jump": SetUp("jump of five standard deviations", _white, jump=5.0),
     "unit": SetUp("mrad taken for rad", _white, unit=1e3),
     "gripper": SetUp("gripper three times as stiff", _white, stiffness=3.0),
-    "model": SetUp("sample with a second branch", _white, branch=(20.0, 20.0)),
+    "model": SetUp("sample with a second, slow branch", _white, branch=(20.0, 2000.0)),
 }
 
 
