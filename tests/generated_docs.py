@@ -120,7 +120,7 @@ def simulated_noise() -> str:
 def simulated_statuses() -> str:
     """Statuses of fits and coverage of limits, over the quantities, by set-up."""
     return _table(
-        {"set-up": str(title)} | _statuses(rows)
+        {"set-up": str(title), "traces": str(rows["traces"].max())} | _statuses(rows)
         for title, rows in pd.read_csv(STATUS).groupby("set_up", sort=False)
     )
 
@@ -136,7 +136,7 @@ def _statuses(rows: pd.DataFrame) -> dict[str, str]:
     for name, of in (("white", white), ("coloured", coloured)):
         held = of["coverage_percent"].dropna()
         found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""
-    wider = (coloured["width"].to_numpy() / white["width"].to_numpy())
+    wider = coloured["width"].to_numpy() / white["width"].to_numpy()
     known = pd.Series(wider[np.isfinite(wider)])
     found["times as wide"] = _range(known, ".2g") if len(known) else ""
     return found
