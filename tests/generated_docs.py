@@ -136,9 +136,6 @@ def _statuses(rows: pd.DataFrame) -> dict[str, str]:
     for name, of in (("white", white), ("coloured", coloured)):
         held = of["coverage_percent"].dropna()
         found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""
-    wider = coloured["width"].to_numpy() / white["width"].to_numpy()
-    known = pd.Series(wider[np.isfinite(wider)])
-    found["times as wide"] = _range(known, ".2g") if len(known) else ""
     return found
 
 

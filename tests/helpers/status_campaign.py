@@ -166,7 +166,9 @@ def _response(gripper: Gripper, set_up: SetUp) -> Array:
         by_name |= {"k_p": k_p, "c_p": c_p}
         parameters = [by_name[name] for name in model.names]
     network = model.network(np.array([parameters]))
-    clean = simulated_rotation(gripper, network, torque_history(phases), TIMES, nonlinear=False)[0]
+    clean = simulated_rotation(
+        gripper, network, torque_history(tuple(phases)), TIMES, nonlinear=False
+    )[0]
     return np.concatenate((np.zeros(late), clean[: len(clean) - late]))
 
 
