@@ -86,6 +86,9 @@ class TorqueHistory:
     """Those of tau_4, (n_harmonics,)."""
     end_s: float
     """End of the protocol."""
+    deforms: bool = False
+    """True if it is a deformation that is held, and the load is read: relaxation. `left` and
+    `right` are then equal, and so are units of deformation everywhere."""
 
     @cached_property
     def symmetric(self) -> bool:
@@ -180,8 +183,11 @@ def drives(left: NDArray[Any], right: NDArray[Any], symmetric: bool) -> NDArray[
     return left[None] if symmetric else np.stack((left, left - right))
 
 
-def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:
-    """Convert phases that follow one another from t = 0 into a list of torque changes."""
+def torque_history(phases: tuple[Phase, ...], *, deforms: bool = False) -> TorqueHistory:
+    """Convert phases that follow one another from t = 0 into a list of changes.
+
+    They are of a torque or, if the protocol `deforms`, of a deformation.
+    """
     ends = np.cumsum([phase.duration_s for phase in phases])
     starts = np.concatenate(([0.0], ends[:-1]))
     jumps, harmonics = [], []
@@ -204,7 +210,9 @@ def torque_history(phases: tuple[Phase, ...]) -> TorqueHistory:
         if (harmonics)
         else (np.zeros(0), np.zeros(0), np.zeros(0, complex), np.zeros(0, complex))
     )
-    return TorqueHistory(starts, left, right, times, omegas, a_left, a_right, float(ends[-1]))
+    return TorqueHistory(
+        starts, left, right, times, omegas, a_left, a_right, float(ends[-1]), deforms
+    )
 
 
 def _harmonic_events(start: float, phase: Phase) -> list[tuple[float, float, complex, complex]]:

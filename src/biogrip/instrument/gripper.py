@@ -71,7 +71,22 @@ class Gripper(Block):
         return self.arm_length_m * math.sin(math.radians(self.reference_angle_deg))
 
     @property
+    def has_inertia(self) -> bool:
+        """True if any of its arms has an inertia, so that it may ring."""
+        return bool(self.left.inertia_kgm2 or self.right.inertia_kgm2)
+
+    @property
     def jaw_stiffness_N_per_m(self) -> float:
         """Stiffness of both hinges as seen from the sample: force over closing of the jaws."""
         yielding = 1 / self.left.stiffness_Nm_per_rad + 1 / self.right.stiffness_Nm_per_rad
         return 1 / (self.lever_m**2 * yielding)
+
+
+# Far below what any sample has, in any units; the squares of its reciprocals are no overflow.
+_NOTHING = 1e-40
+
+NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _NOTHING, _NOTHING))
+"""Arms that do nothing: they turn by what a sample yields to a load, its creep.
+
+With twice their squared lever one, a torque of theirs is the load on the sample.
+"""

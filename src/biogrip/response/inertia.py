@@ -57,6 +57,8 @@ def ring(gripper: Gripper, network: Network, torque: TorqueHistory, time_s: Arra
 
 def change_by_inertia(gripper: Gripper, torque: TorqueHistory, time_s: Array) -> float:
     """Compute the norm of the change of a trace by inertia, relative to the rotation's RMS."""
+    if not gripper.has_inertia:
+        return 0.0
     ringing = time_s[while_ringing(gripper, torque, time_s)]
     if not len(ringing):
         return 0.0

@@ -26,13 +26,13 @@ def make_misfit(
 ) -> Misfit:
     """Return the RMS misfit as a function of parameters of shape (n, n_parameters).
 
-    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for torque
-    steps, sampled uniformly from the start on, with the linear model without inertia, in white
+    That of residuals serves any protocol, sampling and noise. `SeriesMisfit` is used for steps of
+    a torque, sampled uniformly from the start on, with the linear model without inertia, in white
     noise alone.
     """
     uniform = np.arange(len(time_s)) * (time_s[-1] / max(len(time_s) - 1, 1))
     is_uniform = np.allclose(time_s, uniform, rtol=0, atol=1e-9 * time_s[-1])
-    if is_uniform and torque.only_steps and residuals.plain:
+    if is_uniform and torque.only_steps and not torque.deforms and residuals.plain:
         interval_s = float(time_s[-1]) / (len(time_s) - 1)
         return SeriesMisfit(gripper, residuals.model, torque, interval_s, rotation_rad)
     return residuals.condensed_misfit

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from biogrip.arrays import Array, ComplexArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory, drives
 from biogrip.response.linear import phi_function
+from biogrip.response.mode_decay import compute_decay
 
 # exp(-40) is lost in rounding.
 _DECAYED = 40.0
@@ -39,8 +40,10 @@ def compute_growth(
     Returns
     -------
     growth, slope : (n, n_drives, n_modes, n_times)
-        In N m, and N m s, for each of the `drives`.
+        In N m, and N m s, for each of the `drives`; of a deformation, those of `compute_decay`.
     """
+    if torque.deforms:
+        return compute_decay(rates, torque, time_s)
     if before := int(time_s.searchsorted(torque.time_s[0])):
         growth, slope = compute_growth(rates, torque, time_s[before:])
         zeros = np.zeros((*growth.shape[:-1], before), growth.dtype)

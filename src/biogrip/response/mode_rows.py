@@ -2,8 +2,9 @@
 
 For a given protocol and given times, the rows of a mode are a smooth function of its
 rate r alone (`biogrip.response.decay_table`). Divided by T r, T the last time, they are
-as large for slow modes as for fast ones, and polynomials of low degree in short pieces
-of
+as large for slow modes as for fast ones; under a deformation, which modes forget the faster
+the faster they are, they are so multiplied by 1 - T r. They are polynomials of low degree in
+short pieces of
 
     u = log(1 - T r)
 
@@ -46,7 +47,7 @@ class ModeRows:
     def __init__(
         self, torque: TorqueHistory, time_s: Array, to_rows: Array, shortest_s: float
     ) -> None:
-        self._end_s = float(time_s[-1])
+        self._end_s, self._deforms = float(time_s[-1]), torque.deforms
         self._drives, self._rows = 1 if torque.symmetric else 2, to_rows.shape[1]
         decayed = _DECAYED if torque.only_steps else _DECAYED_UNDER_RAMPS
         wide = int(np.ceil(np.log1p(decayed * self._end_s / shortest_s) / WIDTH))
@@ -56,7 +57,7 @@ class ModeRows:
         for piece in range(wide):
             u = WIDTH * (piece + NODES)
             growth, _ = compute_growth(-np.expm1(u)[None] / self._end_s, torque, time_s)
-            values = (growth[0] / np.expm1(u)[:, None]) @ to_rows
+            values = (growth[0] / self._scale(np.expm1(u))[:, None]) @ to_rows
             short = (_TO_SHORT @ values).reshape(self._drives, _SHORTER, len(_ORDERS), self._rows)
             here = slice(piece * _SHORTER, (piece + 1) * _SHORTER)
             self._table[here] = _TO_POWERS @ short.swapaxes(0, 1)
@@ -71,9 +72,14 @@ class ModeRows:
         piece = u.astype(np.intp)
         powers, power_slopes = _powers(u - piece - 0.5)
         # The divisor, and the place, with their derivatives by the log-parameters.
-        scale = np.where(decayed, np.expm1(_WIDTH * self._last), scaled)
-        scale_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
-        place_slopes = scale_slopes / (_WIDTH * (1 + scaled))[:, None]
+        known = np.where(decayed, np.expm1(_WIDTH * self._last), scaled)
+        known_slopes = np.where(decayed, 0.0, -self._end_s)[:, None] * modes.rate_slopes
+        place_slopes = known_slopes / (_WIDTH * (1 + scaled))[:, None]
+        scale, scale_slopes = self._scale(known), known_slopes
+        if self._deforms:
+            # What a fast mode has not forgotten falls with its rate.
+            scale = self._scale(scaled)
+            scale_slopes = (self._end_s * scale * scale)[:, None] * modes.rate_slopes
         # Now (n, n_modes, n_drives), and (n, n_parameters, n_modes, n_drives).
         weights = modes.weights.swapaxes(-1, -2)
         weight_slopes = modes.weight_slopes.swapaxes(-1, -2)
@@ -88,6 +94,10 @@ class ModeRows:
         # One product per sample: the order of its sums does not depend on the number of samples.
         pieces = self._table[piece].reshape(count, -1, self._rows)
         return mixed.reshape(count, 1 + parameters, -1) @ pieces
+
+    def _scale(self, scaled: Array) -> Array:
+        """Return the divisor of a mode's rows by -T r."""
+        return 1 / (1 + scaled) if self._deforms else scaled
 
 
 def _powers(place: Array) -> tuple[Array, Array]:

@@ -29,7 +29,8 @@ from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import LEFT, evaluate, poles, slope_at_poles, transfer_functions
 from biogrip.response.many_branches import modes_with_slopes
 
-_COMPLEX_STEP = 1e-30
+COMPLEX_STEP = 1e-30
+"""Relative imaginary part of a parameter that carries its derivative."""
 
 
 class Modes(NamedTuple):
@@ -126,7 +127,7 @@ def compute_modes(
     """
     network, count = complex_step_network(model, parameters, slopes=slopes)
     if network.k.shape[1] > MOST_BRANCHES:
-        parts = modes_with_slopes(gripper, network, _COMPLEX_STEP, count, symmetric=symmetric)
+        parts = modes_with_slopes(gripper, network, COMPLEX_STEP, count, symmetric=symmetric)
         return Modes(*(np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in parts))
     polynomials = compute_polynomials(gripper, network, count, symmetric=symmetric, inertia=False)
     return modes_at(polynomials, poles(polynomials.denominator, real=True))
@@ -136,12 +137,12 @@ def _split_complex_step(coefficients: NDArray[Any], count: int) -> tuple[Array, 
     """Return coefficients, (..., n, terms), and derivatives, (n_parameters, ..., n, terms)."""
     *others, _, terms = coefficients.shape
     of_tilts = coefficients.reshape(*others, count + 1, -1, terms).swapaxes(0, -3)
-    return of_tilts[0].real, of_tilts[1:].imag / _COMPLEX_STEP
+    return of_tilts[0].real, of_tilts[1:].imag / COMPLEX_STEP
 
 
 @cache
 def _complex_steps(count: int) -> ComplexArray:
     """Return factors: ones in the first row, and one complex-step parameter in each other row."""
     tilts = np.ones((count + 1, count), dtype=np.complex128)
-    tilts[1:].imag = _COMPLEX_STEP * np.eye(count)
+    tilts[1:].imag = COMPLEX_STEP * np.eye(count)
     return tilts

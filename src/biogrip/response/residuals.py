@@ -12,8 +12,8 @@ from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
+from biogrip.response.held_modes import compute_held_modes
 from biogrip.response.linear import LEFT
-from biogrip.response.modes import compute_modes
 from biogrip.response.noise_estimate import estimate_noise, measure_rounding
 from biogrip.response.nuisance import taken_out
 from biogrip.response.sensitivity import (
@@ -236,7 +236,7 @@ class Residuals:
                 gripper, model, torque, time_s, parameters, inertia=inertia, slopes=slopes
             )
             return condensed.rows(rotations)
-        modes = compute_modes(gripper, model, parameters, symmetric=torque.symmetric, slopes=slopes)
+        modes = compute_held_modes(gripper, model, torque, parameters, slopes=slopes)
         return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:

@@ -5,6 +5,7 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.linkage import displacement_of_tip
+from biogrip.response.held_modes import relaxation
 from biogrip.response.linear import LEFT, RIGHT, rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
 
@@ -19,7 +20,12 @@ def simulated_rotation(
     """
     if nonlinear:
         return nonlinear_rotation(gripper, network, torque, time_s)
-    return rotation(step_response(gripper, network, symmetric=torque.symmetric), torque, time_s)
+    if torque.deforms:
+        return relaxation(network, torque, time_s)
+    response = step_response(
+        gripper, network, symmetric=torque.symmetric, inertia=gripper.has_inertia
+    )
+    return rotation(response, torque, time_s)
 
 
 def simulated_shortening(
