@@ -290,8 +290,23 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
     """Add options for columns, noise and nuisance terms of recorded traces."""
     command.add_argument("--time", help="column of times [time_s]")
     command.add_argument("--rotation", help="column of rotations [rotation_rad]")
+    command.add_argument(
+        "--reading",
+        type=_reading,
+        metavar="QUANTITY=COLUMN",
+        help="column of another instrument's readings: displacement, strain or compliance (creep), "
+        "force, stress or modulus (relaxation)",
+    )
+    command.add_argument(
+        "--hold",
+        type=float,
+        metavar="VALUE",
+        help="what was held from 0 to the end, without a config: a stress in Pa for a strain, a "
+        "force in N for a displacement, and the reverse; 1 for a compliance or a modulus",
+    )
     command.add_argument("--time-unit", help="s, ms, min or h, if the column's name has none")
     command.add_argument("--rotation-unit", help="rad, mrad, urad or deg, likewise")
+    command.add_argument("--reading-unit", help="unit of another reading, likewise")
     command.add_argument("--skip", type=int, metavar="N", help="lines before the header [0]")
     command.add_argument(
         "--scale", type=float, metavar="FACTOR", help="rotation = FACTOR times the column [1]"
@@ -331,6 +346,16 @@ def _parameter(text: str) -> tuple[str, float]:
         if name:
             return name, float(value)
     raise argparse.ArgumentTypeError(f"found '{text}', allowed is NAME=VALUE, as in k_p=0")
+
+
+def _reading(text: str) -> tuple[str, str]:
+    """Read the value of ``--reading``."""
+    quantity, _, column = text.partition("=")
+    if quantity and column:
+        return quantity, column
+    raise argparse.ArgumentTypeError(
+        f"found '{text}', allowed is QUANTITY=COLUMN, as in compliance=J"
+    )
 
 
 def _trace_options(command: _Parser) -> None:
@@ -426,18 +451,21 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
     return ReadAs(
         options.time,
         options.rotation,
-        options.time_unit,
-        options.rotation_unit,
-        options.skip,
-        options.scale,
-        None if options.start == FIT else options.start,
-        options.start == FIT or None,
-        options.noise,
-        options.offset,
-        options.drift,
-        options.noise_model,
-        options.sd,
-        options.noise_share,
+        reading=options.reading,
+        hold=options.hold,
+        time_unit=options.time_unit,
+        rotation_unit=options.rotation_unit,
+        reading_unit=options.reading_unit,
+        skip=options.skip,
+        scale=options.scale,
+        start_s=None if options.start == FIT else options.start,
+        fit_start=options.start == FIT or None,
+        noise_rad=options.noise,
+        offset=options.offset,
+        drift=options.drift,
+        noise_model=options.noise_model,
+        sd=options.sd,
+        noise_share=options.noise_share,
     )
 
 

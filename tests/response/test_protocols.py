@@ -21,7 +21,7 @@ from biogrip.experiment.protocol import (
 )
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.actuator import torque as torque_of_voltage
-from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.instrument.gripper import GRIPPER, Arm, Gripper
 from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import phi_function, rotation, step_response
 from biogrip.response.misfit_series import SeriesMisfit
@@ -39,7 +39,7 @@ PROTOCOL = ProtocolBlock(
         PhaseBlock(15.0, torque_Nm=0.5e-9),
     )
 )
-TORQUE = torque_history(PROTOCOL.torques(TABLE_2))
+TORQUE = torque_history(PROTOCOL.held(GRIPPER, TABLE_2))
 PER_SQUARE_VOLT = float(torque_of_voltage(TABLE_2, 1.0))
 EDGES = np.array([0.0, 20.0, 50.0, 60.0, 75.0, 90.0])
 

@@ -174,7 +174,7 @@ def test_the_unit_that_would_fit_is_named(
     values = factor * trace(gripper, steps, SAMPLES["liquid_drop_1"], times)
     for columns in (Columns("time_s", f"phi_{unit}"), Columns("time_s", "phi", None, unit)):
         said = refusal(recorded(times, values), gripper, steps, columns)
-        assert f"column '{columns.rotation}'" in said
+        assert f"column '{columns.reading}'" in said
         assert said.endswith(f"It would fit if it were {hint}")
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from biogrip.errors import BiogripError
+from biogrip.instrument.gripper import ROTATION
 from biogrip.traces import recordings
 from biogrip.traces.recordings import (
-    ROTATION_UNITS,
     TIME_UNITS,
     Columns,
     Recording,
@@ -137,16 +137,16 @@ def test_units_are_never_guessed(
     tmp_path: Path, column: str, given: str | None, message: str
 ) -> None:
     path = written(tmp_path / "t.csv", [f"time_s,{column}", *ROWS])
-    said = refusal(path, Columns("time_s", column, rotation_unit=given))
+    said = refusal(path, Columns("time_s", column, reading_unit=given))
     assert said.startswith(f", column '{column}': ")
     assert re.search(message, said)
 
 
 def test_a_time_has_units_of_time() -> None:
-    assert unit_of(Path("t"), "time_min", None, TIME_UNITS) == "min"
-    assert unit_of(Path("t"), "phi_2", "\u03bcrad", ROTATION_UNITS) == "urad"
+    assert unit_of(Path("t"), "time_min", None, TIME_UNITS, "time_unit") == "min"
+    assert unit_of(Path("t"), "phi_2", "\u03bcrad", ROTATION.units, "rotation_unit") == "urad"
     with pytest.raises(BiogripError, match=r"^t, column 'time_rad': found no unit.*s, ms, min, h"):
-        unit_of(Path("t"), "time_rad", None, TIME_UNITS)
+        unit_of(Path("t"), "time_rad", None, TIME_UNITS, "time_unit")
 
 
 def test_comments_and_empty_lines_are_skipped_but_counted(tmp_path: Path) -> None:
@@ -343,7 +343,7 @@ def test_other_columns_may_share_a_name(tmp_path: Path) -> None:
 
 def test_one_column_is_not_both(tmp_path: Path) -> None:
     path = written(tmp_path / "t.csv", ["time_s,rotation_rad", *ROWS])
-    said = refusal(path, Columns("time_s", "time_s", rotation_unit="rad"))
+    said = refusal(path, Columns("time_s", "time_s", reading_unit="rad"))
     assert said.startswith(", line 1, column 'time_s': found time and rotation in one column")
 
 
@@ -526,7 +526,7 @@ def test_endless_names_and_cells_are_refused(tmp_path: Path, letters: int) -> No
 )
 def test_a_unit_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
     with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
-        unit_of(Path("t.csv"), "t", given, TIME_UNITS)
+        unit_of(Path("t.csv"), "t", given, TIME_UNITS, "time_unit")
 
 
 @pytest.mark.parametrize(
@@ -557,7 +557,7 @@ def test_what_a_column_is_was_said_by_options_or_by_keys(
 )
 def test_an_angle_that_is_spelled_out_is_recognised(given: str, meant: str) -> None:
     with pytest.raises(BiogripError, match=re.escape(f"Did you mean '{meant}'?")):
-        unit_of(Path("t.csv"), "phi", given, ROTATION_UNITS)
+        unit_of(Path("t.csv"), "phi", given, ROTATION.units, "rotation_unit")
 
 
 @pytest.mark.parametrize("more", ["", "# a comment, for which the fast reader gives up"])
@@ -566,7 +566,7 @@ def test_standard_deviations_are_read_in_the_unit_of_the_rotations(
 ) -> None:
     lines = ["sd,time_s,phi", *(f"{i + 1},{i},{i}" for i in range(12)), more]
     path = written(tmp_path / "t.csv", lines)
-    recording = read_recording(path, Columns("time_s", "phi", rotation_unit="mrad", sd="sd"))
+    recording = read_recording(path, Columns("time_s", "phi", reading_unit="mrad", sd="sd"))
     assert recording.sd_rad is not None
     np.testing.assert_allclose(recording.sd_rad, 1e-3 * np.arange(1, 13), rtol=1e-15)
     np.testing.assert_allclose(recording.rotation_rad, 1e-3 * np.arange(12), rtol=1e-15)

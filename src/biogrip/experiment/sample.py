@@ -19,6 +19,7 @@ from biogrip.experiment.network import Network as Network
 from biogrip.experiment.sample_model import SINGLE_BRANCH as SINGLE_BRANCH
 from biogrip.experiment.sample_model import Parameter as Parameter
 from biogrip.experiment.sample_model import SampleModel as SampleModel
+from biogrip.experiment.sample_model import in_pascals
 from biogrip.experiment.sample_model import with_fixed as with_fixed
 
 
@@ -30,16 +31,18 @@ class Sample:
     """Name of the model."""
     branches: int = 1
     """Number of Maxwell branches of a generalized one."""
+    per_area: bool = False
+    """True if its elements relate stress and strain, and have units of moduli."""
 
     @property
     def model(self) -> SampleModel:
         """The constitutive model."""
         model = MODELS[self.name]
-        if self.branches == 1:
-            return model
-        if model.branched is None:
-            raise ValueError(f"{self.name} has no number of branches")
-        return model.branched(self.branches)
+        if self.branches != 1:
+            if model.branched is None:
+                raise ValueError(f"{self.name} has no number of branches")
+            model = model.branched(self.branches)
+        return in_pascals(model) if self.per_area else model
 
     @property
     def candidate(self) -> str:

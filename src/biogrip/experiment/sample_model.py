@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from math import inf
 from typing import TypeAlias
 
@@ -16,6 +17,14 @@ _SUFFIXES = {
     "stiffness": "_N_per_m",
     "damping": "_Ns_per_m",
     "springpot": "_N_per_m",
+    "exponent": "",
+}
+# Where a sample is under stress, and strained.
+_UNITS_PER_AREA = {"stiffness": "Pa", "damping": "Pa s", "springpot": "Pa", "exponent": ""}
+_SUFFIXES_PER_AREA = {
+    "stiffness": "_Pa",
+    "damping": "_Pa_s",
+    "springpot": "_Pa",
     "exponent": "",
 }
 
@@ -37,16 +46,18 @@ class Parameter:
     """True if zero is a possible value: the element is then absent."""
     below: float = inf
     """Upper bound of all values, if there is one."""
+    per_area: bool = False
+    """True if it relates stress and strain."""
 
     @property
     def unit(self) -> str:
         """SI unit; empty if it has none."""
-        return _UNITS[self.kind]
+        return (_UNITS_PER_AREA if self.per_area else _UNITS)[self.kind]
 
     @property
     def column(self) -> str:
         """Name of the parameter's column in result files."""
-        return self.name + _SUFFIXES[self.kind]
+        return self.name + (_SUFFIXES_PER_AREA if self.per_area else _SUFFIXES)[self.kind]
 
     @property
     def symbol(self) -> str:
@@ -168,6 +179,13 @@ def with_fixed(model: SampleModel, fixed: Mapping[str, float]) -> SampleModel:
         network=_Filled(model, tuple(fixed.items())),
         example=tuple(model.example[index] for index in free),
     )
+
+
+@cache
+def in_pascals(model: SampleModel) -> SampleModel:
+    """Return the model of a sample under stress, whose elements are moduli and viscosities."""
+    parameters = tuple(replace(parameter, per_area=True) for parameter in model.parameters)
+    return replace(model, parameters=parameters)
 
 
 K = Parameter("k", "stiffness", "Maxwell spring", "k")

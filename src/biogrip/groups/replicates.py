@@ -59,7 +59,7 @@ class JointResiduals(Residuals):
         """None, for each trace has its own times."""
         return None
 
-    def grip(self, log_parameters: Array) -> Grip:
+    def grip(self, log_parameters: Array) -> Grip | None:
         """Force of the jaws on the sample; the protocol is the same for all traces."""
         return self._parts[0].grip(log_parameters)
 

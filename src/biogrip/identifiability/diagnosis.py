@@ -39,7 +39,7 @@ class Diagnosis:
     """A verdict on every parameter and on the sum of the exchangeable ones."""
     trades: list[Trade]
     """Parameters of which only a combination is determined."""
-    grip: Grip
+    grip: Grip | None
     """Force of the jaws on the sample of the best fit."""
     notes: list[Note]
     """Notes on the result, with weights."""
@@ -117,12 +117,12 @@ def diagnose(
     return Diagnosis(likelihood, findings, trades, grip, notes)
 
 
-def _pulling(grip: Grip, last_s: float) -> Iterator[Note]:
+def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:
     """Yield a note if, with the best fit, the jaws would have to pull at the sample.
 
     A loss of contact would show in the misfit: with a good fit the sample stuck.
     """
-    if grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
+    if grip is not None and grip.pulls_from_s is not None and grip.pulls_from_s <= last_s:
         yield Note(
             HARMLESS,
             f"With the best fit {grip.words()}. Without adhesion the jaws lost contact "
@@ -138,7 +138,9 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
         return
     residual = residuals.left(likelihood.best)
     growth = compute_growth(residual, residuals.rotation(likelihood.best))
-    doubts = list(doubts_about_noise(residual, growth, residuals.rounding_rad))
+    doubts = list(
+        doubts_about_noise(residual, growth, residuals.instrument, residuals.rounding_rad)
+    )
     yield from (Note(DOUBT, doubt) for doubt in doubts)
     if doubts and not residuals.coloured:
         yield Note(
@@ -172,8 +174,8 @@ def _misfit(likelihood: Likelihood, times: float) -> Note:
         )
     return Note(
         REJECTION,
-        f"The misfit is {times:.2g} times the noise of the trace: the model, the protocol, the "
-        "gripper or the unit is not the right one.",
+        f"The misfit is {times:.2g} times the noise of the trace: "
+        f"{likelihood.problem.residuals.instrument.all_that_may_be_wrong} is not the right one.",
     )
 
 

@@ -5,6 +5,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.fit_status import DOUBT, REJECTION, Note
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood
+from biogrip.instrument.gripper import GRIPPER
+from biogrip.instrument.instrument import Instrument
 from biogrip.response.residuals import Residuals
 from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
 
@@ -16,17 +18,18 @@ _MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
 _STRETCHES, _IN_ONE = 20, 0.3
 
 
-def find_slow_misfit(noise_model: NoiseModel, duration_s: float) -> Note | None:
+def find_slow_misfit(
+    noise_model: NoiseModel, duration_s: float, instrument: Instrument = GRIPPER
+) -> Note | None:
     """Return a note if the autocorrelated part of a noise model is, or may be, misfit."""
     share, time_s = noise_model.ar1, noise_model.time_s
     misfit = share > _MOST and time_s > _SLOW * duration_s
     if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
         return None
     meaning = (
-        "that is misfit, not noise. The model, the protocol, the gripper or the unit is not the "
-        "right one."
+        f"that is misfit, not noise. T{instrument.all_that_may_be_wrong[1:]} is not the right one."
         if misfit
-        else "that may be misfit, of a model, protocol or gripper that is not the right one."
+        else f"that may be misfit, of a {instrument.model_or_set_up} that is not the right one."
     )
     return Note(
         REJECTION if misfit else DOUBT,

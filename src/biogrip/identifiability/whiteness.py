@@ -7,6 +7,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.identify.outliers import FAR, outliers_of
+from biogrip.instrument.gripper import GRIPPER
+from biogrip.instrument.instrument import Instrument
 
 FALSE_ALARM = 0.003
 """Significance level of each test: share of traces with white noise that fail it."""
@@ -17,7 +19,9 @@ _CORRELATED = 5.0
 _STRETCHES, _SHORTEST = 20, 5
 
 
-def doubts_about_noise(residual: Array, growth: Array, rounding_rad: float = 0.0) -> Iterator[str]:
+def doubts_about_noise(
+    residual: Array, growth: Array, instrument: Instrument = GRIPPER, rounding_rad: float = 0.0
+) -> Iterator[str]:
     """Yield a sentence for each test of white noise that the residuals of a fit fail.
 
     Parameters
@@ -27,14 +31,19 @@ def doubts_about_noise(residual: Array, growth: Array, rounding_rad: float = 0.0
     growth : (n_samples,)
         Growth of the noise with the rotation, see `compute_growth`. All other tests are of what
         it leaves.
+    instrument
+        The instrument, for its words.
     rounding_rad
         Step of the readings.
     """
+    read, wrong = instrument.read.name, instrument.model_or_set_up
+    many = f"{read}s" if instrument.has_jaws else "readings"
+    wrong = ", the ".join(wrong.split(", ")).replace(" or ", " or the ")
     if np.ptp(growth):
         low, high = np.quantile(growth, (0.05, 0.95))
         yield (
-            f"The noise grows with the rotation: it is {high / low:.2g} times as large for the "
-            "largest tenth of the rotations as for the smallest, and neither the weights of the "
+            f"The noise grows with the {read}: it is {high / low:.2g} times as large for the "
+            f"largest tenth of the {many} as for the smallest, and neither the weights of the "
             "readings nor the intervals allow for that."
         )
         residual = residual / growth
@@ -43,14 +52,13 @@ def doubts_about_noise(residual: Array, growth: Array, rounding_rad: float = 0.0
     if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
-            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the model, "
-            "the protocol or the gripper is not the right one."
+            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the {wrong} "
+            "is not the right one."
         )
     elif chance < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
-            f"{one_in(chance)} traces: the intervals are wrong, or the model, the protocol or the "
-            "gripper is."
+            f"{one_in(chance)} traces: the intervals are wrong, or the {wrong} is."
         )
     chance = wandering(residual)
     if chance < FALSE_ALARM:

@@ -13,7 +13,8 @@ from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.problem import Problem, make_problem, searched
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
 from biogrip.response.misfit import Misfit
@@ -37,6 +38,8 @@ class CaseProblem:
     """Constitutive model."""
     fixed: Mapping[str, float]
     """Parameters that are known, by name."""
+    instrument: Instrument = GRIPPER
+    """What is held and read; other than a gripper, it has `NO_ARMS`."""
     nonlinear: bool = False
     """True to simulate the nonlinear model."""
     offset: bool = False
@@ -63,8 +66,8 @@ class CaseProblem:
 
     @cached_property
     def torque(self) -> TorqueHistory:
-        """Torque of both arms against time."""
-        return torque_history(self.phases)
+        """Torque of both arms, or what else is held, against time."""
+        return torque_history(self.phases, deforms=self.instrument.deforms)
 
     @cached_property
     def model(self) -> SampleModel:
@@ -148,6 +151,7 @@ class CaseProblem:
             self.ranges,
             condensed,
             noise_rad=noise_rad,
+            instrument=self.instrument,
         )
 
     def _condense_weighted(self, time_s: Array, inertia: bool) -> Condensed:

@@ -9,7 +9,8 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.genome import GeneRange, Genome, make_genome
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import Misfit, make_misfit
 from biogrip.response.residuals import Residuals
@@ -53,6 +54,7 @@ def make_problem(
     condensed: Condensed,
     *,
     noise_rad: float | None = None,
+    instrument: Instrument = GRIPPER,
 ) -> Problem:
     """Set up the identification of one trace.
 
@@ -68,9 +70,18 @@ def make_problem(
         Condensed rows of the protocol and times; traces that are fitted together share them.
     noise_rad
         Standard deviation of the noise, if it is known.
+    instrument
+        The instrument, for its words.
     """
     residuals = Residuals(
-        gripper, model, torque, time_s, rotation_rad, condensed, noise_rad=noise_rad
+        gripper,
+        model,
+        torque,
+        time_s,
+        rotation_rad,
+        condensed,
+        noise_rad=noise_rad,
+        instrument=instrument,
     )
     misfit = make_misfit(residuals, gripper, torque, time_s, rotation_rad)
     return searched(misfit, residuals, ranges)

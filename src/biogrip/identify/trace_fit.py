@@ -65,6 +65,7 @@ class TraceFit:
         """Describe the estimated noise model in sentences."""
         if self.noise_model is None:
             return []
+        read = self.problem.residuals.instrument.read.name
         noise_model, left_out = self.noise_model, int(np.count_nonzero(self.outliers))
         parts = [f"{_percent(noise_model.white)} white"]
         if noise_model.ar1 >= _WORTH_SAYING:
@@ -74,7 +75,7 @@ class TraceFit:
         if noise_model.flicker >= _WORTH_SAYING:
             parts.append(f"{_percent(noise_model.flicker)} 1/f")
         if noise_model.proportional >= _WORTH_SAYING:
-            parts.append(f"{_percent(noise_model.proportional)} that grows with the rotation")
+            parts.append(f"{_percent(noise_model.proportional)} that grows with the {read}")
         said = [
             f"Noise model: of the variance {', '.join(parts)};{self.fitted_along} "
             "the intervals allow for all of it."
@@ -135,7 +136,8 @@ def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
     terms = ["an offset"] * case_problem.offset + ["a drift"] * case_problem.drift
     if not terms:
         return ""
-    or_flow = " (or the sample flows: under this torque both give the same line)"
+    held = case_problem.instrument.held.name
+    or_flow = f" (or the sample flows: under this {held} both give the same line)"
     doubt = or_flow if case_problem.drift and drift_is_flow(case_problem.torque, time_s) else ""
     verb = "are" if len(terms) > 1 else "is"
     return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from biogrip.instrument.instrument import Instrument, Quantity
 from biogrip.keys import Block, Problem
 
 _LARGEST_QUALITY = 1e6
@@ -90,3 +91,13 @@ NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _
 
 With twice their squared lever one, a torque of theirs is the load on the sample.
 """
+
+TORQUE = Quantity("torque", "N m", {"N m": 1.0}, r"$\tau$")
+ROTATION = Quantity(
+    "rotation",
+    "rad",
+    {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
+    r"$\varphi$",
+)
+GRIPPER = Instrument("gripper", TORQUE, ROTATION)
+"""The gripper holds a torque, and the closing rotation of its left arm is read."""

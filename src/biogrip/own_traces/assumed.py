@@ -12,8 +12,17 @@ from biogrip.study.study import Case
 
 def assumed(case: Case) -> dict[str, Any]:
     """Return the blocks of the config that an identification relies on, as plain data."""
-    blocks = ("gripper", "protocol", "search_range", "measurement", "models", "least_squares")
-    return {name: plain(_block(case, name)) for name in blocks} | {"fixed": case.fixed}
+    blocks = (
+        "instrument",
+        "gripper",
+        "protocol",
+        "search_range",
+        "measurement",
+        "models",
+        "least_squares",
+    )
+    some = blocks if case.instrument.has_jaws else [name for name in blocks if name != "gripper"]
+    return {name: plain(_block(case, name)) for name in some} | {"fixed": case.fixed}
 
 
 def _block(case: Case, name: str) -> Any:
@@ -23,6 +32,9 @@ def _block(case: Case, name: str) -> Any:
 
 def gripper_in_limits(case_problem: CaseProblem) -> str:
     """Return a sentence on the part that the gripper's uncertainty has in the limits."""
+    if not case_problem.instrument.has_jaws:
+        held = case_problem.instrument.held.name
+        return f"Limits are statistical only: the {held} is taken as exact."
     if not case_problem.uncertain_keys:
         return "Limits are statistical only: the gripper is taken as exact."
     keys = ", ".join(key.removesuffix(".share") for key in case_problem.uncertain_keys)

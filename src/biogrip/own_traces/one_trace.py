@@ -20,6 +20,7 @@ from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
 from biogrip.identifiability.onset_profiles import profile_over_onset
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.own_traces.assumed import (
     assumed,
     by_default,
@@ -28,8 +29,9 @@ from biogrip.own_traces.assumed import (
     versions,
 )
 from biogrip.own_traces.fitted_models import judge_again, models_tried
+from biogrip.own_traces.held import with_instrument
 from biogrip.own_traces.late_onset import late_onset
-from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY
+from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.posterior import limits_in, write_samples
@@ -160,6 +162,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             read.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))
         if case_problem.fixed:
             read.append(Note(HARMLESS, _NOT_COMPARED))
+        instrument = case_problem.instrument
         said = exact_data(diagnosis, [*read, *notes_on_fit(fit), *doubts])
         data = {
             WRITTEN_BY: __version__,
@@ -167,6 +170,8 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             "model": case_problem.model.name,
             "model_title": case_problem.model.title,
             "confidence": confidence,
+            "instrument": instrument.kind,
+            "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
             **fixed_data(case_problem),
             "limits": gripper_in_limits(case_problem),
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
@@ -174,7 +179,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             "noise_model": fit.noise_data(),
             **models.data([] if said["fit"] == REJECTED else diagnosis.findings),
             "assumed": assumed(case),
-            "by_default": by_default(options.config),
+            "by_default": by_default(options.config) if instrument.has_jaws else [],
             "versions": versions(),
         }
         samples = None
@@ -198,7 +203,8 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
 def _written(data: dict[str, Any]) -> dict[str, Any]:
     """Round results; keep assumptions, which must be repeatable, and the posterior as they are."""
     kept = {name: data[name] for name in ("assumed", "posterior") if name in data}
-    return {**rounded_numbers(data), **kept}
+    read = INSTRUMENTS[data["reads"]["quantity"]].read
+    return in_own_units({**rounded_numbers(data), **kept}, read)
 
 
 def check_trace_file(trace: Path) -> None:
@@ -233,8 +239,10 @@ def study_of(options: IdentifyOptions) -> Study:
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
-    if isinstance(given := merged.get("measurement"), dict):
-        merged["measurement"] = options.read_as.over(given) | {"file": str(options.trace)}
+    if isinstance(measured := merged.get("measurement"), dict):
+        merged["measurement"] = options.read_as.over(measured) | {"file": str(options.trace)}
+        given = read_configs([options.config]) if options.config else {}
+        merged = with_instrument(merged, given, options.read_as, options.trace)
     # Cases of the config are meant for the workflow.
     merged.pop("only", None)
     if options.posterior:

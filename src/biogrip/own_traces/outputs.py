@@ -2,10 +2,13 @@
 
 import json
 import os
+import re
 from pathlib import Path
+from typing import Any
 
 from biogrip.errors import BiogripError
 from biogrip.files import scratch_path
+from biogrip.instrument.instrument import Quantity
 from biogrip.products.files.parquet import column_names
 from biogrip.terminal import visible
 
@@ -74,3 +77,15 @@ def _is_ours(output: Path) -> bool:
             return WRITTEN_BY.encode() in head
     except (BiogripError, OSError, ValueError, TypeError, RecursionError):
         return False
+
+
+_RADIANS = re.compile("_rad(?=$|_per_s$)")
+
+
+def in_own_units(data: Any, read: Quantity) -> Any:
+    """Return data whose keys end with the unit of what is read, instead of radians."""
+    if isinstance(data, list):
+        return [in_own_units(each, read) for each in data]
+    if not isinstance(data, dict):
+        return data
+    return {_RADIANS.sub(read.suffix, key): in_own_units(each, read) for key, each in data.items()}

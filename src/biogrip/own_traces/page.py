@@ -17,6 +17,7 @@ from biogrip.own_traces.words import (
     evidence_in_words,
     for_a_paper,
     further_notes,
+    in_unit,
     labels_of,
     limits_in_short,
     noise_in_words,
@@ -70,6 +71,7 @@ class Page:
             refused={visible(trace): visible_lines(reason) for trace, reason in refused.items()},
             written_by=f"{WRITTEN_BY} {__version__}",
             labels=labels_of(self._traces),
+            in_unit=in_unit,
         )
         write_text(page, text)
 

@@ -5,20 +5,21 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from biogrip.errors import BiogripError
+from biogrip.errors import BiogripError, nearest
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import ROTATION, Gripper
+from biogrip.instrument.instrument import Quantity
 from biogrip.own_traces.search_ranges import with_own_ranges
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages import recording
-from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE
+from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS
 from biogrip.study.study import Case
 from biogrip.study.validation import measurement_problem
 from biogrip.traces.recordings import Columns
 
-USUAL_COLUMNS = {"time": "time_s", "rotation": "rotation_rad"}
-"""Names of the columns where neither option nor config has others."""
-
+_USUAL_TIME = "time_s"
+# Options that are no keys of ``measurement``.
+_ELSEWHERE = ("hold", "reading")
 _OPTIONS = {"noise_rad": "noise", "start_s": "start"}
 
 
@@ -29,9 +30,15 @@ class ReadAs:
     Parameters
     ----------
     time, rotation
-        Names of the columns, by default those of `USUAL_COLUMNS`.
-    time_unit, rotation_unit
-        Units of the columns, where their names have none.
+        Names of the columns, by default ``time_s`` and ``rotation_rad``.
+    reading
+        Quantity that another instrument reads, and the name of its column; by default that of the
+        quantity with its unit, as in ``modulus_Pa``.
+    time_unit, rotation_unit, reading_unit
+        Units of the columns, where their names have none; the last is of other readings than
+        rotations.
+    hold
+        What is held from 0 to the end of the trace, SI units, where no config says so.
     skip, scale
         Lines before the header, and rotation over the number in the column.
     start_s, fit_start
@@ -50,8 +57,11 @@ class ReadAs:
 
     time: str | None = None
     rotation: str | None = None
+    reading: tuple[str, str] | None = None
+    hold: float | None = None
     time_unit: str | None = None
     rotation_unit: str | None = None
+    reading_unit: str | None = None
     skip: int | None = None
     scale: float | None = None
     start_s: float | None = None
@@ -66,31 +76,36 @@ class ReadAs:
     @property
     def block(self) -> dict[str, str | float | bool]:
         """Keys of the ``measurement`` block that are given."""
-        return {key: value for key, value in asdict(self).items() if value is not None}
+        given = {key: value for key, value in asdict(self).items() if value is not None}
+        named = dict([self.reading]) if self.reading else {}
+        return {key: value for key, value in given.items() if key not in _ELSEWHERE} | named
 
     def over(self, measurement: Mapping[str, Any]) -> dict[str, Any]:
         """Return the ``measurement`` block of a config with the options laid over it.
 
-        An onset that is given replaces one that is fitted, and the reverse.
+        An onset that is given replaces one that is fitted, and the reverse; so does a reading.
         """
-        one_of = {"start_s", "fit_start"}
-        replaced = one_of if one_of & self.block.keys() else set()
+        replaced: set[str] = set()
+        for one_of in ({"start_s", "fit_start"}, {*READINGS}):
+            replaced |= one_of if one_of & self.block.keys() else set()
         kept = {key: value for key, value in measurement.items() if key not in replaced}
-        return USUAL_COLUMNS | kept | self.block
+        return {"time": _USUAL_TIME} | kept | self.block
 
-    @property
-    def columns(self) -> Columns:
-        """Names and units of the file's columns."""
+    def columns(self, read: Quantity) -> Columns:
+        """Return names and units of the columns of a file with readings of a quantity."""
+        is_rotation = read == ROTATION
+        named = dict([self.reading]) if self.reading else {ROTATION.name: self.rotation}
         return Columns(
-            self.time or USUAL_COLUMNS["time"],
-            self.rotation or USUAL_COLUMNS["rotation"],
+            self.time or _USUAL_TIME,
+            named.get(read.name) or read.column,
             self.time_unit,
-            self.rotation_unit,
+            self.rotation_unit if is_rotation else self.reading_unit,
             self.skip or 0,
             1.0 if self.scale is None else self.scale,
             self.start_s,
             by_options=True,
             sd=self.sd,
+            quantity=read,
         )
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
@@ -108,7 +123,9 @@ class ReadAs:
         BiogripError
             With file, line and column, if the trace cannot be used.
         """
-        trace = recording.read_checked(file, gripper, problem, self.columns)
+        trace = recording.read_checked(
+            file, gripper, problem, self.columns(problem.instrument.read)
+        )
         return recording.with_fitted_onset(trace, problem)
 
     def check(self) -> None:
@@ -119,6 +136,12 @@ class ReadAs:
         BiogripError
             With the option's name.
         """
+        if self.reading and self.reading[0] not in READINGS:
+            allowed = [name for name in READINGS if name != ROTATION.name]
+            raise BiogripError(
+                f"--reading: found '{self.reading[0]}', allowed are {', '.join(allowed)}."
+                + nearest(self.reading[0], allowed)
+            )
         for key, value in self.block.items():
             option = _OPTIONS.get(key, key).replace("_", "-")
             if self.noise_model == COLOURED and key in KNOWN_NOISE:

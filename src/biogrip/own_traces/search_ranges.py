@@ -33,11 +33,11 @@ def ranges_of(
 ) -> dict[str, GeneRange]:
     """Compute search ranges of springs and dampers from the scales of a trace.
 
-    Torque over rotation is the scale of stiffness at the jaws. A spring changes the trace by less
-    than its noise if it is softer by more than the ratio of the trace to the noise, over all
-    readings, or if it turns by less than what all readings together resolve. A damper is as stiff
-    as c/t after a time t, which is between the shortest sampling interval and the duration; so is
-    a springpot, with a power of t.
+    Torque over rotation is the scale of stiffness at the jaws, and load over deformation that of
+    other instruments. A spring changes the trace by less than its noise if it is softer by more
+    than the ratio of the trace to the noise, over all readings, or if it turns by less than what
+    all readings together resolve. A damper is as stiff as c/t after a time t, which is between the
+    shortest sampling interval and the duration; so is a springpot, with a power of t.
 
     Parameters
     ----------
@@ -66,6 +66,8 @@ def ranges_of(
     ]
     torque_Nm = float(np.max(np.abs(ends)))
     stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * turn_rad)
+    if case_problem.instrument.deforms:
+        stiffness = turn_rad / torque_Nm
     low, high = stiffness / softer, stiffness * stiffer
     short_s, long_s = float(np.min(np.diff(time_s))), float(np.ptp(time_s))
     dampers = _decades(low * short_s, high * long_s)

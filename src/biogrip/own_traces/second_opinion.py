@@ -80,18 +80,24 @@ def second_opinion(
         "explain the trace far better "
         f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
     )
+    held = case_problem.instrument.held.name
+    or_flows = (
+        f" Or the sample flows: as long as the {held} is constant, a drift and a damper without a "
+        "spring give the same line."
+    )
+    if case_problem.instrument.deforms:
+        or_flows = ""
     if not case_problem.drift and drift_is_flow(case_problem.torque, recorded.time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
-            "sample flows. Under this torque both give the same line, and the trace cannot tell "
-            "which it is: a torque that changes would."
+            f"sample flows. Under this {held} both give the same line, and the trace cannot tell "
+            f"which it is: a {held} that changes would."
         )
     else:
         text = (
             f"An offset and a drift of the instrument, fitted along, {better}: "
             f"{'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, identify "
-            "the trace with --offset --drift. Or the sample flows: as long as the torque is "
-            "constant, a drift and a damper without a spring give the same line."
+            f"the trace with --offset --drift.{or_flows}"
         )
     return [Note(DOUBT if changed else HARMLESS, text)]
 

@@ -40,7 +40,7 @@ def in_words(found: Mapping[str, Any]) -> str:
         f"{visible(found['trace'])}: fit {found['fit']}",
         *(f"  {visible(reason)}" for reason in found["reasons"]),
         f"{found['samples']} samples, {noise_in_words(found)}, "
-        f"misfit {found['misfit_rad']:.3g} rad",
+        f"misfit {in_unit(found['misfit_rad'], found)}",
         f"{found['model_title']}, {100 * found['confidence']:g} % limits:",
         *(
             f"  {item['quantity']:<{width}}  {_coloured(item['in_words'], item['verdict'])}"
@@ -53,9 +53,9 @@ def in_words(found: Mapping[str, Any]) -> str:
     if "onset_s" in found:
         lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
     if "offset_rad" in found:
-        lines.append(f"Offset of the instrument: {found['offset_rad']:.3g} rad")
+        lines.append(f"Offset of the instrument: {in_unit(found['offset_rad'], found)}")
     if "drift_rad_per_s" in found:
-        lines.append(f"Drift of the instrument: {found['drift_rad_per_s']:.3g} rad/s")
+        lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
     lines += _posterior(found["posterior"]) if "posterior" in found else []
@@ -69,7 +69,12 @@ def noise_in_words(found: Mapping[str, Any]) -> str:
     what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
     if any(given.get(key) is not None for key in KNOWN_NOISE):
         what = "noise as given"
-    return f"{what} {found['scatter_rad']:.3g} rad"
+    return f"{what} {in_unit(found['scatter_rad'], found)}"
+
+
+def in_unit(value: float, found: Mapping[str, Any]) -> str:
+    """Return a number with the unit of what the instrument reads."""
+    return f"{value:.3g} {found['reads']['unit']}".rstrip()
 
 
 def fixed_in_words(found: Mapping[str, Any]) -> list[str]:

@@ -16,7 +16,7 @@ _TELLING = 0.01
 def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
     """Return True if a drift looks like the flow of a damper without a spring.
 
-    Under a constant torque both are the same line.
+    Under a constant load both are the same line. Under a deformation nothing flows on.
 
     Parameters
     ----------
@@ -25,6 +25,8 @@ def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
     time_s : (n_samples,)
         Sampling times.
     """
+    if torque.deforms:
+        return False
     drives = 1 if torque.symmetric else 2
     static = np.eye(drives)[:, None, :]
     lags = StepResponse(

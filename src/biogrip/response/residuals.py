@@ -9,7 +9,8 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
 from biogrip.response.held_modes import compute_held_modes
@@ -43,6 +44,8 @@ class Residuals:
         functions and noise model. Residuals are white.
     noise_rad
         Standard deviation of the noise; by default estimated from neighbouring readings.
+    instrument
+        The instrument, for its words.
     """
 
     def __init__(
@@ -55,7 +58,9 @@ class Residuals:
         condensed: Condensed,
         *,
         noise_rad: float | None = None,
+        instrument: Instrument = GRIPPER,
     ) -> None:
+        self.instrument = instrument
         self._gripper = gripper
         self.model = model
         self._torque = torque
@@ -84,8 +89,10 @@ class Residuals:
         """Ascending sampling times, (n_samples,); None of several traces together."""
         return self._time_s
 
-    def grip(self, log_parameters: Array) -> Grip:
-        """Return the force with which the jaws press a sample or would have to pull it."""
+    def grip(self, log_parameters: Array) -> Grip | None:
+        """Return the force with which the jaws press a sample or would have to pull it, if any."""
+        if not self.instrument.has_jaws:
+            return None
         network = self.model.network(np.exp(log_parameters))
         return compute_grip(self._gripper, network, self._torque, nonlinear=self.nonlinear)
 

@@ -22,7 +22,10 @@ from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
 from biogrip.instrument.calibration import CalibrationTest
-from biogrip.keys import BY_KIND, OPEN, Block, Checked, Printed, Problem
+from biogrip.instrument.gripper import GRIPPER
+from biogrip.instrument.instrument import Instrument
+from biogrip.instrument.instruments import INSTRUMENTS, KINDS
+from biogrip.keys import BY_KIND, OPEN, Block, Checked, OneOf, Printed, Problem
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.gripper_block import GripperBlock
 from biogrip.study.measurement_block import MeasurementBlock
@@ -93,6 +96,15 @@ class Shared(Checked, BaseModel):
 
     model_config = OPEN
 
+    instrument: Annotated[
+        str,
+        OneOf(KINDS),
+        Field(
+            description="`gripper`: a torque is held and a rotation read; `creep`: a force is held "
+            "and a displacement read, or a stress and a strain; `relaxation`: the other way round. "
+            "The blocks gripper, actuator and calibration are of the first alone."
+        ),
+    ] = GRIPPER.kind
     gripper: GripperBlock
     protocol: ProtocolBlock
     measurement: MeasurementBlock
@@ -193,6 +205,15 @@ class CaseBlock(Shared):
         return self.measurement.file is not None
 
     @property
+    def held_by(self) -> Instrument:
+        """The instrument, by its kind, and by what the protocol holds and the trace is of."""
+        kind = _of_kind(self.instrument)
+        bases = self.protocol.phases[0].bases
+        fitting = [each for each in kind if each.held.column in bases] or kind
+        named = [each for each in fitting if each.read.name in self.measurement.readings]
+        return (named or fitting)[0]
+
+    @property
     def known(self) -> Mapping[str, float]:
         """Parameters with known values, which are not identified."""
         return self.fixed or {}
@@ -219,6 +240,7 @@ class CaseBlock(Shared):
             (("fixed", *path), text)
             for path, text in fixed_problems(self.sample.sample.model, self.known)
         )
+        yield from self._instrument_problems()
         yield from self._contact_problems()
         yield from self._design_problems()
         yield from self._method_problems()
@@ -234,8 +256,37 @@ class CaseBlock(Shared):
                 text = f"found '{self.assumed_gripper}', allowed is '{CALIBRATED}' or keys of a "
                 yield ("assumed_gripper",), f"{text}gripper block."
 
+    def _instrument_problems(self) -> Iterator[Problem]:
+        """Find a protocol, a reading and equations that are not of the kind of instrument."""
+        kind = _of_kind(self.instrument)
+        for path, text in self.protocol.instrument_problems(kind):
+            yield ("protocol", *path), text
+        allowed = [each.read.name for each in kind]
+        for name in self.measurement.readings if self.recorded else ():
+            if name not in allowed:
+                text = f"is not what {self.instrument} reads; allowed is {' or '.join(allowed)}."
+                yield ("measurement", name), text
+            elif name != self.held_by.read.name:
+                text = f"is not read where {self.held_by.held.name} is held; allowed is "
+                yield ("measurement", name), f"{text}{self.held_by.read.name}."
+        if self.held_by.has_jaws:
+            return
+        for key, value in (
+            ("target", self.models.target),
+            ("identification", self.models.identification),
+        ):
+            if value != "linear":
+                yield ("models", key), f"found {value}, allowed with {self.instrument} is linear."
+        for key in ("contact", "assumed_gripper"):
+            if getattr(self, key) is not None:
+                yield (key,), f"is of the gripper; leave it out with {self.instrument}."
+        if self.sample.size_m is not None:
+            yield ("sample", "size_m"), f"is of the gripper; leave it out with {self.instrument}."
+
     def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
         """Find a sample that does not fit between the jaws, and what is no comb drive's."""
+        if not self.held_by.has_jaws:
+            return
         in_volts = all(phase.voltage_V is not None for phase in self.protocol.phases)
         for path, text in self.gripper.comb_problems(comb, in_volts=in_volts):
             yield ("gripper", *path), text
@@ -368,6 +419,10 @@ class CaseBlock(Shared):
         if not 5 / frequency <= test.duration_s <= most:
             text = f"found {test.duration_s}, allowed is from five periods of the arms' ring, "
             yield ("calibration", "duration_s"), f"{text}{5 / frequency:.3g} s, to {most:.3g} s."
+
+
+def _of_kind(kind: str) -> list[Instrument]:
+    return [each for each in INSTRUMENTS.values() if each.kind == kind]
 
 
 OVERRIDABLE = (*Shared.model_fields, *METHOD_BLOCKS)

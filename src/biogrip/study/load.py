@@ -62,5 +62,7 @@ def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
             for block in OVERRIDABLE:
                 if isinstance(config.get(block), dict):
                     case[block] = overlaid(config[block], case.get(block, {}))
+                elif block in config:
+                    case.setdefault(block, config[block])
         filled[name] = case
     return {**config, "cases": filled}

@@ -6,24 +6,31 @@ from typing import Annotated
 
 from pydantic import Field
 
+from biogrip.errors import nearest
 from biogrip.experiment.noise import Noise
 from biogrip.experiment.sampling import Burst, Sampling
+from biogrip.instrument.gripper import ROTATION
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.keys import Block, OneOf, Problem
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns
+from biogrip.traces.recordings import TIME_UNITS, Columns
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
 KNOWN_NOISE = ("noise_rad", "sd", "noise_share")
 """Keys that say how large the noise is."""
 
-_COLUMNS = ("time", "rotation", "time_unit", "rotation_unit", "skip", "scale")
+READINGS = tuple(INSTRUMENTS)
+"""Keys that name the column of the readings, one for each quantity that an instrument reads."""
+
+_COLUMNS = ("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale")
 _OF_FILE = (*_COLUMNS, *KNOWN_NOISE, "start_s", "fit_start")
+_Column = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class MeasurementBlock(Block):
-    """Sampling and noise of the left arm's rotation, or the file of a recorded trace."""
+    """Sampling and noise of what the instrument reads, or the file of a recorded trace."""
 
     rate_Hz: Annotated[float, Field(ge=1e-9, le=1e9)]
     """Sampling rate; the first sample is at t = 0."""
@@ -41,10 +48,27 @@ class MeasurementBlock(Block):
     """Name of the file's column of times; its clock starts with the protocol, or before."""
     rotation: Annotated[str | None, Field(min_length=1, max_length=4000)] = None
     """Name of the file's column of the left arm's closing rotation."""
+    displacement: _Column = None
+    """Name of the file's column of displacements under a force that is held (`instrument:
+    creep`)."""
+    strain: _Column = None
+    """Name of that of strains under a stress that is held (creep)."""
+    compliance: _Column = None
+    """Name of that of creep compliances: strains over the largest stress that is held (creep)."""
+    force: _Column = None
+    """Name of that of forces at a displacement that is held (`instrument: relaxation`)."""
+    stress: _Column = None
+    """Name of that of stresses at a strain that is held (relaxation)."""
+    modulus: _Column = None
+    """Name of that of relaxation moduli: stresses over the largest strain that is held
+    (relaxation)."""
     time_unit: Annotated[str | None, OneOf(TIME_UNITS)] = None
     """Unit of the times, where the column's name does not end in it."""
-    rotation_unit: Annotated[str | None, OneOf(ROTATION_UNITS)] = None
+    rotation_unit: Annotated[str | None, OneOf(ROTATION.units)] = None
     """Unit of the rotations, where the column's name does not end in it."""
+    reading_unit: Annotated[str | None, Field(min_length=1, max_length=20)] = None
+    """Unit of what another instrument reads, where the column's name does not end in it; of strains
+    by default 1."""
     skip: Annotated[int | None, Field(ge=0, le=1_000_000)] = None
     """Number of lines in the file before its header, as programs of instruments write them."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
@@ -86,18 +110,24 @@ class MeasurementBlock(Block):
     @property
     def columns(self) -> Columns:
         """Columns of a recorded trace's file."""
+        (name,) = self.readings
         assert self.time is not None
-        assert self.rotation is not None
         return Columns(
             self.time,
-            self.rotation,
+            getattr(self, name),
             self.time_unit,
-            self.rotation_unit,
+            self.rotation_unit if name == ROTATION.name else self.reading_unit,
             self.skip or 0,
             1.0 if self.scale is None else self.scale,
             self.start_s,
             sd=self.sd,
+            quantity=INSTRUMENTS[name].read,
         )
+
+    @property
+    def readings(self) -> list[str]:
+        """Quantities whose columns are named; of a valid recorded trace, one."""
+        return [name for name in READINGS if getattr(self, name) is not None]
 
     @property
     def fits_offset(self) -> bool:
@@ -134,8 +164,24 @@ class MeasurementBlock(Block):
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."
             return
-        for key in ("time", "rotation"):
-            if getattr(self, key) is None:
-                yield (key,), f"is missing: a recorded trace needs the name of its {key} column."
+        if self.time is None:
+            yield ("time",), "is missing: a recorded trace needs the name of its time column."
+        yield from self._reading_problems()
         if problem := trace_file_problem(self.file):
             yield ("file",), problem
+
+    def _reading_problems(self) -> Iterator[Problem]:
+        if not self.readings:
+            text = "is missing: a recorded trace needs the name of its rotation column"
+            yield (ROTATION.name,), f"{text}, or of another reading: {', '.join(READINGS[1:])}."
+            return
+        name, *others = self.readings
+        for other in others:
+            yield (other,), f"does not go with {name}; allowed is one of {', '.join(READINGS)}."
+        key, other_key = ("rotation_unit", "reading_unit")[:: 1 if name == ROTATION.name else -1]
+        if getattr(self, other_key) is not None:
+            yield (other_key,), f"does not go with {name}; allowed is {key}."
+        allowed = INSTRUMENTS[name].read.units
+        if self.reading_unit is not None and self.reading_unit not in allowed:
+            text = f"found '{self.reading_unit}', allowed are {', '.join(allowed)}."
+            yield ("reading_unit",), text + nearest(self.reading_unit, allowed)

@@ -9,10 +9,11 @@ from pydantic_core import ErrorDetails
 
 from biogrip.digits import counted
 from biogrip.errors import nearest
+from biogrip.instrument.gripper import ROTATION
 from biogrip.keys import CONFLICT, TWICE, Problem
 from biogrip.study.plain import built
 from biogrip.study.schema import Schema, schema_of
-from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, nearest_unit
+from biogrip.traces.recordings import TIME_UNITS, nearest_unit
 
 T = TypeVar("T")
 MOST_EXPLAINED = 1000
@@ -28,7 +29,7 @@ _RETIRED: dict[tuple[Hashable, ...], str] = {
     ("design", "tried"): "now called `candidates`.",
 }
 
-_UNITS = ([*TIME_UNITS], [*ROTATION_UNITS])
+_UNITS = ([*TIME_UNITS], [*ROTATION.units])
 _BOUNDS = {"exclusiveMinimum": "greater than", "minimum": "at least", "maximum": "at most"}
 _LONGEST = 40
 

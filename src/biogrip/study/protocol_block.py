@@ -1,7 +1,7 @@
-"""Config block of the protocol: torques or voltages of the comb drives over time."""
+"""Config block of the protocol: what is held over time, as torques or voltages of comb drives."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -9,15 +9,23 @@ from pydantic import Field
 
 from biogrip.experiment.protocol import Harmonic, Load, Phase, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
+from biogrip.instrument.instrument import Instrument
+from biogrip.instrument.instruments import HELD
 from biogrip.keys import Block, Problem
 
 _LONGEST_S = 1e9
 _MOST_PERIODS = 10_000
+_VOLTAGE = "voltage_V"
+_BASES = (HELD[0].column, _VOLTAGE, *(held.column for held in HELD[1:]))
+# What a comb drive pulls with.
+_PULLS = _BASES[:2]
+# A load or a deformation, either way.
+_Signed = Annotated[float | None, Field(ge=-1e12, le=1e12)]
 
 
 @dataclass(frozen=True)
 class PhaseBlock(Block):
-    """A phase of the protocol: a hold, a ramp or a sinusoid, in torque or in voltage."""
+    """A phase of the protocol: a hold, a ramp or a sinusoid, of one quantity in all phases."""
 
     duration_s: Annotated[float, Field(ge=1e-6, le=_LONGEST_S)]
     """Duration of the phase; of all together at most 1e9 s."""
@@ -39,14 +47,44 @@ class PhaseBlock(Block):
     """Amplitude of a sinusoid on top of a held voltage; needs frequency_Hz."""
     voltage_right_V: Annotated[float | None, Field(ge=0, le=1e4)] = None
     """Held voltage of the right arm, where it differs."""
+    force_N: _Signed = None
+    """Force on the sample, instead of torque_Nm, where the instrument is `creep`; so is stress_Pa.
+    Where it is `relaxation`, displacement_m or strain."""
+    to_force_N: _Signed = None
+    """Force at the end of a ramp."""
+    amplitude_N: _Signed = None
+    """Amplitude of a sinusoid on top of a held force."""
+    stress_Pa: _Signed = None
+    """Stress on the sample."""
+    to_stress_Pa: _Signed = None
+    """Stress at the end of a ramp."""
+    amplitude_Pa: _Signed = None
+    """Amplitude of a sinusoid on top of a held stress."""
+    displacement_m: _Signed = None
+    """Displacement of the sample."""
+    to_displacement_m: _Signed = None
+    """Displacement at the end of a ramp, as the ramp of loading."""
+    amplitude_m: _Signed = None
+    """Amplitude of a sinusoid on top of a held displacement."""
+    strain: _Signed = None
+    """Strain of the sample."""
+    to_strain: _Signed = None
+    """Strain at the end of a ramp, as the ramp of loading."""
+    amplitude_strain: _Signed = None
+    """Amplitude of a sinusoid on top of a held strain."""
     frequency_Hz: Annotated[float | None, Field(ge=1e-9, le=1e9)] = None
     """Frequency of the sinusoid, which starts at its mean, rising."""
 
     @property
+    def bases(self) -> list[str]:
+        """Keys that say what is held; in a valid phase, one."""
+        return [key for key in _BASES if getattr(self, key) is not None]
+
+    @property
     def drives(self) -> bool:
-        """True if any torque or voltage of the phase is above zero."""
-        torques = self.torque_Nm, self.to_torque_Nm, self.torque_right_Nm
-        return any((*torques, self.voltage_V, self.to_voltage_V, self.voltage_right_V))
+        """True if anything that the phase holds differs from zero."""
+        own = vars(self).items()
+        return any(value for key, value in own if key not in ("duration_s", "frequency_Hz"))
 
     def phase(self, per_square_volt: float) -> Phase:
         """Return the phase in torques; a voltage's torque is `per_square_volt` V^2 (eq. 9)."""
@@ -54,8 +92,9 @@ class PhaseBlock(Block):
             left = self._load(self.voltage_V, self.to_voltage_V, self.amplitude_V)
             loads = left, _at(left, self.voltage_right_V)
             return Phase(self.duration_s, *(_squared(load, per_square_volt) for load in loads))
-        assert self.torque_Nm is not None
-        left = self._load(self.torque_Nm, self.to_torque_Nm, self.amplitude_Nm)
+        (base,) = self.bases
+        keys = (base, *_further(base))
+        left = self._load(*(getattr(self, key) for key in keys))
         return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
 
     def _load(self, value: float, to: float | None, amplitude: float | None) -> Load:
@@ -64,14 +103,15 @@ class PhaseBlock(Block):
     def problems(self) -> Iterator[Problem]:
         """Find keys that are in conflict."""
         given = {name: value for name, value in vars(self).items() if value is not None}
-        bases = [key for key in ("torque_Nm", "voltage_V") if key in given]
-        if len(bases) != 1:
-            found = " and ".join(bases) or "neither"
-            yield (), f"found {found}, allowed is one of torque_Nm and voltage_V."
+        if len(self.bases) != 1:
+            found = " and ".join(self.bases) or "neither"
+            allowed = f"{' and '.join(_PULLS)}, or with another instrument of "
+            others = ", ".join(base for base in _BASES if base not in _PULLS)
+            yield (), f"found {found}, allowed is one of {allowed}{others}."
             return
-        by = bases[0]
-        quantity, unit = by.split("_")
-        swing, right, ramp = f"amplitude_{unit}", f"{quantity}_right_{unit}", f"to_{by}"
+        by = self.bases[0]
+        ramp, swing = _further(by)
+        right = by.replace("_", "_right_") if by in _PULLS else ""
         for key in given:
             if key not in ("duration_s", by, right, ramp, swing, "frequency_Hz"):
                 yield (key,), f"does not go with {by}."
@@ -84,7 +124,7 @@ class PhaseBlock(Block):
             yield ("frequency_Hz",), f"{text} in a phase."
         if swing in given and ramp in given:
             yield (), "has a ramp and a sinusoid; allowed is one of them in a phase."
-        if given.get(swing, 0) > min(given[by], given.get(right, given[by])):
+        if by in _PULLS and given.get(swing, 0) > min(given[by], given.get(right, given[by])):
             text = f"found {given[swing]}, allowed is at most {by}: comb drives only pull."
             yield (swing,), text
 
@@ -101,10 +141,18 @@ class ProtocolBlock(Block):
         """Duration of the protocol."""
         return sum(phase.duration_s for phase in self.phases)
 
-    def torques(self, comb: CombDrive) -> tuple[Phase, ...]:
-        """Return all phases in torques, converting voltages (eq. 9)."""
+    def held(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
+        """Return all phases in units of what the instrument holds.
+
+        Voltages are converted to torques (eq. 9). What a relative reading is divided by is one.
+        """
         per_square_volt = 0.5 * capacitance_slope(comb)
-        return tuple(phase.phase(per_square_volt) for phase in self.phases)
+        phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
+        if not instrument.relative:
+            return phases
+        ends = [phase.left.at([0.0, phase.duration_s]) for phase in phases]
+        largest = max((end for each in ends for end in each.tolist()), key=abs)
+        return tuple(_divided(phase, largest) for phase in phases)
 
     def problems(self) -> Iterator[Problem]:
         """Refuse a protocol that is too long, or in which all torques are zero."""
@@ -112,8 +160,43 @@ class ProtocolBlock(Block):
             text = f"found {self.end_s:g} s in all phases together, allowed is at most "
             yield ("phases",), f"{text}{_LONGEST_S:g} s."
         if not any(phase.drives for phase in self.phases):
-            text = "no phase has a torque, so nothing would move; allowed is at least one above"
-            yield ("phases",), f"{text} 0 N m."
+            (base, *_) = self.phases[0].bases or ["torque_Nm"]
+            text = f"no phase has a {base.partition('_')[0]}, so nothing would move; allowed is at"
+            yield ("phases",), f"{text} least one above 0{_unit(base)}."
+
+    def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
+        """Find phases that hold what none of some instruments, of one kind, holds."""
+        columns = list(dict.fromkeys(instrument.held.column for instrument in instruments))
+        allowed = [*columns, _VOLTAGE] if _BASES[0] in columns else columns
+        for index, phase in enumerate(self.phases):
+            for base in phase.bases:
+                if base not in allowed:
+                    text = f"is not what {instruments[0].kind} holds; allowed is "
+                    yield ("phases", index, base), f"{text}{' or '.join(allowed)}."
+                elif base not in _PULLS and base != self.phases[0].bases[0]:
+                    text = f"does not go with {self.phases[0].bases[0]} in another phase; allowed "
+                    yield ("phases", index, base), f"{text}is one of them."
+
+
+def _further(base: str) -> tuple[str, str]:
+    """Return the keys of a ramp's end and of a sinusoid's amplitude."""
+    return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
+
+
+def _unit(base: str) -> str:
+    return next((f" {held.unit}".rstrip() for held in HELD if held.column == base), " V")
+
+
+def _divided(phase: Phase, by: float) -> Phase:
+    """Return a phase whose loads, alike on both sides, are divided by a number."""
+    own = phase.left
+    divided = Load(
+        own.value_Nm / by,
+        own.slope_Nm_per_s / by,
+        own.curvature_Nm_per_s2 / by,
+        tuple(replace(h, amplitude_Nm=h.amplitude_Nm / by) for h in own.harmonics),
+    )
+    return Phase(phase.duration_s, divided, divided)
 
 
 def _at(load: Load, value: float | None) -> Load:

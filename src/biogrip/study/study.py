@@ -15,7 +15,7 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS, Method
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.interpretations import read_blocks
@@ -53,7 +53,11 @@ class Case:
     """True if the trace was recorded, not simulated."""
     actuator = _of_case(lambda case: case.study.config.actuator)
     """Comb drive of the study."""
-    sample = _of_case(lambda case: case.block.sample.sample)
+    instrument = _of_case(lambda case: case.block.held_by)
+    """What is held and read."""
+    sample = _of_case(
+        lambda case: replace(case.block.sample.sample, per_area=case.instrument.per_area)
+    )
     """Constitutive model."""
     size_m = _of_case(lambda case: case.block.sample.size_m)
     """Diameter of the sample, if it is given."""
@@ -113,12 +117,14 @@ class Case:
 
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
-        """Phases of the protocol, in torques."""
-        return self.block.protocol.torques(self.actuator)
+        """Phases of the protocol, in torques or what else the instrument holds."""
+        return self.block.protocol.held(self.instrument, self.actuator)
 
     @cached_property
     def gripper(self) -> Gripper:
-        """True gripper, at the angle at which the jaws touch the sample."""
+        """True gripper, at the angle at which the jaws touch the sample; or none."""
+        if not self.instrument.has_jaws:
+            return NO_ARMS
         neutral = self.block.gripper.neutral
         if self.size_m is None:
             return neutral
@@ -172,13 +178,16 @@ class Case:
             self.ranges,
             self.sample,
             self.fixed,
+            self.instrument,
             nonlinear=self.block.models.identification == "nonlinear",
             offset=measurement.fits_offset,
             drift=measurement.fits_drift,
             noise_rad=measurement.noise_rad,
             noise_share=measurement.noise_share,
             coloured=measurement.coloured,
-            uncertainty=self.block.gripper.uncertainties(self.actuator),
+            uncertainty=(
+                self.block.gripper.uncertainties(self.actuator) if self.instrument.has_jaws else {}
+            ),
             fit_start=measurement.fit_start,
         )
 
@@ -218,7 +227,8 @@ class Case:
     def models(self) -> dict[str, Sample]:
         """Sample models to fit to the case's traces by name, see `CANDIDATES`."""
         names = (*self.study.config.model_selection.models, self.sample.candidate)
-        return {name: CANDIDATES[name] for name in names}
+        per_area = self.instrument.per_area
+        return {name: replace(CANDIDATES[name], per_area=per_area) for name in names}
 
     @property
     def compared_models(self) -> dict[str, Sample]:
@@ -330,12 +340,12 @@ class Study:
     def phases(self) -> tuple[Phase, ...]:
         """Protocol of all cases if it is the same, else of the study."""
         own = {case.phases for case in self.cases.values()}
-        return own.pop() if len(own) == 1 else self.config.protocol.torques(self.config.actuator)
+        return own.pop() if len(own) == 1 else self.config.protocol.held(GRIPPER, self.actuator)
 
     @property
     def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
         """Protocol and sampling, for cases that do not change them."""
-        phases = self.config.protocol.torques(self.config.actuator)
+        phases = self.config.protocol.held(GRIPPER, self.config.actuator)
         return phases, self.config.measurement.sampling
 
     @property

@@ -18,11 +18,12 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.instrument import Instrument, Quantity
 from biogrip.response.nuisance import without
 from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
 from biogrip.traces.onset import begins_constant, estimate_onset
-from biogrip.traces.recordings import ROTATION_UNITS, TIME_UNITS, Columns, Recording, place, unit_of
+from biogrip.traces.recordings import TIME_UNITS, Columns, Recording, place, unit_of
 
 LARGEST_SHARE = 1.5
 """Largest plausible rotation, as a multiple of the free rotation.
@@ -104,14 +105,15 @@ def check_recording(
     noise_rad: float | None = None,
     typical_rad: float | None = None,
     onset_s: float | None = None,
+    instrument: Instrument = GRIPPER,
 ) -> str | None:
-    """Refuse a trace that is impossible with the gripper and protocol.
+    """Refuse a trace that is impossible with the instrument and protocol.
 
     Checked in this order: times outside the protocol, or covering too little of it; no response
     to the torque; a response of the wrong sign; a rotation above the free gripper's, or so small
     that the sample would be hundreds of times stiffer than the hinges, so that the trace shows only
     errors of the instrument. A trace in a wrong unit fails one of these checks. A small rotation
-    passes if a given noise is far smaller still.
+    passes if a given noise is far smaller still. Without arms, nothing limits a reading.
 
     Parameters
     ----------
@@ -131,6 +133,8 @@ def check_recording(
     onset_s
         Time of the trace's clock at which the protocol starts; readings before it are allowed if
         it is given.
+    instrument
+        What is held and read.
 
     Returns
     -------
@@ -144,33 +148,46 @@ def check_recording(
         plausible.
     """
     _check_times(recording, gripper, torque, path, columns, onset_s)
-    trace, lagged, free = (
-        recording.rotation_rad,
-        lagged_torques(torque, _LAG_SHARES),
-        free_rotation(gripper, torque),
-    )
+    trace, lagged = recording.rotation_rad, lagged_torques(torque, _LAG_SHARES)
+    free = free_rotation(gripper, torque)
     largest = float(np.abs(trace).max())
     if largest > _ABSURD * free:
         # Beyond this its square could overflow.
         _check_turn(recording, largest, free, path, columns, None)
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
+    read, held = columns.quantity, instrument.held.name
     if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
         raise BiogripError(
-            f"{_extent(recording, path)}, column '{columns.rotation}': found no response to the "
-            f"torque, but {trace.mean():.3g} rad throughout, give or take {trace.std():.2g} rad; "
-            "allowed is a rotation from zero that follows the torque and stands out of the noise."
+            f"{_extent(recording, path)}, column '{columns.reading}': found no response to the "
+            f"{held}, but {trace.mean():.3g}{_unit(read)} throughout, give or take "
+            f"{trace.std():.2g}{_unit(read)}; allowed is a {read.name} from zero that follows the "
+            f"{held} and stands out of the noise."
         )
     if _mirrored(functions, gripper, noise_rad):
         raise BiogripError(
-            f"{_extent(recording, path)}, column '{columns.rotation}': found a rotation that goes "
-            "against the torque, allowed is the closing rotation, positive where the arm closes. "
-            "It would fit if it were -1 times (is opening counted as positive? Then scale it by "
-            "-1), or if an offset or drift of the instrument, where it has one, were declared."
+            f"{_extent(recording, path)}, column '{columns.reading}': found a {read.name} that "
+            f"goes against the {held}, allowed is {_sign(instrument)}, or if an offset or drift of "
+            "the instrument, where it has one, were declared."
         )
+    if not instrument.has_jaws:
+        return None
     turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
     return _check_turn(recording, turn, free, path, columns, typical_rad)
+
+
+def _unit(quantity: Quantity) -> str:
+    return f" {quantity.unit}".rstrip()
+
+
+def _sign(instrument: Instrument) -> str:
+    if instrument.has_jaws:
+        return (
+            "the closing rotation, positive where the arm closes. It would fit if it were -1 times "
+            "(is opening counted as positive? Then scale it by -1)"
+        )
+    return "one of the same sign. It would fit if it were -1 times (then scale it by -1)"
 
 
 def free_rotation(gripper: Gripper, torque: TorqueHistory) -> float:
@@ -207,7 +224,7 @@ def _check_times(
 
     if fits(1.0):
         return
-    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS)
+    unit = unit_of(path, columns.time, columns.time_unit, TIME_UNITS, "time_unit")
     hint = _other_units(unit, TIME_UNITS, fits)
     for sample in np.flatnonzero((time_s < earliest) | (time_s > end_s + slack))[:1]:
         if not hint and onset_s is None:
@@ -328,8 +345,9 @@ def _check_turn(
 
     if fits(1.0):
         return None
-    unit = unit_of(path, columns.rotation, columns.rotation_unit, ROTATION_UNITS)
-    hint = _other_units(unit, ROTATION_UNITS, fits)
+    allowed = columns.quantity.units
+    unit = unit_of(path, columns.reading, columns.reading_unit, allowed, columns.unit_key)
+    hint = _other_units(unit, allowed, fits)
     if noise_rad is not None and _FAR_ABOVE * noise_rad < turn < smallest:
         return (
             f"The largest rotation is {turn:.3g} rad, where without any sample the arm turns by "
@@ -343,7 +361,7 @@ def _check_turn(
     )
     sample = np.argmax(np.abs(recording.rotation_rad))
     raise BiogripError(
-        f"{place(path, recording.lines[sample], columns.rotation)}: found "
+        f"{place(path, recording.lines[sample], columns.reading)}: found "
         f"{recording.rotation_rad[sample]:.3g} rad as the largest rotation, and {turn:.3g} rad as "
         f"the largest with the noise smoothed out; allowed is {limit} {free:.3g} rad."
         f"{hint}"

@@ -15,10 +15,11 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
+from biogrip.instrument.gripper import ROTATION
+from biogrip.instrument.instrument import Quantity
 from biogrip.terminal import visible
 
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
-ROTATION_UNITS = {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": np.pi / 180}
 
 FEWEST_SAMPLES = 10
 MOST_ROWS = 10_000_000
@@ -53,27 +54,34 @@ class Columns:
 
     time: str
     """Name of the column of times."""
-    rotation: str
-    """Name of that of rotations."""
+    reading: str
+    """Name of that of what the instrument reads."""
     time_unit: str | None = None
     """Key of `TIME_UNITS`; None if the column's name ends with the unit."""
-    rotation_unit: str | None = None
-    """Key of `ROTATION_UNITS`, likewise."""
+    reading_unit: str | None = None
+    """Key of the quantity's units, likewise."""
     skip: int = 0
     """Number of lines before the header."""
     scale: float = 1.0
-    """Rotation in its unit over the number in the column."""
+    """Reading in its unit over the number in the column."""
     start_s: float | None = None
     """Time of the clock at which the protocol starts, if it is known."""
     by_options: bool = False
     """True if command-line options set them, false for config keys; used in messages."""
     sd: str | None = None
-    """Name of the column of the rotations' standard deviations, in their unit, if there is one."""
+    """Name of the column of the readings' standard deviations, in their unit, if there is one."""
+    quantity: Quantity = ROTATION
+    """What is read."""
+
+    @property
+    def unit_key(self) -> str:
+        """The key that says the unit of the readings."""
+        return "rotation_unit" if self.quantity == ROTATION else "reading_unit"
 
     @property
     def named(self) -> dict[str, str]:
         """Names of the columns by the key that says them, in the order of reading."""
-        names = {"time": self.time, "rotation": self.rotation}
+        names = {"time": self.time, self.quantity.name: self.reading}
         return names if self.sd is None else {**names, "sd": self.sd}
 
 
@@ -132,7 +140,7 @@ def read_recording(path: Path, columns: Columns) -> Recording:
     Returns
     -------
     Recording
-        Trace in s and rad.
+        Trace in SI units.
 
     Raises
     ------
@@ -183,6 +191,7 @@ def unit_of(
     column: str,
     given: str | None,
     allowed: Mapping[str, float],
+    key: str,
     *,
     by_options: bool = False,
 ) -> str:
@@ -197,7 +206,9 @@ def unit_of(
     given
         Unit that the user states, or None.
     allowed
-        Allowed units, `TIME_UNITS` or `ROTATION_UNITS`.
+        Allowed units; if ``1`` is among them, none need be given.
+    key
+        Key or option that states the unit, for messages.
     by_options
         Field of `Columns`.
 
@@ -207,13 +218,14 @@ def unit_of(
         If no allowed unit is given, or name and statement contradict each other.
     """
     choices = ", ".join(allowed)
-    quantity = "time" if allowed is TIME_UNITS else "rotation"
     named = _unit_at_end(column, allowed)
     stated = named if given is None else _plain(given)
+    if stated is None and "1" in allowed:
+        return "1"
     if stated is None:
         raise BiogripError(
             f"{place(path, column=column)}: found no unit, neither stated (by "
-            f"{_said_by(by_options, f'{quantity}_unit')}) nor at the end of the name; allowed are "
+            f"{_said_by(by_options, key)}) nor at the end of the name; allowed are "
             f"{choices}."
         )
     if stated not in allowed:
@@ -250,8 +262,10 @@ def _unit_at_end(column: str, allowed: Mapping[str, float]) -> str | None:
     if ending is None:
         return None
     # A name may end with something other than a unit, as in rotation_left or phi (2).
-    unit = next(group for group in ending.groups() if group is not None)
-    return next((u for u in allowed if u in (unit.strip(), unit.rpartition("_")[2])), None)
+    unit = next(group for group in ending.groups() if group is not None).strip()
+    before, _, last = unit.rpartition("_")
+    last = f"1/{last}" if before.endswith("per") else last
+    return next((u for u in allowed if u in (unit, last)), None)
 
 
 def _plain(name: str) -> str:
@@ -274,25 +288,24 @@ def _read_text(path: Path, columns: Columns) -> tuple[Array, Array, IntArray]:
 
 
 def _read(path: Path, stream: Iterator[str], columns: Columns) -> tuple[Array, Array, IntArray]:
-    """Read unit factors to s and rad, (n,), numbers, (n_rows, n), and line numbers.
+    """Read unit factors to SI units, (n,), numbers, (n_rows, n), and line numbers.
 
-    The columns are time, rotation and standard deviation, in the file's units, with NaN for gaps.
+    The columns are time, reading and standard deviation, in the file's units, with NaN for gaps.
     """
     at: list[int] = []
     lines = _significant(path, stream, at, columns.skip)
     layout = _layout(path, lines, at, columns)
-    time_unit, rotation_unit = (
-        unit_of(path, column, given, allowed, by_options=columns.by_options)
-        for column, given, allowed in (
-            (columns.time, columns.time_unit, TIME_UNITS),
-            (columns.rotation, columns.rotation_unit, ROTATION_UNITS),
+    allowed, key = columns.quantity.units, columns.unit_key
+    time_unit, unit = (
+        unit_of(path, column, given, units, said_by, by_options=columns.by_options)
+        for column, given, units, said_by in (
+            (columns.time, columns.time_unit, TIME_UNITS, "time_unit"),
+            (columns.reading, columns.reading_unit, allowed, key),
         )
     )
-    sizes = np.array([TIME_UNITS[time_unit], ROTATION_UNITS[rotation_unit]])
+    sizes = np.array([TIME_UNITS[time_unit], allowed[unit]])
     if columns.sd is not None:
-        sizes = np.append(
-            sizes, ROTATION_UNITS[unit_of(path, columns.sd, rotation_unit, ROTATION_UNITS)]
-        )
+        sizes = np.append(sizes, allowed[unit_of(path, columns.sd, unit, allowed, key)])
     from biogrip.traces.plain_rows import plain_rows  # Arrow takes as long as a short job.
 
     plain = plain_rows(path, at[0], layout.width, [*layout.indices.values()], layout.separator)

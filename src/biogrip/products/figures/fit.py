@@ -7,6 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.digits import with_unit
+from biogrip.instrument.gripper import ROTATION
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import Fit, scale_of, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
@@ -33,16 +35,23 @@ def draw(
 
 
 def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
-    """Draw a trace, its target and its fit over time; return factor and unit of the rotation."""
-    factor, unit = scale_of(fit.fitted_rad, "rad")
+    """Draw a trace, its target and its fit over time; return factor and unit of the readings."""
+    factor, unit = _scale(fit)
     axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
     kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
     axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
     if fit.target_rad is not None:
         axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
-    axes.set_ylabel(f"closing rotation ({unit})")
+    name = "closing rotation" if fit.read == ROTATION else fit.read.name
+    axes.set_ylabel(with_unit(name, unit))
     return factor, unit
+
+
+def _scale(fit: Fit) -> tuple[float, str]:
+    """Return factor and unit with a prefix, where the unit of the readings may have one."""
+    plain = fit.read.unit.isalpha()
+    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
 def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
@@ -62,7 +71,7 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)
-    residuals.set_ylabel(f"residual ({unit})")
+    residuals.set_ylabel(with_unit("residual", unit))
     residuals.set_xlabel("time (s)")
     residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
     drawn.align_ylabels()

@@ -13,6 +13,8 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.success import typical
+from biogrip.instrument.gripper import ROTATION
+from biogrip.instrument.instrument import Quantity
 from biogrip.products.batches import parse_batch
 from biogrip.products.files.identifications import read_identifications
 from biogrip.products.files.traces import Measurements, read_measurements
@@ -37,6 +39,8 @@ class Fit:
     """Fitted rotation, (n_samples,)."""
     sd_rad: Array | None = None
     """Standard deviations of the readings, (n_samples,), where they are known."""
+    read: Quantity = ROTATION
+    """What is read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +76,8 @@ def fit_of(
     measured = recorded.rotation_rad[seed]
     nuisance = problem.nuisance(recorded.time_s)
     fitted = simulated + within(nuisance, measured - simulated, recorded.sd_rad)
-    return Fit(recorded.time_s, recorded.target_rad, measured, fitted, recorded.sd_rad)
+    target, read = recorded.target_rad, problem.instrument.read
+    return Fit(recorded.time_s, target, measured, fitted, recorded.sd_rad, read)
 
 
 def first_seeds(found: pd.DataFrame) -> pd.DataFrame:

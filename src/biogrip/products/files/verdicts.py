@@ -60,7 +60,7 @@ def exact_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, 
             }
             for trade in ([] if rejected else diagnosis.trades)
         ],
-        "jaw_force": dict(vars(diagnosis.grip)),
+        **({"jaw_force": dict(vars(diagnosis.grip))} if diagnosis.grip else {}),
         "notes": [dict(vars(note)) for note in ordered],
     }
 

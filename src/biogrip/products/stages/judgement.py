@@ -74,7 +74,9 @@ def notes_on_fit(fit: TraceFit) -> list[Note]:
     notes = [Note(HARMLESS, text) for text in fit.notes()]
     if fit.noise_model is None:
         return notes
-    misfit = find_slow_misfit(fit.noise_model, fit.problem.residuals.duration_s)
+    misfit = find_slow_misfit(
+        fit.noise_model, fit.problem.residuals.duration_s, fit.problem.residuals.instrument
+    )
     return [misfit, *notes] if misfit else notes
 
 

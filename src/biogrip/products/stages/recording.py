@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import TorqueHistory
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.fitted_onset import OnsetFits
 from biogrip.instrument.gripper import Gripper
@@ -56,6 +57,9 @@ def read_checked(
         onset_s = guess_onset(problem, trace.time_s, trace.rotation_rad)
     if onset_s is not None:
         trace = without_padding(replace(trace, time_s=trace.time_s - onset_s))
+    at_steps = 0
+    if not problem.instrument.has_jaws:
+        trace, at_steps = without_steps(trace, problem.torque)
     nuisance = problem.nuisance(trace.time_s)
     suspicion = check_recording(
         trace,
@@ -67,6 +71,7 @@ def read_checked(
         None if weighted else problem.noise_rad,
         _typical_noise(trace, problem),
         onset_s,
+        problem.instrument,
     )
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
@@ -81,7 +86,28 @@ def read_checked(
         )
     rotations = {0: trace.rotation_rad}
     gaps = trace.without_number
-    return Measurements(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s)
+    return Measurements(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps)
+
+
+def without_steps(trace: Recording, held: TorqueHistory) -> tuple[Recording, int]:
+    """Leave out readings at the very instant of a step, and count them.
+
+    Without inertia a sample jumps there, and nothing tells on which side a reading was taken.
+    """
+    steps = [start for start, order, _ in held.jumps if order == 0]
+    kept = ~np.isin(trace.time_s, steps)
+    return _part(trace, kept), int(np.count_nonzero(~kept))
+
+
+def _part(trace: Recording, kept: BoolArray) -> Recording:
+    sd_rad = None if trace.sd_rad is None else trace.sd_rad[kept]
+    return replace(
+        trace,
+        time_s=trace.time_s[kept],
+        rotation_rad=trace.rotation_rad[kept],
+        lines=trace.lines[kept],
+        sd_rad=sd_rad,
+    )
 
 
 def without_padding(trace: Recording) -> Recording:
@@ -137,6 +163,11 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if trace.gaps:
         rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
         notes.append(f"Left out for want of a number: {rows}.")
+    if trace.at_steps:
+        notes.append(
+            f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "
+            "nothing tells on which side of it they were taken."
+        )
     return notes
 
 

@@ -1,0 +1,77 @@
+"""Declaration of an instrument: what it holds, what it reads, and its words for both."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that an instrument holds or reads."""
+
+    name: str
+    """Name in messages, in the config, and of the option for its column."""
+    unit: str
+    """SI unit; empty for a pure number."""
+    units: Mapping[str, float] = field(hash=False, compare=False)
+    """Units of a file's column, as multiples of the SI unit."""
+    symbol: str
+    """Symbol as mathtext."""
+
+    @property
+    def suffix(self) -> str:
+        """End of the names of columns and keys: the SI unit."""
+        return "".join(f"_{part}" for part in self.unit.replace("1/", "per ").split()).replace(
+            "N_m", "Nm"
+        )
+
+    @property
+    def column(self) -> str:
+        """Usual name of a column or key: the name with the unit."""
+        return self.name + self.suffix
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What an instrument holds and reads."""
+
+    kind: str
+    """`gripper`, `creep` or `relaxation`."""
+    held: Quantity
+    """What the protocol holds."""
+    read: Quantity
+    """What a trace is of."""
+    per_area: bool = False
+    """True if stiffness is a modulus, in Pa."""
+    relative: bool = False
+    """True if what is read is divided by the largest value that is held."""
+
+    @property
+    def deforms(self) -> bool:
+        """True if a deformation is held and a load is read."""
+        return self.kind == "relaxation"
+
+    @property
+    def model_or_set_up(self) -> str:
+        """Words for what may be wrong if a model does not fit."""
+        return "model, protocol or gripper" if self.has_jaws else "model or protocol"
+
+    @property
+    def all_that_may_be_wrong(self) -> str:
+        """The same with the unit, each with its article."""
+        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), "unit"]
+        *first, last = (f"the {part}" for part in parts)
+        return f"{', '.join(first)} or {last}"
+
+    @property
+    def has_jaws(self) -> bool:
+        """True if it grips the sample between arms, which yield and may let it go."""
+        return self.kind == "gripper"
+
+
+STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
+"""Units of stresses and moduli."""
+
+FORCE = Quantity("force", "N", {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12}, "$F$")
+DISPLACEMENT = Quantity("displacement", "m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}, r"$x$")
+STRESS = Quantity("stress", "Pa", STRESS_UNITS, r"$\sigma$")
+STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2}, r"$\varepsilon$")
