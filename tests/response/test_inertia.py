@@ -148,7 +148,7 @@ def test_power_laws_ring_whoever_else_does(gripper: Gripper, name: str) -> None:
     model = MODELS[name]
     near = np.log(MODEL_PARAMETERS[name])
     rng = np.random.default_rng(2)
-    logs = np.clip(near + rng.normal(size=(8, 3)), *log_range(model))
+    logs = np.clip(near + rng.normal(size=(8, len(near))), *log_range(model))
     step = torque_history((hold(0.5, 1.6e-9), hold(1.0, 0.4e-9)))
     time_s = np.sort(np.concatenate([start + np.geomspace(1e-7, 0.4, 15) for start in (0, 0.5)]))
     ringing = while_ringing(gripper, step, time_s)

@@ -5,7 +5,7 @@ job's digest the code of that: this module is in none, so that one more model ma
 """
 
 from biogrip.experiment.burgers import BURGERS
-from biogrip.experiment.fractional import FRACTIONAL_KELVIN_VOIGT, FRACTIONAL_MAXWELL
+from biogrip.experiment.fractional import FRACTIONAL_MODELS
 from biogrip.experiment.maxwell_models import (
     DAMPER,
     GENERALIZED_MAXWELL,
@@ -28,7 +28,6 @@ MODELS: dict[str, SampleModel] = {
         ZENER_MAXWELL,
         ZENER_KELVIN,
         BURGERS,
-        FRACTIONAL_KELVIN_VOIGT,
-        FRACTIONAL_MAXWELL,
+        *FRACTIONAL_MODELS,
     )
 }

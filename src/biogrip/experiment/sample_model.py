@@ -1,5 +1,6 @@
 """Sample models and their parameters, and the parameters that several models share."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -62,7 +63,7 @@ class Parameter:
     @property
     def symbol(self) -> str:
         """The symbol as mathtext."""
-        letter, _, index = self.name.replace("alpha", r"\alpha").partition("_")
+        letter, _, index = re.sub("(alpha|beta)", r"\\\1", self.name).partition("_")
         return f"${letter}_{{{index}}}$" if index else f"${letter}$"
 
 
@@ -88,7 +89,8 @@ class SampleModel:
     """Parameters whose sum deserves a row of its own in tables, because stiff branches make them
     trade against each other."""
     branches: tuple[tuple[str, str], ...] = ()
-    """Spring and damper of each Maxwell branch, by name; with several, the fastest first."""
+    """Spring and damper of each Maxwell branch, or modulus and exponent of each springpot, by
+    name, where a trace is the same whichever is called which; in ascending order (`in_order`)."""
     contains: Mapping[str, Turned] = field(default_factory=dict, hash=False)
     """Models that it becomes where elements vanish, by candidate, and how their parameters are
     turned into its own (`biogrip.experiment.nesting`)."""
@@ -115,7 +117,7 @@ class SampleModel:
 
     @property
     def free_branches(self) -> tuple[tuple[int, int], ...]:
-        """Indices of spring and damper of each branch of which both are to be identified."""
+        """Indices of both parameters of each branch of which both are to be identified."""
         places = {name: index for index, name in enumerate(self.names)}
         return tuple(
             (places[spring], places[damper])
@@ -123,17 +125,23 @@ class SampleModel:
             if spring in places and damper in places
         )
 
+    @property
+    def branch_power(self) -> int:
+        """Power of k in c/k^power, by which branches ascend: 0 for the exponents of springpots."""
+        return 0 if self.power_law else 1
+
     def in_order(self, parameters: Array) -> IntArray:
         """Order in which branches of samples, (n, n_parameters), relax, the fastest first.
 
         A trace is the same whichever branch is called which; so that samples and fits
-        can be compared, branches are counted by their relaxation times c/k. For every column it is
-        the one that belongs there, (n, n_parameters), as of `numpy.take_along_axis`.
+        can be compared, branches are counted by their relaxation times c/k, and springpots by their
+        exponents. For every column it is the one that belongs there, (n, n_parameters), as of
+        `numpy.take_along_axis`.
         """
         order = np.tile(np.arange(len(self.names)), (len(parameters), 1))
         if len(self.free_branches) > 1:
             springs, dampers = np.array(self.free_branches).T
-            times = parameters[:, dampers] / parameters[:, springs]
+            times = parameters[:, dampers] / parameters[:, springs] ** self.branch_power
             ranks = np.argsort(times, axis=1, kind="stable")
             order[:, springs], order[:, dampers] = springs[ranks], dampers[ranks]
         return order

@@ -14,6 +14,11 @@ few branches, all faster ones by a damper and a few branches, which have the sam
 moments: a quadrature on Chebyshev's nodes, one of them at zero. All springs come out
 positive and smooth in alpha, and the limits, spring and damper, are exact.
 
+Ladders have the same rates, so in parallel they add up. In series their impedance is
+L_1 L_2/H with H = L_1 + L_2. It has branches at the zeros -x of H, with the springs
+L_1(-x)^2/(x H'(-x)), and, if both ladders have branches, at the shared rates p_j, with the
+springs W_1j W_2j/(W_1j + W_2j).
+
 References
 ----------
 .. [1] A. Bonfanti, J. L. Kaplan, G. Charras and A. Kabla, Fractional viscoelastic models for
@@ -29,6 +34,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from biogrip.arrays import Array
+from biogrip.experiment.network import Network
+from biogrip.interlacing import Zeros, interlaced_zeros
 
 SHORTEST_S, LONGEST_S = 1e-5, 1e5
 """Range of times, and of reciprocal rates, in which the ladder is a springpot to 1e-6."""
@@ -61,19 +68,90 @@ _TO_WEIGHTS = _interpolation(_PLACES)
 
 
 _ROUNDING = 2.0**-44
+# Spring of a branch that equal ladders in series do not have, in N/m: no response shows it.
+_GONE = 1e-30
+# Least relative distance of the rates of two springpots in series.
+_APART = 2e-6
 
 
 @dataclass(frozen=True)
 class Ladder:
-    """Parallel spring, damper and Maxwell branches that represent n springpots."""
+    """Parallel spring, damper and Maxwell branches of n samples."""
 
     spring: NDArray[Any]
     """Parallel spring in N/m, (n,)."""
     damper: NDArray[Any]
     """Parallel damper in N s/m, (n,)."""
     springs: NDArray[Any]
-    """Springs of the Maxwell branches in N/m, (n_branches, n); their rates are
-    `BRANCH_RATES_PER_S`."""
+    """Springs of the Maxwell branches in N/m, (n_branches, n), whose rates are
+    `BRANCH_RATES_PER_S`; without branches zeros, (1, n)."""
+
+    def __add__(self, other: "Ladder") -> "Ladder":
+        """Return both ladders in parallel."""
+        return Ladder(
+            self.spring + other.spring, self.damper + other.damper, self.springs + other.springs
+        )
+
+    @property
+    def network(self) -> Network:
+        """Springs and dampers of the samples; the ladder has branches."""
+        dampers = self.springs / BRANCH_RATES_PER_S[:, None]
+        return Network(k_p=self.spring, c_p=self.damper, k=self.springs.T, c=dampers.T)
+
+    @property
+    def weights(self) -> NDArray[Any]:
+        """Parallel spring and springs of the branches, (1 + n_branches, n)."""
+        return np.concatenate((self.spring[None], self.springs))
+
+    def near(self, zeros: Zeros) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Return L(-x)/x and -d(L(-x)/x)/dx at positive numbers x, each (n_zeros, n)."""
+        value, steepness = -self.damper + np.zeros_like(zeros.beyond), np.zeros_like(zeros.beyond)
+        for weight, pole in zip(self.weights, _POLES, strict=False):
+            distance = zeros.from_pole(pole)
+            value = value + weight / distance
+            steepness = steepness + weight / distance**2
+        return value, steepness
+
+
+_POLES = np.append(0.0, BRANCH_RATES_PER_S)
+
+
+def spring(k: NDArray[Any]) -> Ladder:
+    """Return n springs as ladders."""
+    return Ladder(k, 0 * k, 0 * k[None])
+
+
+def damper(c: NDArray[Any]) -> Ladder:
+    """Return n dampers as ladders."""
+    return Ladder(0 * c, c, 0 * c[None])
+
+
+def series(first: Ladder, second: Ladder) -> Network:
+    """Return the network of ladders in series; one of the two has branches."""
+    both = first + second
+    poles = _POLES[:, None] * np.ones(len(both.spring))
+    zeros = interlaced_zeros(both.weights, poles, both.damper)
+    (of_first, steep_first), (of_second, steep_second) = first.near(zeros), second.near(zeros)
+    steepness = steep_first + steep_second
+    # L_1 = -L_2 at the zeros. Of this mean no digits cancel that the softer ladder has.
+    share = steep_first / steepness
+    springs = ((1 - share) * of_first - share * of_second) ** 2 / steepness
+    rates = zeros.values
+    if np.all(product := first.springs * second.springs):
+        springs = np.where(springs == 0, _GONE, springs)
+        shared, own = product / both.springs, springs[1:]
+        # Rates that are nearly equal cost digits: apart, with the same mean, they do not.
+        lack = np.maximum(_APART * poles[1:] - (rates[1:] - poles[1:]).real, 0)
+        share = shared / (shared + own)
+        rates[1:] += lack * share
+        rates = np.concatenate((rates, poles[1:] - lack * (1 - share)))
+        springs = np.concatenate((springs, shared))
+    return Network(
+        k_p=first.spring * second.spring / both.spring,
+        c_p=first.damper * second.damper / both.damper,
+        k=springs.T,
+        c=(springs / rates).T,
+    )
 
 
 def ladder(modulus_N_per_m: NDArray[Any], exponent: NDArray[Any]) -> Ladder:

@@ -17,7 +17,8 @@ class Prior:
     """Normal priors of the log-parameters, truncated at the ends of the search range.
 
     A prior of zero precision is uniform. Branches are in the order of their relaxation
-    times, the fastest first: exchanging them does not change a response.
+    times, the fastest first, and springpots in that of their exponents: exchanging them does not
+    change a response.
     """
 
     model: SampleModel
@@ -49,7 +50,8 @@ class Prior:
         branches = self.model.free_branches
         if len(branches) > 1:
             springs, dampers = np.array(branches).T
-            times = log_parameters[:, dampers] - log_parameters[:, springs]
+            springs_log = self.model.branch_power * log_parameters[:, springs]
+            times = log_parameters[:, dampers] - springs_log
             allowed &= np.all(np.diff(times, axis=1) >= 0, axis=1)
         return np.where(allowed, density, -np.inf)
 

@@ -26,6 +26,9 @@ class BranchPenalty:
     before: tuple[int, int] | None = None
     """Those of the branch that must relax later; None if the branch must relax within the
     experiment."""
+    power: int = 1
+    """`SampleModel.branch_power`: 0 for springpots, of which the one of `before` must have the
+    larger exponent."""
 
     @property
     def stiffness(self) -> float:
@@ -38,7 +41,7 @@ class BranchPenalty:
         for branch, sign in ((self.branch, 1.0), (self.before, -1.0)):
             if branch is not None:
                 spring, damper = branch
-                found[damper], found[spring] = sign, -sign
+                found[damper], found[spring] = sign, -sign * self.power
         return found
 
     def allowed(self, longest_s: float) -> float:
@@ -156,7 +159,8 @@ def find_combinations(model: SampleModel, members: list[int]) -> list[Quantity]:
 
 
 def _ordered(model: SampleModel) -> tuple[BranchPenalty, ...]:
-    return tuple(BranchPenalty(branch, later) for branch, later in pairwise(model.free_branches))
+    pairs = pairwise(model.free_branches)
+    return tuple(BranchPenalty(branch, later, model.branch_power) for branch, later in pairs)
 
 
 def _sum(model: SampleModel, members: tuple[int, ...]) -> Quantity:

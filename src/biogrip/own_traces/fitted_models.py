@@ -8,7 +8,7 @@ import numpy as np
 
 from biogrip.experiment.nesting import as_richer, contained
 from biogrip.experiment.random_streams import stream
-from biogrip.experiment.sample import CANDIDATES, MODELS
+from biogrip.experiment.sample import CANDIDATES
 from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, Note
@@ -21,6 +21,8 @@ from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
 
 _MOST_SAMPLES = 50_000
+# Beside branches; the other power laws contain these, and are tried if they are named.
+_POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
 
 @dataclass(frozen=True)
@@ -194,4 +196,4 @@ def judge_again(
 
 def _power_laws(duration_s: float) -> list[str]:
     """Return power-law models, if the experiment is not longer than their range of validity."""
-    return [name for name, model in MODELS.items() if model.power_law and duration_s <= LONGEST_S]
+    return _POWER_LAWS if duration_s <= LONGEST_S else []

@@ -22,6 +22,7 @@ from biogrip.response.roots import find_zeros, roots
 
 # Factor that moves starts off the real axis, which no iteration from a real start would leave.
 _ASIDE = 1 + 1e-3j
+_ROUNDING = 1e-15
 
 
 class Ringing:
@@ -41,7 +42,11 @@ class Ringing:
         beyond = find_zeros(beyond, lambda points: self._newton_step(origin, points), between)
         self.rates = s = beyond - origin
         """Roots of E in 1/s, (n, n_modes)."""
-        inverse = 1 / ((self._rates - origin[..., None]) + beyond[..., None])
+        away = (self._rates - origin[..., None]) + beyond[..., None]
+        # From another start than that of its branch, a root may be found that is nearer to a very
+        # weak branch than rounding. Its mode has no weight.
+        lost = (np.abs(away) < _ROUNDING * self._rates) & (self._rates != origin[..., None])
+        inverse = 1 / np.where(lost, _ROUNDING**2 * self._rates, away)
         # G and dG/ds, and dE/ds.
         self._sample = self._k_p + self._c_p * s + (self._k * inverse).sum(axis=2) * s
         sample_slope = self._c_p + (self._k * self._rates * inverse**2).sum(axis=2)

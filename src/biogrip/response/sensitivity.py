@@ -19,8 +19,9 @@ from biogrip.response.ringing import compute_responses, ringing_responses
 
 # The correction is of second order; differences give its derivative to 1e-6 of that.
 _STEP = 1e-3
-# Ringing runs through hundreds of radians before it ends: its differences need a shorter step.
-_RINGING_STEP = 1e-5
+# Ringing runs through hundreds of radians before it ends: its differences need a shorter step. On
+# a sample that is elastic at once, which damps it least, it runs through thousands.
+_RINGING_STEP, _ELASTIC_STEP = 1e-5, 2e-6
 # Times at once: the responses of modes at a million times would take too much memory.
 _AT_ONCE = 100_000
 
@@ -47,10 +48,12 @@ def linear_responses(
     for some in parts(len(time_s), _AT_ONCE):
         rows[:, :, some] = compute_responses(modes, torque, time_s[some])
     if inertia and np.any(ringing := while_ringing(gripper, torque, time_s)):
-        around = model.network(_around(parameters, _RINGING_STEP, slopes=slopes))
+        elastic = not np.any(model.network(parameters[:1]).c_p)
+        step = _ELASTIC_STEP if elastic else _RINGING_STEP
+        around = model.network(_around(parameters, step, slopes=slopes))
         added = ring(gripper, around, torque, time_s[ringing])
         added = added.reshape(len(parameters), -1, added.shape[1])
-        rows[..., ringing] += differences(added, _RINGING_STEP)
+        rows[..., ringing] += differences(added, step)
     return rows
 
 
