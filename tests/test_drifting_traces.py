@@ -10,11 +10,12 @@ from scipy.stats import chi2, norm
 from biogrip.arrays import Array
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import Note
+from biogrip.identifiability.likelihood import compute_fall
 from biogrip.identifiability.whiteness import wandering
 from biogrip.identify.answer import silent
 from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.second_opinion import fall_of, second_opinion
+from biogrip.own_traces.second_opinion import second_opinion
 from biogrip.products.files.traces import Measurements
 from tests.helpers.problems import clean, run
 
@@ -106,7 +107,7 @@ def test_chi_squared_falls_by_twice_the_logarithm_of_how_much_likelier(
     before_rad, after_rad = (float(np.sqrt(np.mean(fit**2))) for fit in fits)
     before = norm.logpdf(fits[0], scale=known or before_rad).sum()
     after = norm.logpdf(fits[1], scale=known or after_rad).sum()
-    found = fall_of(50, before_rad, after_rad, known)
+    found = compute_fall(50, before_rad, after_rad, known)
     assert found == pytest.approx(2 * (after - before), rel=1e-12)
 
 

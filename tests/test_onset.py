@@ -13,6 +13,9 @@ from biogrip.cli import main
 from biogrip.experiment.protocol import Phase, hold, load
 from biogrip.identify.fitted_onset import OnsetFits
 from biogrip.library import Sample, set_up, simulate
+from biogrip.products.stages import judgement, recording
+from biogrip.study.defaults import default_config
+from biogrip.study.load import load_study, read_configs
 from biogrip.traces.onset import begins_constant, estimate_onset
 from tests.helpers.default import STUDY
 
@@ -124,6 +127,49 @@ def test_a_late_protocol_is_said(
     (said,) = [text for text in found["reasons"] if "The trace is constant until 8." in text]
     assert "--start fit" in said
     assert said in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("noise_model", ["white", "coloured"])
+@pytest.mark.parametrize("onset_s", [0.87, 3.0])
+def test_a_late_protocol_determines_nothing(
+    tmp_path: Path, onset_s: float, noise_model: str
+) -> None:
+    """However few readings are before it, and whatever the noise model makes of the misfit."""
+    found = identified(tmp_path, *late(2, onset_s), "--noise-model", noise_model)
+    assert found["fit"] == "rejected"
+    assert any("The trace is constant until" in reason for reason in found["reasons"])
+    assert {each["verdict"] for each in found["quantities"]} == {"fit rejected"}
+
+
+def test_groups_know_a_late_protocol(tmp_path: Path) -> None:
+    rows = ["file,cell,group"]
+    for seed, (name, onset_s) in enumerate((("a", 0.0), ("b", 0.0), ("c", 0.87), ("c", 0.0))):
+        written(tmp_path / f"{seed}.csv", *late(seed, onset_s))
+        rows.append(f"{seed}.csv,{name},one")
+    (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n")
+    (tmp_path / "lab.yaml").write_text(CONFIG)
+    assert (
+        main(["groups", str(tmp_path / "cells.csv"), "--config", str(tmp_path / "lab.yaml")]) == 0
+    )
+    found = json.loads((tmp_path / "cells.compared.json").read_text())
+    assert found["rejected"] == ["c"]
+    (said,) = [text for text in found["cells"][2]["reasons"] if "is constant until 0.8" in text]
+    assert said.startswith("2.csv: The trace")
+
+
+@pytest.mark.parametrize("start", ["", ", start_s: 0.87"])
+def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
+    trace = written(tmp_path / "trace.csv", *late(2, 0.87))
+    config, traces, verdicts = (tmp_path / name for name in ("c.yaml", "t.parquet", "v.json"))
+    measurement = f"{{file: {trace}, time: time_s, rotation: rotation_rad{start}}}"
+    own = f"{{sample: {{model: generalized_maxwell}}, measurement: {measurement}}}"
+    config.write_text(f"{CONFIG}only: [mine]\ncases: {{mine: {own}}}\n")
+    study = load_study(read_configs([default_config(), config]), [config])
+    recording.record(study.cases["mine"], trace, traces)
+    judgement.judge(study.cases["mine"], traces, [], verdicts)
+    found = json.loads(verdicts.read_text())
+    assert found["fit"] == ("ok" if start else "rejected")
+    assert start or any("measurement.start_s" in reason for reason in found["reasons"])
 
 
 @pytest.mark.parametrize("start", [f"{ONSET_S}", "fit"])

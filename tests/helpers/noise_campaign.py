@@ -16,7 +16,7 @@ from scipy.special import chdtrc
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import AR1, Drift, Flicker, Outliers
-from biogrip.identifiability.likelihood import Likelihood, make_likelihood
+from biogrip.identifiability.likelihood import Likelihood, compute_fall, make_likelihood
 from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
@@ -25,7 +25,6 @@ from biogrip.identify.multi_start import identify_from
 from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
-from biogrip.own_traces.second_opinion import fall_of
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 from tests.helpers.groups_campaign import write
@@ -131,7 +130,7 @@ def seen(kind: Kind, seed: int) -> Seen:
     plain = case_problem.of(time_s, trace)
     ignored = _likelihood(plain, find(plain))
     more = replace(case_problem, offset=True, drift=True).of(time_s, trace)
-    fall = fall_of(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
+    fall = compute_fall(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
     residual = plain.residuals.left(ignored.best)
     growth = compute_growth(residual, plain.residuals.rotation(ignored.best))
     doubts = list(doubts_about_noise(residual, growth))

@@ -99,3 +99,22 @@ def make_likelihood(
 
         threshold, certainty = fdtri(1, min(left, problem.residuals.freedom), levels)
     return Likelihood(problem, best, misfit_rad, noise_rad, float(threshold), float(certainty))
+
+
+def compute_fall(
+    samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
+) -> float:
+    """Compute the decrease of chi^2, i.e. twice the increase of the log-likelihood.
+
+    Parameters
+    ----------
+    samples
+        Number of samples.
+    before_rad, after_rad
+        RMS residuals of the worse and of the better fit.
+    noise_rad
+        Standard deviation of the noise, if known; otherwise each fit's misfit estimates it.
+    """
+    if noise_rad is not None:
+        return samples * (before_rad**2 - after_rad**2) / noise_rad**2
+    return 2 * samples * float(np.log(before_rad / after_rad))

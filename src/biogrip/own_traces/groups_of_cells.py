@@ -30,18 +30,21 @@ from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identifiability.fit_status import DOUBTFUL, HARMLESS, OK, REJECTED, Note
 from biogrip.identify.answer import Identification
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
 from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.words import fixed_in_words
+from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
+from biogrip.traces.late_onset import note_late_onset
 
 _LIMITS = (
     "Limits are statistical only: all cells share the gripper, whose uncertainty changes their "
@@ -56,8 +59,17 @@ class _TraceProblem:
     trace: Path
     problem: Problem
     case: Case
+    case_problem: CaseProblem
+    recorded: Measurements
     notes: list[Note]
-    noise_rad: float | None
+
+    def notes_at(self, best: Array) -> list[Note]:
+        """Return the notes on its noise, and on an onset that a joint best fit shows to be late."""
+        time_s, rotation_rad = self.recorded.time_s, self.recorded.rotation_rad[0]
+        if not self.case.may_start_late:
+            return self.notes
+        late = note_late_onset(self.case_problem, time_s, rotation_rad, best)
+        return [*self.notes, *(replace(n, text=f"{self.trace.name}: {n.text}") for n in late)]
 
 
 def groups(
@@ -150,7 +162,8 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
                 confidence=confidence,
                 noise_rad=_known_noise(usable),
             )
-            fit.diagnosis.notes.extend(note for each in usable for note in each.notes)
+            best = fit.diagnosis.likelihood.best
+            fit.diagnosis.notes.extend(note for each in usable for note in each.notes_at(best))
             judged.append(JudgedCell(cell.name, cell.group, fit))
             data.append(
                 {
@@ -291,7 +304,7 @@ class _Traces:
             assumed = replace(case_problem, uncertainty={})
             fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
             problem, notes = fit.problem, [*notes, *notes_on_fit(fit)]
-        return _TraceProblem(trace, problem, case, notes, case_problem.noise_rad)
+        return _TraceProblem(trace, problem, case, case_problem, recorded, notes)
 
 
 def _in_common_ranges(traces: list[_TraceProblem]) -> list[_TraceProblem]:
@@ -304,7 +317,8 @@ def _in_common_ranges(traces: list[_TraceProblem]) -> list[_TraceProblem]:
 
 
 def _known_noise(traces: Sequence[_TraceProblem]) -> list[float] | None:
-    known = [each.noise_rad for each in traces if each.noise_rad is not None]
+    levels = [each.case_problem.noise_rad for each in traces]
+    known = [level for level in levels if level is not None]
     return known if len(known) == len(traces) else None
 
 

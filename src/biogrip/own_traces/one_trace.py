@@ -30,7 +30,6 @@ from biogrip.own_traces.assumed import (
 )
 from biogrip.own_traces.fitted_models import judge_again, models_tried
 from biogrip.own_traces.held import with_instrument
-from biogrip.own_traces.late_onset import late_onset
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.second_opinion import second_opinion
@@ -52,6 +51,7 @@ from biogrip.study.sample_block import fixed_problems
 from biogrip.study.source import dotted
 from biogrip.study.study import Study
 from biogrip.study.trace_file import trace_file_problem
+from biogrip.traces.late_onset import note_late_onset
 
 _NOT_COMPARED = (
     "With fixed parameters no other sample models are tried: a value that is known in this model "
@@ -156,7 +156,9 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         progress.done()
         progress.doing("trying an offset and a drift")
         doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
-        doubts += late_onset(case_problem, recorded, diagnosis)
+        if case.may_start_late:
+            near = diagnosis.likelihood.best
+            doubts += note_late_onset(case_problem, recorded.time_s, recorded.rotation_rad[0], near)
         read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
         if case_problem.fit_start and case.posterior is not None:
             read.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))

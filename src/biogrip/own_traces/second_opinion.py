@@ -8,6 +8,7 @@ from scipy.special import chdtrc
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identifiability.fit_status import DOUBT, HARMLESS, Note
+from biogrip.identifiability.likelihood import compute_fall
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Identification, Progress
@@ -59,7 +60,7 @@ def second_opinion(
     # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
     from_there = found.at(fit_from([problem], likelihood.best))
     found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))
-    fall = fall_of(
+    fall = compute_fall(
         problem.residuals.samples,
         likelihood.misfit_rad,
         found.misfit_rad,
@@ -100,25 +101,6 @@ def second_opinion(
             f"the trace with --offset --drift.{or_flows}"
         )
     return [Note(DOUBT if changed else HARMLESS, text)]
-
-
-def fall_of(
-    samples: int, before_rad: float, after_rad: float, noise_rad: float | None = None
-) -> float:
-    """Return the decrease of chi^2, i.e. twice the increase of the log-likelihood.
-
-    Parameters
-    ----------
-    samples
-        Number of samples.
-    before_rad, after_rad
-        RMS residuals of the worse and of the better fit.
-    noise_rad
-        Standard deviation of the noise, if known; otherwise each fit's misfit estimates it.
-    """
-    if noise_rad is not None:
-        return samples * (before_rad**2 - after_rad**2) / noise_rad**2
-    return 2 * samples * float(np.log(before_rad / after_rad))
 
 
 def _differ(before: Finding, after: Finding) -> bool:

@@ -92,6 +92,12 @@ class Case:
         return self.name if self.block.title is None else self.block.title
 
     @property
+    def may_start_late(self) -> bool:
+        """True if the trace is recorded, and nothing says when its protocol starts."""
+        measured = self.block.measurement
+        return self.recorded and measured.start_s is None and not measured.fit_start
+
+    @property
     def seeds(self) -> int:
         """Number of traces; 1 for a recorded trace."""
         return 1 if self.recorded else self.study.config.seeds

@@ -9,6 +9,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, without
@@ -65,6 +66,18 @@ def estimate_onset(
         low, high = onsets[max(best - 1, 0)], onsets[min(best + 1, _DELAYS - 1)]
         if high - low < shortest:
             return float(onsets[best])
+
+
+def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
+    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
+    return estimate_onset(
+        time_s,
+        rotation_rad,
+        problem.gripper,
+        problem.torque,
+        offset=problem.offset,
+        drift=problem.drift,
+    )
 
 
 def _thinned(samples: int, within: IntArray) -> BoolArray:

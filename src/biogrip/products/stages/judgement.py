@@ -27,6 +27,7 @@ from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_o
 from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.uses import from_case, searched_for, to_identify
 from biogrip.study.study import Case
+from biogrip.traces.late_onset import note_late_onset
 
 TRACE = 0
 """Seed of the trace that is judged."""
@@ -65,7 +66,11 @@ def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path
     diagnosis, valley = _diagnosed(fit.problem, case_problem, fit.found, case.confidence)
     if case_problem.fit_start:
         diagnosis = profile_over_onset(diagnosis, recorded.time_s)
-    said = diagnosis_data(diagnosis, notes_on_fit(fit))
+    notes = notes_on_fit(fit)
+    if case.may_start_late:
+        trace, near = recorded.rotation_rad[TRACE], diagnosis.likelihood.best
+        notes += note_late_onset(case_problem, recorded.time_s, trace, near)
+    said = diagnosis_data(diagnosis, notes)
     _write(verdicts, case, {**said, "noise_model": fit.noise_data(), "valley": valley})
 
 
@@ -122,7 +127,9 @@ JUDGED = Product(
     "judgement",
     {"verdicts": PATH},
     judge,
-    from_case("name least_squares confidence study.study_seed", problem=searched_for),
+    from_case(
+        "name least_squares confidence may_start_late study.study_seed", problem=searched_for
+    ),
     lambda plan: wildcards_of(plan.study.cases),
     message="Computing confidence limits for the first trace of {case}",
     reads={

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array, BoolArray
+from biogrip.arrays import BoolArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory
@@ -20,7 +20,7 @@ from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
 from biogrip.traces.noise_share import proportional_deviations
-from biogrip.traces.onset import estimate_onset
+from biogrip.traces.onset import guess_onset
 from biogrip.traces.plausibility import check_recording
 from biogrip.traces.recordings import Columns, Recording, place, read_recording
 
@@ -123,18 +123,6 @@ def without_padding(trace: Recording) -> Recording:
         trace.lines[first:],
         trace.without_number + first,
         None if trace.sd_rad is None else trace.sd_rad[first:],
-    )
-
-
-def guess_onset(problem: CaseProblem, time_s: Array, rotation_rad: Array) -> float:
-    """Estimate the onset of a trace, (n_samples,), without a sample model, in s of its clock."""
-    return estimate_onset(
-        time_s,
-        rotation_rad,
-        problem.gripper,
-        problem.torque,
-        offset=problem.offset,
-        drift=problem.drift,
     )
 
 
