@@ -145,6 +145,8 @@ def test_groups_leave_rejected_cells_out_by_name(
     assert status == 0
     assert data["rejected"] == ["cell 6"]
     assert "Left out, as their fits are rejected: cell 6." in said
+    noise = {cell["cell"]: cell["traces"][0]["noise_rad"] for cell in data["cells"]}
+    assert noise["cell 6"] == pytest.approx(SIGMA, rel=0.1)
     counted = {name for row in data["groups"] for name in row["not_determined"]}
     counted |= {cell["cell"] for row in data["groups"] for cell in row["determined"]}
     assert counted == {f"cell {seed}" for seed in range(6)}
@@ -153,3 +155,38 @@ def test_groups_leave_rejected_cells_out_by_name(
     assert "Left out, as their fits" not in said
     assert command("groups", table, "--exclude", "cell6", *options)[0] == 1
     assert "--exclude: found 'cell6'. Did you mean 'cell 6'?" in capsys.readouterr().err
+
+
+def test_a_rejected_fit_says_only_why(tmp_path: Path) -> None:
+    """Noise models, simpler models and doubts about limits speak of results that it lacks."""
+    models = "model_selection: {models: [kelvin_voigt, liquid_drop]}\n"
+    (tmp_path / "models.yaml").write_text(FEW.partition("model_selection")[0] + models)
+    trace = written(tmp_path / "t.csv", WRONG["late step"], 0)
+    lines = trace.read_text().splitlines()
+    trace.write_text("\n".join([*lines[:300], "149.6,", *lines[300:]]) + "\n")
+    for noise_model in ("white", "coloured"):
+        found = tmp_path / f"{noise_model}.json"
+        options = ["--config", tmp_path / "models.yaml", "--output", found]
+        _, said = command("identify", trace, "--noise-model", noise_model, *options)
+        data = json.loads(found.read_text())
+        assert data["fit"] == REJECTED
+        heavy = [note["text"] for note in data["notes"] if note["weight"] == REJECTION]
+        light = [note["text"] for note in data["notes"] if note["weight"] != REJECTION]
+        assert heavy == data["reasons"]
+        assert light == ["Left out for want of a number: 1 row of 801."]
+        assert data["noise_rad"] is None
+        assert ("noise that cannot be told" in said) == (noise_model == "coloured")
+        for word in ("allow for", "richer", "suits the trace", "intervals", "Limits are"):
+            assert word not in said
+
+
+def test_an_undeclared_offset_may_be_why(tmp_path: Path) -> None:
+    (tmp_path / "few.yaml").write_text(FEW)
+    trace, found = written(tmp_path / "t.csv", RIGHT - 0.4 * RIGHT.max(), 0), tmp_path / "t.json"
+    options = ["--config", tmp_path / "few.yaml", "--output", found, "--force"]
+    assert command("identify", trace, *options)[0] == 0
+    data = json.loads(found.read_text())
+    assert data["fit"] == REJECTED
+    assert any("with them it is not rejected" in reason for reason in data["reasons"])
+    assert command("identify", trace, "--offset", "--drift", *options)[0] == 0
+    assert json.loads(found.read_text())["fit"] == OK

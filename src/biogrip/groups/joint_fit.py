@@ -23,7 +23,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.groups.replicates import compute_common_noise, joint_problem
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.fit_status import DOUBT, Note
+from biogrip.identifiability.fit_status import DOUBT, REJECTED, REJECTION, Note
 from biogrip.identifiability.whiteness import one_in
 from biogrip.identify.answer import Identification
 from biogrip.identify.multi_start import fit_from
@@ -95,13 +95,15 @@ def fitted_jointly(
         found = replace(found, parameters=best, misfit_rad=diagnosis.likelihood.misfit_rad)
     agreement = _agreement(problems, diagnosis.likelihood.best, noise_rad)
     if agreement < _DISAGREE:
-        diagnosis.notes.append(
-            Note(
-                DOUBT,
-                "The traces do not tell of one and the same sample (replicates of one would differ "
-                f"as much {one_in(agreement)}): the cell changed, or the intervals are too narrow.",
-            )
+        rejected = diagnosis.status == REJECTED
+        meaning = (
+            "the cell changed" if rejected else "the cell changed, or the intervals are too narrow"
         )
+        text = (
+            "The traces do not tell of one and the same sample (replicates of one would differ as "
+            f"much {one_in(agreement)}): {meaning}."
+        )
+        diagnosis.notes.append(Note(REJECTION if rejected else DOUBT, text))
     return JointFit(diagnosis, tuple(levels), agreement)
 
 

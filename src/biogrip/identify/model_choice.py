@@ -83,6 +83,13 @@ def preferred_simpler(tried: Sequence[FittedModel], chosen: str) -> str | None:
     return best.candidate if worth_it and more > 0 and worse <= WORTH_A_MENTION else None
 
 
+def asks_for_more(tried: Sequence[FittedModel], chosen: str) -> bool:
+    """Return True if BIC prefers another model that is no simpler than the chosen one."""
+    own = next(each for each in tried if each.candidate == chosen)
+    best = min(tried, key=lambda each: each.delta_bic)
+    return own.delta_bic >= WORTH_A_MENTION and len(best.model.names) >= len(own.model.names)
+
+
 def advice(tried: Sequence[FittedModel], chosen: str) -> str:
     """State in a sentence whether BIC prefers another model to the chosen one.
 

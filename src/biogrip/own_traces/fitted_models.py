@@ -15,7 +15,13 @@ from biogrip.identifiability.fit_status import DOUBT, Note
 from biogrip.identifiability.likelihood import MISSED
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.answer import Identification
-from biogrip.identify.model_choice import FittedModel, advice, preferred_simpler, ranked
+from biogrip.identify.model_choice import (
+    FittedModel,
+    advice,
+    asks_for_more,
+    preferred_simpler,
+    ranked,
+)
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
@@ -47,13 +53,14 @@ class FittedModels:
         pairs = zip(self.tried, self.answers, strict=True)
         return next((answer for each, answer in pairs if each.candidate == self.chosen), None)
 
-    def data(self, findings: Sequence[Finding]) -> dict[str, Any]:
+    def data(self, findings: Sequence[Finding] | None) -> dict[str, Any]:
         """Return one row per model, and advice in words, as plain data.
 
         Parameters
         ----------
         findings
-            Findings on the quantities of the chosen model; none if its fit is rejected.
+            Findings on the quantities of the chosen model; None if its fit is rejected. Advice is
+            then only another model that may be the reason.
         """
         if not self.tried:
             return {"models": [], "advice": None}
@@ -70,8 +77,11 @@ class FittedModels:
             }
             for each, answer in zip(self.tried, self.answers, strict=True)
         ]
-        words = f"{advice(self.tried, self.chosen)} {self._compared(findings)}".rstrip()
-        return {"models": rows, "advice": words}
+        words = advice(self.tried, self.chosen)
+        if findings is not None:
+            return {"models": rows, "advice": f"{words} {self._compared(findings)}".rstrip()}
+        more = asks_for_more(self.tried, self.chosen)
+        return {"models": rows, "advice": words if more else None}
 
     def _compared(self, findings: Sequence[Finding]) -> str:
         """Return a sentence on where a preferred simpler model's values are, if it is nested."""

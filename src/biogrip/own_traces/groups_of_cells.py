@@ -26,7 +26,7 @@ from biogrip.groups.group_findings import (
     differences_of_groups,
     findings_of_groups,
 )
-from biogrip.groups.joint_fit import fitted_jointly
+from biogrip.groups.joint_fit import JointFit, fitted_jointly
 from biogrip.groups.population import FEWEST_CELLS
 from biogrip.identifiability.fit_status import DOUBTFUL, HARMLESS, OK, REJECTED, Note
 from biogrip.identify.answer import Identification
@@ -41,6 +41,7 @@ from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
 from biogrip.progress import Progress
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
@@ -171,7 +172,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
                     "group": cell.group,
                     "traces": [
                         {"file": str(each.trace), "noise_rad": noise}
-                        for each, noise in zip(usable, fit.noise_rad, strict=True)
+                        for each, noise in zip(usable, _noise_of(fit, usable), strict=True)
                     ],
                     "agreement_p": fit.agreement,
                     **exact_data(fit.diagnosis),
@@ -314,6 +315,16 @@ def _in_common_ranges(traces: list[_TraceProblem]) -> list[_TraceProblem]:
     low = np.min([each.problem.low for each in traces], axis=0)
     high = np.max([each.problem.high for each in traces], axis=0)
     return [replace(each, problem=replace(each.problem, low=low, high=high)) for each in traces]
+
+
+def _noise_of(fit: JointFit, traces: Sequence[_TraceProblem]) -> Sequence[float]:
+    """Return the noise of each trace in rad; of a rejected fit, as given or that of neighbours."""
+    if fit.diagnosis.status != REJECTED:
+        return fit.noise_rad
+    return [
+        each.case_problem.noise_rad or estimate_noise(each.recorded.rotation_rad[0])
+        for each in traces
+    ]
 
 
 def _known_noise(traces: Sequence[_TraceProblem]) -> list[float] | None:

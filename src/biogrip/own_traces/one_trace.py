@@ -160,12 +160,13 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             near = diagnosis.likelihood.best
             doubts += note_late_onset(case_problem, recorded.time_s, recorded.rotation_rad[0], near)
         read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
+        assumptions = []
         if case_problem.fit_start and case.posterior is not None:
-            read.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))
+            assumptions.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))
         if case_problem.fixed:
-            read.append(Note(HARMLESS, _NOT_COMPARED))
+            assumptions.append(Note(HARMLESS, _NOT_COMPARED))
         instrument = case_problem.instrument
-        said = exact_data(diagnosis, [*read, *notes_on_fit(fit), *doubts])
+        said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *doubts], read)
         data = {
             WRITTEN_BY: __version__,
             "trace": str(options.trace),
@@ -179,7 +180,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
             **said,
             "noise_model": fit.noise_data(),
-            **models.data([] if said["fit"] == REJECTED else diagnosis.findings),
+            **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
             "assumed": assumed(case),
             "by_default": by_default(options.config) if instrument.has_jaws else [],
             "versions": versions(),

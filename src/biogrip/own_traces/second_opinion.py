@@ -7,7 +7,7 @@ from scipy.special import chdtrc
 
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
-from biogrip.identifiability.fit_status import DOUBT, HARMLESS, Note
+from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.identifiability.likelihood import compute_fall
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
@@ -42,8 +42,9 @@ def second_opinion(
     Returns
     -------
     list of Note
-        At most one. Empty if both terms are declared already, if the model is nonlinear, or if the
-        noise model is coloured, which fits both unless they are refused.
+        At most one; with a rejected fit, only if that with both terms is not. Empty if both are
+        declared already, if the model is nonlinear, or if the noise model is coloured, which fits
+        both unless they are refused.
     """
     case_problem = case.problem.weighted(recorded.sd_rad)
     added = 2 - case_problem.offset - case_problem.drift
@@ -72,11 +73,15 @@ def second_opinion(
     other = diagnose(
         problem, also.searched, found, confidence=case.confidence, noise_rad=case_problem.noise_rad
     )
+    rejected = diagnosis.status == REJECTED
+    if rejected and other.status == REJECTED:
+        return []
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
         for before, after in zip(diagnosis.findings, other.findings, strict=True)
         if _differ(before, after)
     ]
+    changes = "with them it is not rejected" if rejected else "; ".join(changed)
     better = (
         "explain the trace far better "
         f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
@@ -97,10 +102,11 @@ def second_opinion(
     else:
         text = (
             f"An offset and a drift of the instrument, fitted along, {better}: "
-            f"{'; '.join(changed) or 'no verdict changes'}. If the instrument may drift, identify "
-            f"the trace with --offset --drift.{or_flows}"
+            f"{changes or 'no verdict changes'}. If the instrument may drift, identify the trace "
+            f"with --offset --drift.{or_flows}"
         )
-    return [Note(DOUBT if changed else HARMLESS, text)]
+    weight = DOUBT if changed else HARMLESS
+    return [Note(REJECTION if rejected else weight, text)]
 
 
 def _differ(before: Finding, after: Finding) -> bool:

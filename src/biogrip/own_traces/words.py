@@ -9,7 +9,7 @@ import numpy as np
 from tabulate import tabulate
 
 from biogrip.digits import with_unit
-from biogrip.identifiability.fit_status import OK
+from biogrip.identifiability.fit_status import OK, REJECTED
 from biogrip.identifiability.marginals import AGREES
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
@@ -48,7 +48,8 @@ def in_words(found: Mapping[str, Any]) -> str:
         ),
     ]
     lines += one_sided_in_words([found])
-    lines += [found["limits"], *(trade["words"] for trade in found["trades"])]
+    lines += [found["limits"]] if found["fit"] != REJECTED else []
+    lines += [trade["words"] for trade in found["trades"]]
     lines += fixed_in_words(found)
     if "onset_s" in found:
         lines.append(f"The protocol starts at {found['onset_s']:.4g} s of the clock, as fitted.")
@@ -65,6 +66,8 @@ def in_words(found: Mapping[str, Any]) -> str:
 
 def noise_in_words(found: Mapping[str, Any]) -> str:
     """Return the noise that a misfit is held against: given, modelled, or seen in the trace."""
+    if found["fit"] == REJECTED and found["noise_model"]:
+        return "noise that cannot be told from misfit"
     given = found["assumed"]["measurement"]
     what = "noise as modelled" if found["noise_model"] else "scatter of neighbours"
     if any(given.get(key) is not None for key in KNOWN_NOISE):

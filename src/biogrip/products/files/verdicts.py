@@ -9,6 +9,7 @@ import numpy as np
 from biogrip.digits import round_increase, rounded_numbers
 from biogrip.identifiability.fit_status import (
     REJECTED,
+    REJECTION,
     Note,
     compute_status,
     find_reasons,
@@ -32,22 +33,28 @@ def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[s
     return rounded_numbers(exact_data(diagnosis, notes))
 
 
-def exact_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
+def exact_data(
+    diagnosis: "Diagnosis", notes: Sequence[Note] = (), on_reading: Sequence[Note] = ()
+) -> dict[str, Any]:
     """Return a diagnosis like `diagnosis_data`, with only chi^2 increases rounded.
 
     A rejected fit determines nothing: its quantities have the best fit as value, no limits, and
-    the verdict `FIT_REJECTED`.
+    the verdict `FIT_REJECTED`; its misfit tells no noise. Notes that neither reject it nor are on
+    reading the file speak of results that it does not have, and are left out.
     """
     likelihood = diagnosis.likelihood
-    ordered = order_notes([*diagnosis.notes, *notes])
-    status = compute_status(ordered)
+    every = [*diagnosis.notes, *on_reading, *notes]
+    status = compute_status(every)
     rejected = status == REJECTED
+    if rejected:
+        every = [note for note in every if note.weight == REJECTION or note in on_reading]
+    ordered = order_notes(every)
     return {
         "fit": status,
         "reasons": find_reasons(ordered),
         "samples": likelihood.problem.residuals.samples,
         "misfit_rad": likelihood.misfit_rad,
-        "noise_rad": likelihood.noise_rad,
+        "noise_rad": None if rejected else likelihood.noise_rad,
         "scatter_rad": likelihood.problem.residuals.noise_scale_rad,
         "threshold": likelihood.threshold,
         "certainty": likelihood.certainty,
