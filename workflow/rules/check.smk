@@ -11,12 +11,15 @@ OVERLAYS = {
     "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
+    "measured": (["measured"], "all", "*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 
 # The default study, whatever this run was configured with; nothing of it is kept.
 RUN_AFRESH = (
     "scratch=$(mktemp -d); trap 'rm -rf \"$scratch\"' EXIT; "
+    # Recorded traces are found from where Snakemake runs.
+    f'cp -R "{workflow.basedir}/data" "$scratch/data"; '
     "snakemake -j {threads} --snakefile {params.snakefile:q} "
     '--directory "$scratch" --quiet rules progress host reason {params.config} -- {params.targets} >> {log:q} 2>&1'
 )

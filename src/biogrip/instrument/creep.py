@@ -16,7 +16,7 @@ from biogrip.instrument.instrument import (
 
 _PER_STRESS = {f"1/{unit}": 1 / size for unit, size in STRESS_UNITS.items()}
 
-COMPLIANCE = Quantity("compliance", "1/Pa", _PER_STRESS, "$J$")
+COMPLIANCE = Quantity("compliance", "1/Pa", _PER_STRESS)
 
 CREEP = (
     Instrument("creep", FORCE, DISPLACEMENT),

@@ -92,12 +92,12 @@ NO_ARMS = Gripper(math.sqrt(0.5), 90.0, Arm(0.0, _NOTHING, _NOTHING), Arm(0.0, _
 With twice their squared lever one, a torque of theirs is the load on the sample.
 """
 
-TORQUE = Quantity("torque", "N m", {"N m": 1.0}, r"$\tau$")
+TORQUE = Quantity("torque", "N m", {"N m": 1.0})
 ROTATION = Quantity(
     "rotation",
     "rad",
     {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180},
-    r"$\varphi$",
+    "closing rotation",
 )
 GRIPPER = Instrument("gripper", TORQUE, ROTATION)
 """The gripper holds a torque, and the closing rotation of its left arm is read."""

@@ -14,8 +14,13 @@ class Quantity:
     """SI unit; empty for a pure number."""
     units: Mapping[str, float] = field(hash=False, compare=False)
     """Units of a file's column, as multiples of the SI unit."""
-    symbol: str
-    """Symbol as mathtext."""
+    label: str = ""
+    """Name on axes, where it says more."""
+
+    @property
+    def title(self) -> str:
+        """Name on axes."""
+        return self.label or self.name
 
     @property
     def suffix(self) -> str:
@@ -71,7 +76,7 @@ class Instrument:
 STRESS_UNITS = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "mPa": 1e-3}
 """Units of stresses and moduli."""
 
-FORCE = Quantity("force", "N", {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12}, "$F$")
-DISPLACEMENT = Quantity("displacement", "m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9}, r"$x$")
-STRESS = Quantity("stress", "Pa", STRESS_UNITS, r"$\sigma$")
-STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2}, r"$\varepsilon$")
+FORCE = Quantity("force", "N", {"N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "pN": 1e-12})
+DISPLACEMENT = Quantity("displacement", "m", {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9})
+STRESS = Quantity("stress", "Pa", STRESS_UNITS)
+STRAIN = Quantity("strain", "", {"1": 1.0, "%": 1e-2})

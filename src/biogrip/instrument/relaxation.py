@@ -10,7 +10,7 @@ from biogrip.instrument.instrument import (
     Quantity,
 )
 
-MODULUS = Quantity("modulus", "Pa", STRESS_UNITS, "$G$")
+MODULUS = Quantity("modulus", "Pa", STRESS_UNITS)
 
 RELAXATION = (
     Instrument("relaxation", DISPLACEMENT, FORCE),

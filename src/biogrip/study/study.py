@@ -369,6 +369,16 @@ class Study:
         return [name for name, case in self.cases.items() if not case.recorded]
 
     @property
+    def gripped(self) -> list[str]:
+        """Names of simulated cases whose sample the gripper holds."""
+        return [name for name in self.simulated if self.cases[name].instrument.has_jaws]
+
+    @property
+    def has_gripper(self) -> bool:
+        """True if the gripper holds the sample of any case."""
+        return any(case.instrument.has_jaws for case in self.cases.values())
+
+    @property
     def recorded(self) -> list[str]:
         """Names of cases with a recorded trace."""
         return [name for name, case in self.cases.items() if case.recorded]

@@ -1,6 +1,7 @@
 """Figure 7: the comb drive to scale, and its torque against voltage."""
 
 import math
+from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -120,5 +121,6 @@ COMB = drawing(
     "its side; "
     "(c) its torque against voltage, eq. (9), with the protocol's operating points.",
     uses=from_study("actuator phases"),
+    when=attrgetter("has_gripper"),
     rule="study_figures",
 )

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.digits import with_unit
-from biogrip.instrument.gripper import ROTATION
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import Fit, scale_of, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
@@ -43,8 +42,7 @@ def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
     if fit.target_rad is not None:
         axes.plot(fit.time_s, factor * fit.target_rad, color=TARGET, label="target")
     axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
-    name = "closing rotation" if fit.read == ROTATION else fit.read.name
-    axes.set_ylabel(with_unit(name, unit))
+    axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
 
 

@@ -12,7 +12,7 @@ from biogrip.products.figures.results import scale_of
 from biogrip.products.figures.style import BLACK, BLUE, COLUMN_IN, ORANGE, figure
 from biogrip.products.files.traces import TARGETS, read_target
 from biogrip.products.product import the
-from biogrip.products.uses import from_case, simulated
+from biogrip.products.uses import from_case, gripped
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.unilateral import UnilateralResponse, unilateral_response
 from biogrip.study.study import Case
@@ -80,6 +80,6 @@ FORCE = drawing(
     "and, where a linear model allows, the rotation of jaws that let go there.",
     uses=from_case("title gripper phases sample parameters nonlinear_target unilateral"),
     reads={"target": the(TARGETS)},
-    cases=simulated,
+    cases=gripped,
     rule="case_figures",
 )

@@ -14,7 +14,7 @@ from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.stages.model_difference import network_of, scaled
 from biogrip.products.tables.linearisation import CAPTION, LIMIT_PERCENT
-from biogrip.products.uses import each, from_study, simulated
+from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.study.study import Case, Study
@@ -88,8 +88,8 @@ LINEARISATION_FIGURE = drawing(
     name="linearisation_figure",
     file="linearisation",
     caption=f"(a) Nonlinear minus linear rotation of one case. (b to d) {CAPTION}",
-    uses=from_study(cases=each(simulated, "title sample parameters gripper phases")),
+    uses=from_study(cases=each(gripped, "title sample parameters gripper phases")),
     reads={"differences": the(DIFFERENCES.path)},
-    when=simulated,
+    when=gripped,
     rule="study_figures",
 )

@@ -1,6 +1,7 @@
 """Figures 4 to 6: the gripper as a linkage, to scale, and the sample's two networks."""
 
 import math
+from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,7 +16,7 @@ from biogrip.products.figures.elements import damper, spring
 from biogrip.products.figures.nomenclature import nomenclature
 from biogrip.products.figures.style import BLACK, BLUE, GREY, ORANGE, PAGE_IN, figure, panel
 from biogrip.products.stages.model_difference import network_of
-from biogrip.products.uses import each, from_study, simulated
+from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.study import Study
 
@@ -194,6 +195,7 @@ LINKAGE = drawing(
     "displacements u of the tips and x of the node between spring and damper, all to the right; "
     "(d) the constitutive models. Arm length and angle are those of the config; in the default "
     "study they are reconstructed.",
-    uses=from_study("gripper", cases=each(simulated, "sample parameters gripper phases")),
+    uses=from_study("gripper", cases=each(gripped, "sample parameters gripper phases")),
+    when=attrgetter("has_gripper"),
     rule="study_figures",
 )

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
+from operator import attrgetter
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -94,5 +95,6 @@ TORQUE = drawing(
     "takes by eq. (9): counted from contact, as the paper does, and with what holds the jaws at "
     "the smallest and at the largest sample that the gripper takes.",
     uses=from_study("phases actuator gripper jaw_gap_m"),
+    when=attrgetter("has_gripper"),
     rule="study_figures",
 )

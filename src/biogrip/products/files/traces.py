@@ -10,6 +10,8 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
+from biogrip.instrument.instrument import Instrument
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.products.files.parquet import column_names, read_columns, table_of, write_tables
 from biogrip.products.files.rows import write_rows
 
@@ -18,6 +20,12 @@ MEASUREMENTS = "results/measurements/{case}/{batch}.parquet"
 SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
+
+_WITHOUT_JAWS = {
+    ("time_s", each.held.column, each.read.column)
+    for each in INSTRUMENTS.values()
+    if not each.has_jaws
+}
 
 # Prefix of a seed's column.
 _SEED = "seed_"
@@ -54,7 +62,7 @@ class Measurements:
 def write_target(
     path: Path, time_s: Array, torque_Nm: Array, rotation_rad: Array, jaw_force_N: Array
 ) -> None:
-    """Write a noise-free trace as CSV.
+    """Write a noise-free trace of the gripper as CSV.
 
     Numbers have nine significant digits: more than any instrument gives, and few enough that
     results on different processors agree. The force has these digits of its largest value, since
@@ -71,14 +79,25 @@ def write_target(
     write_rows(path, TARGET_COLUMNS, rows)
 
 
+def write_target_without_jaws(
+    path: Path, time_s: Array, held: Array, read: Array, instrument: Instrument
+) -> None:
+    """Write a noise-free trace of another instrument, as `write_target` does."""
+    rows = (
+        (f"{t:.10g}", f"{x:.10g}", _WRITTEN.format(y))
+        for t, x, y in zip(time_s, held, read, strict=True)
+    )
+    write_rows(path, ("time_s", instrument.held.column, instrument.read.column), rows)
+
+
 def as_written(rotation_rad: Array) -> Array:
     """Return a rotation rounded like a target that was written and read."""
     return np.array([float(_WRITTEN.format(value)) for value in rotation_rad])
 
 
 def read_target(path: Path) -> tuple[Array, Array, Array]:
-    """Read time, torque and rotation of a target written by `write_target`, all of them finite."""
-    time_s, torque, rotation, _ = _target_columns(path)
+    """Read time, what is held and what is read of a target, all of them finite."""
+    time_s, torque, rotation, *_ = _target_columns(path)
     return time_s, torque, rotation
 
 
@@ -92,7 +111,7 @@ def _target_columns(path: Path) -> Array:
     try:
         with path.open() as stream:
             header = tuple(stream.readline().strip().split(","))
-            if header != TARGET_COLUMNS:
+            if header != TARGET_COLUMNS and header not in _WITHOUT_JAWS:
                 raise BiogripError(
                     f"{path}, line 1: found the columns {', '.join(header)}; "
                     f"a target has {', '.join(TARGET_COLUMNS)}."
@@ -100,14 +119,14 @@ def _target_columns(path: Path) -> Array:
             values = np.loadtxt(stream, delimiter=",", ndmin=2)
     except (OSError, ValueError) as error:
         raise BiogripError(f"{path}: cannot be read as a target: {error}.") from error
-    if values.shape[1] != len(TARGET_COLUMNS):
-        allowed = f"allowed are {len(TARGET_COLUMNS)}"
+    if values.shape[1] != len(header):
+        allowed = f"allowed are {len(header)}"
         raise BiogripError(
             f"{path}: found {counted(values.shape[1], 'column')} in the rows, {allowed}."
         )
     for row, column in np.argwhere(~np.isfinite(values))[:1]:
         raise BiogripError(
-            f"{path}, line {row + 2}, {TARGET_COLUMNS[column]}: found {values[row, column]}, "
+            f"{path}, line {row + 2}, {header[column]}: found {values[row, column]}, "
             "allowed is a finite number."
         )
     return values.T

@@ -49,6 +49,8 @@ def write(case: Case, verdicts: Path, figures: list[Path], page: Path) -> None:
         model=case.sample.model.title,
         trace=case.file or f"seed {TRACE} of the simulated traces",
         found=read_verdicts(verdicts),
+        unit=case.instrument.read.unit,
+        has_jaws=case.instrument.has_jaws,
         figures=[(path.stem, embedded(path)) for path in figures],
     )
     write_text(page, text)
@@ -77,7 +79,7 @@ SUMMARY = Product(
     "summary",
     {"page": "results/summaries/{case}.html"},
     write,
-    from_case("title sample file", template=_template),
+    from_case("title sample file instrument", template=_template),
     lambda plan: wildcards_of(plan.study.cases),
     message="Writing the summary page of {case}",
     reads={"verdicts": the(PATH), "figures": Reads(_figures)},

@@ -88,16 +88,16 @@
       residual = left;
       lines.push({ x: times, y: trace.map((value, i) => value - left[i]), mode: "lines", line: { color: FITTED, width: 1.5, dash: "dash" }, name: "fit" });
     }
-    draw("plot-trace", "Trace and fit", "time (s)", "closing rotation (rad)", lines);
-    draw("plot-residual", "What the fit leaves", "time (s)", "trace − fit (rad)", [dots(times, residual, "residual")]);
+    draw("plot-trace", "Trace and fit", "time (s)", item.reads, lines);
+    draw("plot-residual", "What the fit leaves", "time (s)", `trace − fit${item.unit && ` (${item.unit})`}`, [dots(times, residual, "residual")]);
     const history = fit ? fit.history : [];
-    draw("plot-history", history.length ? "How it was found" : "This method has no generations", "generation", "lowest misfit (rad)",
+    draw("plot-history", history.length ? "How it was found" : "This method has no generations", "generation", `lowest misfit${item.unit && ` (${item.unit})`}`,
       history.length ? [{ x: history[0], y: history[1], mode: "lines", line: { color: FITTED, shape: "hv" }, name: "lowest misfit" }] : [],
       { yaxis: { type: "log" } });
     const note = item.nonlinear ? " The study's model is nonlinear here; the page draws the linear one." : "";
     element("fit-words").textContent = !item.closed_form
-      ? "Arms or torques differ, arms ring, or readings have weights: the page does not compute that, and shows traces only."
-      : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit_rad)} rad.${note}` : "";
+      ? `${item.grips ? "Arms or torques differ, arms ring, or readings have weights" : "Creep and relaxation"}: the page does not compute that, and shows traces only.`
+      : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit_rad)} ${item.unit}.${note}` : "";
     element("plot-profile").dataset.ready = "";
     clearTimeout(showTrace.later);
     showTrace.later = setTimeout(() => { if (fit && item.closed_form) showProfile(item, trace, fit); }, 30);
@@ -157,7 +157,7 @@
     selector.append("start from");
     const select = document.createElement("select");
     select.id = "try-case";
-    cases.forEach((c, i) => { if (c.elements.length) select.append(new Option(c.title, i)); });
+    cases.forEach((c, i) => { if (c.elements.length && c.grips) select.append(new Option(c.title, i)); });
     select.value = tried.index;
     select.addEventListener("change", () => { tried.index = Number(select.value); startFrom(); });
     selector.append(select);
@@ -245,9 +245,9 @@
   if (cases.length) {
     chooseCase();
     // A power law has no few elements that sliders could move.
-    tried.index = cases.findIndex((c) => c.elements.length);
+    tried.index = cases.findIndex((c) => c.elements.length && c.grips);
     if (tried.index >= 0) startFrom();
-    else element("force-words").textContent = "The page has no sliders for power-law samples.";
+    else if (element("force-words")) element("force-words").textContent = "The page has no sliders for power-law samples.";
   }
   window.biogrip = { cases, mechanics, inference, profileOf, dots };
 })();

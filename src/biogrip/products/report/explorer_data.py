@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.digits import rounded
+from biogrip.digits import rounded, with_unit
 from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.case_problem import CaseProblem
@@ -90,8 +90,12 @@ def _case(
         "name": case.name,
         "title": case.title,
         "model": model.title,
+        "grips": case.instrument.has_jaws,
+        "reads": with_unit(case.instrument.read.title, case.instrument.read.unit),
+        "unit": case.instrument.read.unit,
         # What the page can compute: symmetric arms that do not ring, and readings of one weight.
         "closed_form": sampled.sd_rad is None
+        and case.instrument.has_jaws
         and is_symmetric(case.problem.gripper, torque)
         and not case.problem.shows_inertia(time_s, shown, sigma),
         "nonlinear": problem.nonlinear or (not case.recorded and case.nonlinear_target),

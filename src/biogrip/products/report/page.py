@@ -89,8 +89,10 @@ class Content:
 
 
 _STUDY = using(
-    "identifiers shown",
-    cases=each(every, "name title parameters problem recorded noise nonlinear_target truth"),
+    "identifiers shown has_gripper",
+    cases=each(
+        every, "name title instrument parameters problem recorded noise nonlinear_target truth"
+    ),
 )
 
 
@@ -192,6 +194,7 @@ def write(
             item for item in shown_tables if item["entry"].name not in (*_FIRST, *_EVIDENCE)
         ],
         config=shown.config,
+        grips=shown.study.has_gripper,
         versions={"Python": platform.python_version()}
         | {name: version(name) for name in _LIBRARIES},
     )
@@ -297,7 +300,8 @@ def _card(case: Case, path: Path) -> dict[str, Any]:
     found = read_verdicts(path)
     for item in found["quantities"]:
         item["target"] = target_of(item["quantity"], case.parameters)
-    return {"title": case.title, "recorded": case.recorded, **found}
+    unit = case.instrument.read.unit
+    return {"title": case.title, "recorded": case.recorded, "unit": unit, **found}
 
 
 def _named(items: list[dict[str, Any]], names: Sequence[str]) -> list[dict[str, Any]]:

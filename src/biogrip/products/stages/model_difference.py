@@ -12,7 +12,7 @@ from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import Product, Weight
-from biogrip.products.uses import each, from_study, simulated
+from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nonlinear import FINE, correction
 from biogrip.study.study import Case, Study
@@ -85,8 +85,8 @@ MODEL_DIFFERENCE = Product(
     "model_difference",
     {"differences": DIFFERENCES.path},
     compare,
-    from_study(cases=each(simulated, "sample parameters gripper phases")),
-    lambda plan: [{}] if plan.study.simulated else [],
+    from_study(cases=each(gripped, "sample parameters gripper phases")),
+    lambda plan: [{}] if plan.study.gripped else [],
     message="Comparing the linear and the nonlinear model",
     weight=Weight(30, 1000),
 )

@@ -8,7 +8,7 @@ from biogrip.arrays import Array
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at, torque_history
 from biogrip.experiment.sample import Network
-from biogrip.products.files.traces import TARGETS, write_target
+from biogrip.products.files.traces import TARGETS, write_target, write_target_without_jaws
 from biogrip.products.product import Product, wildcards_of
 from biogrip.products.uses import from_case
 from biogrip.progress import warn
@@ -27,9 +27,15 @@ def simulate(case: Case, target: Path) -> None:
     BiogripError
         If the rotation is not finite, or exceeds the stroke of the comb drives.
     """
-    torque = torque_history(case.phases)
+    torque = torque_history(case.phases, deforms=case.instrument.deforms)
     network = case.sample.model.sample(case.parameters)
     time_s = case.sampling.over(torque.end_s)
+    if not case.instrument.has_jaws:
+        read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
+        _check_finite(case, time_s, read)
+        held = torque_at(torque, time_s)
+        write_target_without_jaws(target, time_s, held, read, case.instrument)
+        return
     rotation, force = _response(case, network, torque, time_s)
     _check(case, time_s, rotation)
     _say_if_contact_is_lost(case, network, torque)
@@ -61,15 +67,20 @@ def _say_if_contact_is_lost(case: Case, network: Network, torque: TorqueHistory)
     warn(f"{case.name}: under this protocol {words}; {then}.")
 
 
-def _check(case: Case, time_s: Array, simulated: Array) -> None:
+def _check_finite(case: Case, time_s: Array, simulated: Array) -> None:
     model = case.sample.model
     for sample in np.flatnonzero(~np.isfinite(simulated))[:1]:
         values = ", ".join(f"{name} = {case.parameters[name]:g}" for name in model.names)
+        read = case.instrument.read.name
         raise BiogripError(
-            f"the simulated rotation of {model.title} with {values} is {simulated[sample]} "
+            f"the simulated {read} of {model.title} with {values} is {simulated[sample]} "
             f"at {time_s[sample]:g} s; allowed are parameters, a gripper and a protocol for which "
             "it is finite."
         )
+
+
+def _check(case: Case, time_s: Array, simulated: Array) -> None:
+    _check_finite(case, time_s, simulated)
     largest = float(np.max(np.abs(simulated)))
     if largest > case.stroke_rad:
         raise BiogripError(
@@ -83,7 +94,8 @@ TARGET = Product(
     {"target": TARGETS},
     simulate,
     from_case(
-        "name gripper phases sampling sample parameters nonlinear_target unilateral stroke_rad"
+        "name instrument gripper phases sampling sample parameters nonlinear_target unilateral "
+        "stroke_rad"
     ),
     lambda plan: wildcards_of([*plan.study.simulated, *plan.study.points]),
     message="Simulating the response of {case}",

@@ -1,5 +1,7 @@
 """Table of rotation, torque and voltage at contact with samples of several sizes."""
 
+from operator import attrgetter
+
 import numpy as np
 
 from biogrip.errors import BiogripError
@@ -53,5 +55,6 @@ CONTACT = table(
     item="input: contact",
     caption="Rotation, torque and voltage that close the jaws onto samples of several sizes.",
     uses=from_study("gripper jaw_gap_m actuator phases"),
+    when=attrgetter("has_gripper"),
     rule="tables",
 )

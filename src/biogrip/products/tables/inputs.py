@@ -1,6 +1,7 @@
 """Tables 1 to 4: inputs of the study, from its config."""
 
 from collections.abc import Callable
+from operator import attrgetter
 
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.products.product import Product
@@ -115,7 +116,13 @@ def _quantities(
     return Table(caption + _LEGEND, columns, sourced)
 
 
-def _input(make: Callable[[Study], Table], name: str, number: int, uses: Uses) -> Product:
+def _input(
+    make: Callable[[Study], Table],
+    name: str,
+    number: int,
+    uses: Uses,
+    when: Callable[[Study], object] = lambda _: True,
+) -> Product:
     return table(
         make,
         name=name,
@@ -124,12 +131,17 @@ def _input(make: Callable[[Study], Table], name: str, number: int, uses: Uses) -
         "reconstructed are not given by the paper.",
         uses=uses,
         rule="tables",
+        when=when,
     )
 
 
+_GRIPS = attrgetter("has_gripper")
+
 INPUTS = (
-    _input(gripper, "gripper", 1, from_study("gripper", reconstructed=marked("gripper"))),
-    _input(actuator, "actuator", 2, from_study("actuator", reconstructed=marked("actuator"))),
+    _input(gripper, "gripper", 1, from_study("gripper", reconstructed=marked("gripper")), _GRIPS),
+    _input(
+        actuator, "actuator", 2, from_study("actuator", reconstructed=marked("actuator")), _GRIPS
+    ),
     _input(
         gene_ranges, "gene_ranges", 3, from_study("ranges", reconstructed=marked("search_range"))
     ),

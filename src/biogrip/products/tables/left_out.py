@@ -1,5 +1,7 @@
 """Size of the physical effects that the model leaves out."""
 
+from operator import attrgetter
+
 from biogrip.experiment.protocol import largest_torque, torque_history
 from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.left_out import (
@@ -11,7 +13,7 @@ from biogrip.instrument.left_out import (
 )
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.products.uses import each, from_study, simulated
+from biogrip.products.uses import each, from_study, gripped
 from biogrip.study.study import Case, Study
 
 _COLUMNS = (
@@ -83,6 +85,7 @@ LEFT_OUT = table(
     left_out,
     caption="Size of effects that the model leaves out: drag, rolling, fringing, the sample's "
     "inertia.",
-    uses=from_study("gripper actuator phases", cases=each(simulated, "sample parameters")),
+    uses=from_study("gripper actuator phases", cases=each(gripped, "sample parameters")),
+    when=attrgetter("has_gripper"),
     rule="tables",
 )

@@ -8,7 +8,7 @@ from biogrip.products.files.differences import DIFFERENCES
 from biogrip.products.product import the
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.products.uses import simulated
+from biogrip.products.uses import gripped
 from biogrip.study.study import Study
 
 LIMIT_PERCENT = 1.0
@@ -62,5 +62,5 @@ LINEARISATION = table(
     caption=CAPTION,
     rule="tables",
     reads={"differences": the(DIFFERENCES.path)},
-    when=simulated,
+    when=gripped,
 )

@@ -7,7 +7,7 @@ from biogrip.experiment.protocol import torque_history
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
-from biogrip.products.uses import each, from_study, simulated
+from biogrip.products.uses import each, from_study, gripped
 from biogrip.response.grip import compute_grip
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.simulation import simulated_shortening
@@ -85,8 +85,8 @@ MECHANICS = table(
     caption="Strain, force, stiffness and apparent modulus of every simulated sample, beside the "
     "gripper's own stiffness.",
     uses=from_study(
-        cases=each(simulated, "title gripper phases sample parameters nonlinear_target size_m")
+        cases=each(gripped, "title gripper phases sample parameters nonlinear_target size_m")
     ),
     rule="tables",
-    when=simulated,
+    when=gripped,
 )
