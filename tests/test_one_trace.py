@@ -22,7 +22,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.experiment.sample import MODELS
+from biogrip.experiment.sample import CANDIDATES, MODELS
 from biogrip.identifiability.profiles import Profile
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
@@ -554,6 +554,9 @@ def test_the_chosen_model_is_held_against_others(
     """The example is of a drop with a membrane; its parallel damper does not show."""
     assert "model is richer than the trace asks for: Maxwell liquid drop" in example[0]
     assert example[1]["advice"].endswith(" Its values lie within the limits.")
+    tried = [row["model"] for row in example[1]["models"]]
+    assert tried[-2:] == ["fractional_kelvin_voigt", "fractional_maxwell"]
+    assert sum(CANDIDATES[name].model.power_law for name in tried) == 2
     assert example[0].count("97.5 %") == 1
     few = tmp_path / "few.yaml"
     few.write_text("least_squares: {candidates: 100, starts: 4}\n")

@@ -322,3 +322,13 @@ def test_one_quantity_in_text() -> None:
     assert (q.label, q.unit) == ("c + c_p", "N s/m")
     assert math.exp(q.log(x)) == pytest.approx(7.0)
     assert q.penalties == (BranchPenalty((0, 2)),)
+
+
+def test_the_larger_exponent_is_that_of_the_first_springpot() -> None:
+    """Quantities of two springpots are penalised where the exponents exchange their order."""
+    for name in ("springpots_in_series", "springpots_in_parallel"):
+        for q in parameters_and_sum(MODELS[name]):
+            (penalty,) = q.penalties
+            late = [penalty.form(4) @ np.log([9.0, alpha, 2.0, 0.5]) for alpha in (0.4, 0.6)]
+            assert late == pytest.approx([np.log(0.5 / 0.4), np.log(0.5 / 0.6)])
+            assert penalty.allowed(400.0) == 0

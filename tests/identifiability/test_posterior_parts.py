@@ -49,18 +49,20 @@ def test_the_prior_is_a_normal_distribution_cut_off_or_a_uniform_one() -> None:
     assert np.all(prior.log_density(outside) == -np.inf)
 
 
-def test_branches_come_in_their_order_and_the_prior_still_integrates_to_one() -> None:
-    model = CANDIDATES["generalized_maxwell_3"].model
-    low, high = np.zeros(8), np.full(8, 2.0)
+@pytest.mark.parametrize("name", ["generalized_maxwell_3", "springpots_in_series"])
+def test_branches_come_in_their_order_and_the_prior_still_integrates_to_one(name: str) -> None:
+    model = CANDIDATES[name].model
+    size = len(model.names)
+    low, high = np.zeros(size), np.full(size, 2.0)
     prior = make_prior(model, low, high, {})
-    anywhere = np.random.default_rng(1).uniform(low, high, (100_000, 8))
+    anywhere = np.random.default_rng(1).uniform(low, high, (100_000, size))
     density = np.exp(prior.log_density(anywhere))
     # A sixth of the points count: their share has a standard deviation of 0.7 %.
-    assert np.mean(density) * 2.0**8 == pytest.approx(1.0, rel=0.03)
+    assert np.mean(density) * 2.0**size == pytest.approx(1.0, rel=0.03)
     drawn = prior.draw(500, np.random.default_rng(2))
     assert np.all(np.isfinite(prior.log_density(drawn)))
     np.testing.assert_array_equal(
-        model.in_order(np.exp(drawn)), np.tile(np.arange(8), (len(drawn), 1))
+        model.in_order(np.exp(drawn)), np.tile(np.arange(size), (len(drawn), 1))
     )
 
 

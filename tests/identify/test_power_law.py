@@ -35,11 +35,22 @@ def response(model: SampleModel, sample: list[float]) -> Array:
 
 
 @pytest.mark.parametrize(
-    ("model", "truth"), [(SOLID, [0.3, 10.0, 0.4]), (LIQUID, [10.0, 0.3, 300.0])]
+    ("model", "truth", "level"),
+    [
+        (SOLID, [0.3, 10.0, 0.4], 0.03),
+        (LIQUID, [10.0, 0.3, 300.0], 0.03),
+        (MODELS["springpot"], [10.0, 0.4], 0.03),
+        (MODELS["springpot_beside_damper"], [10.0, 0.3, 50.0], 0.03),
+        (MODELS["fractional_maxwell_gel"], [5.0, 20.0, 0.5], 0.03),
+        (MODELS["fractional_solid"], [1.0, 10.0, 0.3, 300.0], 0.01),
+        (MODELS["springpots_in_parallel"], [60.0, 0.8, 5.0, 0.2], 0.01),
+    ],
 )
-def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float]) -> None:
+def test_intervals_hold_the_exponent(
+    model: SampleModel, truth: list[float], level: float
+) -> None:
     """40 seeds, 95 %: fewer than 33 hold it once in 3000 times."""
-    problems = case_problem(TIMES, response(model, truth), 40, model, level=0.03)
+    problems = case_problem(TIMES, response(model, truth), 40, model, level=level)
     found = identified(problems, list(range(40)), FEW)
     likelihoods = [
         make_likelihood(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)

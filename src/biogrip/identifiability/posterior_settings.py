@@ -60,5 +60,5 @@ class PosteriorSettings(Block):
                 text = f"found {name}, allowed is what is identified, {', '.join(searched)}."
                 yield ("prior", name), text + nearest(name, searched)
             elif name in branches:
-                text = "is of one of several branches, which are named by the order in which they "
-                yield ("prior", name), f"{text}relax; allowed are priors of the other parameters."
+                text = "is of one of several branches or springpots, which are named by their order"
+                yield ("prior", name), f"{text}; allowed are priors of the other parameters."

@@ -27,7 +27,7 @@ from biogrip.identify.trace_fit import TraceFit
 from biogrip.study.study import Case, Study
 
 _MOST_SAMPLES = 50_000
-# Beside branches; the other power laws contain these, and are tried if they are named.
+# Each of the others would take half a second to five; they are tried where the config names them.
 _POWER_LAWS = ["fractional_kelvin_voigt", "fractional_maxwell"]
 
 
