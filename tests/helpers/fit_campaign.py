@@ -34,7 +34,11 @@ from biogrip.identify.least_squares import LeastSquaresSettings
 from biogrip.identify.nested_fits import fit_models
 from biogrip.library import Arm, GeneRange, Gripper, hold, set_up
 
-TRIED = (*MODELS, "generalized_maxwell_2", "generalized_maxwell_3")
+TRIED = (
+    *(name for name, model in MODELS.items() if not model.power_law),
+    *("fractional_kelvin_voigt", "fractional_maxwell"),
+    *("generalized_maxwell_2", "generalized_maxwell_3"),
+)
 """Names of the models that every trace is fitted with."""
 
 NAMES = {model: CANDIDATES[model].model.names for model in TRIED}
