@@ -488,6 +488,43 @@ def test_what_is_said_is_enough_to_repeat_it(
     assert again["quantities"] == told["quantities"]
 
 
+EVERYTHING = """
+study_seed: 7
+least_squares: {candidates: 60, starts: 3}
+identifiability: {confidence: 0.9}
+posterior: {walkers: 20, most_steps: 1000, prior: {k_p: {median: 5.0, spread: 1.0}}EVIDENCE}
+gripper: {uncertainty: {torque_percent: 1.0}}
+protocol: {phases: [{duration_s: 200, torque_Nm: 1.6e-9}, {duration_s: 200, torque_Nm: 0.32e-9}]}
+"""
+
+
+@pytest.mark.parametrize(
+    ("options", "evidence", "models"),
+    [
+        (("--offset", "--fix", "c=77"), "", ""),
+        (("--noise", "3.6e-6"), ", evidence: true", "model_selection: {models: [damper, maxwell]}"),
+    ],
+)
+def test_all_that_is_assumed_repeats_it(
+    tmp_path: Path, options: tuple[str, ...], evidence: str, models: str
+) -> None:
+    """Every byte of the answer and of the samples, without any option but the model's."""
+    config, found = tmp_path / "c.yaml", tmp_path / "f.json"
+    config.write_text(EVERYTHING.replace("EVIDENCE", evidence) + models)
+    told = []
+    arguments: tuple[str, ...] = ("--model", "liquid_drop", *options)
+    for _ in range(2):
+        run = identify(EXAMPLE, *arguments, "--output", found, "--config", config, "--force")
+        assert run.returncode == 0, run.stderr
+        data = json.loads(found.read_text())
+        data.pop("by_default")
+        told.append((json.dumps(data), found.with_suffix(".parquet").read_bytes()))
+        assumed = data["assumed"]
+        arguments = ("--model", assumed.pop("model"))
+        config.write_text(yaml.safe_dump(assumed))
+    assert told[0] == told[1]
+
+
 @pytest.mark.parametrize(
     ("options", "noise"),
     [
@@ -513,8 +550,8 @@ def test_how_a_file_was_read_is_enough_to_repeat_it(
     assert run.returncode == 0, run.stderr
     assert noise in run.stdout
     found = json.loads((tmp_path / "found.json").read_text())
-    few_models = yaml.safe_load(FEW)["model_selection"]
-    again.write_text(yaml.safe_dump({**found["assumed"], "model_selection": few_models}))
+    assert found["assumed"]["model"] == "liquid_drop"
+    again.write_text(yaml.safe_dump({k: v for k, v in found["assumed"].items() if k != "model"}))
     run = identify(*arguments, "--config", again)
     assert run.returncode == 0, run.stderr
     repeated = json.loads((tmp_path / "found.json").read_text())

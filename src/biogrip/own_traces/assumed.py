@@ -1,5 +1,6 @@
 """Record of all that an identification assumes, so that it can be repeated."""
 
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -10,19 +11,29 @@ from biogrip.study.plain import plain
 from biogrip.study.study import Case
 
 
-def assumed(case: Case) -> dict[str, Any]:
-    """Return the blocks of the config that an identification relies on, as plain data."""
-    blocks = (
-        "instrument",
-        "gripper",
-        "protocol",
-        "search_range",
-        "measurement",
-        "models",
-        "least_squares",
-    )
-    some = blocks if case.instrument.has_jaws else [name for name in blocks if name != "gripper"]
-    return {name: plain(_block(case, name)) for name in some} | {"fixed": case.fixed}
+def assumed(case: Case, tried: Sequence[str] | None) -> dict[str, Any]:
+    """Return what an identification relies on, as plain data: its model, and a config.
+
+    Parameters
+    ----------
+    case
+        The case that the trace was identified as.
+    tried
+        Names of the sample models that were tried; None if the config leaves them to biogrip.
+    """
+    blocks = ["instrument", "protocol", "search_range", "measurement", "models", "least_squares"]
+    blocks += ["gripper"] if case.instrument.has_jaws else []
+    own = case.posterior
+    return {
+        "model": case.sample.candidate,
+        **{name: plain(_block(case, name)) for name in blocks},
+        **({"actuator": plain(case.actuator)} if case.instrument.has_jaws else {}),
+        "fixed": case.fixed,
+        "identifiability": {"confidence": case.confidence},
+        "model_selection": {} if tried is None else {"models": list(tried)},
+        **({} if own is None else {"posterior": plain(own)}),
+        "study_seed": case.study.study_seed,
+    }
 
 
 def _block(case: Case, name: str) -> Any:

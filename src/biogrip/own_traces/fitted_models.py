@@ -48,6 +48,11 @@ class FittedModels:
     answers: list[Identification] = field(default_factory=list)
 
     @property
+    def names(self) -> list[str]:
+        """Names of the models."""
+        return [each.candidate for each in self.tried]
+
+    @property
     def own(self) -> Identification | None:
         """Best fit of the chosen model, if it is among those tried."""
         pairs = zip(self.tried, self.answers, strict=True)

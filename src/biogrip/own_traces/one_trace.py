@@ -147,9 +147,8 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
         )
         progress.done()
         progress.doing("trying other sample models")
-        models = models_tried(
-            study, case, fit, diagnosis, lambda: None, named=names_models(options.config)
-        )
+        named = names_models(options.config)
+        models = models_tried(study, case, fit, diagnosis, lambda: None, named=named)
         diagnosis, doubts = judge_again(fit, diagnosis, models, confidence, case_problem.noise_rad)
         if case_problem.fit_start:
             diagnosis = profile_over_onset(diagnosis, recorded.time_s)
@@ -167,6 +166,9 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             assumptions.append(Note(HARMLESS, _NOT_COMPARED))
         instrument = case_problem.instrument
         said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *doubts], read)
+        # Evidence is compared of fewer models than are tried where the config names none.
+        unnamed = case.compared_models and not named
+        tried = None if unnamed else models.names or list(case.models)
         data = {
             WRITTEN_BY: __version__,
             "trace": str(options.trace),
@@ -181,7 +183,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             **said,
             "noise_model": fit.noise_data(),
             **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-            "assumed": assumed(case),
+            "assumed": assumed(case, tried),
             "by_default": by_default(options.config) if instrument.has_jaws else [],
             "versions": versions(),
         }
