@@ -21,6 +21,8 @@ from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
+from biogrip.own_design.earlier import Recorded, estimate_from_recordings
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.design_inputs import make_design_inputs, plausible, plausible_ends
 from biogrip.study.load import load_study, read_configs
@@ -280,6 +282,43 @@ def test_after_a_trace_with_columns_and_units_of_its_own(
     assert design(tmp_path, "--after", noisy, *sensitivity) == 1
     bounds_after(tmp_path, "--after", noisy, *sensitivity, "--noise", "1.2e-5")
     assert "level_rad: 3.0e-06" in (tmp_path / "out.yaml").read_text()
+
+
+def test_an_earlier_trace_tells_as_much_as_its_weights_say(tmp_path: Path) -> None:
+    """Information is a sum over readings, of squared finite differences over their variances."""
+    case = seldom_sampled()
+    trace = write_trace(case, tmp_path / "trace.csv")
+    times, rotation = np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True)
+    sd_rad = np.where(times < 0.4 * times[-1], 3e-6, 3e-5)
+    rotation += 2.9e-5 * (sd_rad > 1e-5) * np.random.default_rng(2).standard_normal(len(times))
+    columns = np.column_stack((times, rotation, sd_rad))
+    np.savetxt(trace, columns, "%.12g", ",", header="time_s,rotation_rad,sd_rad", comments="")
+    earlier = estimate_from_recordings([Recorded(case, trace)], ReadAs(sd="sd_rad"), 0)
+
+    def response(x: Array) -> Array:
+        network = case.sample.model.network(np.exp(x)[None])
+        return simulated_rotation(
+            case.gripper, network, case.problem.torque, times, nonlinear=False
+        )[0]
+
+    steps = 1e-4 * np.eye(len(earlier.best))
+    slopes = [(response(earlier.best + h) - response(earlier.best - h)) / 2e-4 for h in steps]
+    expected = (slopes / sd_rad**2) @ np.transpose(slopes)
+    np.testing.assert_allclose(
+        earlier.information[0], expected, rtol=1e-3, atol=1e-5 * np.abs(expected).max()
+    )
+
+
+def test_weights_are_options_of_a_design(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A share of the rotation that is far too small refuses the trace; one that fits does not."""
+    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
+    trace = str(write_trace(seldom_sampled(), tmp_path / "trace.csv"))
+    bounds_after(tmp_path, "--after", trace, "--noise", "3e-6", "--noise-share", "1e-4")
+    tiny = ("--noise", "1e-7", "--noise-share", "1e-5")
+    assert design(tmp_path, "--force", "--after", trace, *tiny) == 1
+    assert "--noise-share" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

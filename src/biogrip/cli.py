@@ -248,7 +248,7 @@ def _groups_parser(stages: Any) -> None:
 def _design_parser(stages: Any) -> None:
     text = "design torque and sampling times that determine every parameter"
     design = stages.add_parser("design", help=text, description=text)
-    design.set_defaults(command=_design, noise_model=None, sd=None, noise_share=None)
+    design.set_defaults(command=_design, noise_model=None)
     design.examples = _examples(
         "design my_design.yaml",
         "design my_design.yaml --after first.csv --output second.yaml",
@@ -322,6 +322,12 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
         command.add_argument(
             name, action=argparse.BooleanOptionalAction, help=f"fit {what} along, or not"
         )
+    command.add_argument(
+        "--sd", metavar="COLUMN", help="column of the rotations' standard deviations"
+    )
+    command.add_argument(
+        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the rotation"
+    )
 
 
 def _start(text: str) -> float | str:
@@ -362,12 +368,6 @@ def _trace_options(command: _Parser) -> None:
     """Add options for reading and identifying recorded traces."""
     command.lists_models = True
     _reading_options(command)
-    command.add_argument(
-        "--sd", metavar="COLUMN", help="column of the rotations' standard deviations"
-    )
-    command.add_argument(
-        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the rotation"
-    )
     command.add_argument(
         "--model", default="generalized_maxwell", help="sample model [%(default)s]"
     )

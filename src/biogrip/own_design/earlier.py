@@ -7,7 +7,7 @@ from pathlib import Path
 from biogrip.design.earlier_traces import Earlier, estimate_from_traces
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
-from biogrip.groups.replicates import joint_problem
+from biogrip.groups.replicates import compute_common_noise, joint_problem
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
@@ -36,7 +36,8 @@ def estimate_from_recordings(
     """Fit the traces of one sample jointly, adding one after another.
 
     Search range, least squares and the block `design` are those of the first trace's case. Noise is
-    assumed white, and as in that block if the options do not say otherwise.
+    assumed independent, and as in that block if the options do not say otherwise; readings with
+    standard deviations of their own have weights accordingly.
 
     Raises
     ------
@@ -49,8 +50,9 @@ def estimate_from_recordings(
     read_as.check()
     if read_as.fit_start:
         raise BiogripError("--start: found fit, allowed with --after is a time.")
-    noise_rad = read_as.noise_rad or block.noise_rad
-    problems = [_make_problem(each, read_as, noise_rad) for each in traces]
+    given = [_make_problem(each, read_as, block.noise_rad) for each in traces]
+    problems, levels = [problem for problem, _ in given], [level for _, level in given]
+    samples = [problem.residuals.samples for problem in problems]
     rng = stream(study_seed, case.name, 0, "after")
 
     def identify(problem: Problem) -> Identification:
@@ -58,7 +60,8 @@ def estimate_from_recordings(
 
     earlier, ends = None, plausible_ends(case)
     for count, recorded in enumerate(traces, 1):
-        joint = joint_problem(problems[:count], count * [noise_rad])
+        joint = joint_problem(problems[:count], levels[:count])
+        noise_rad = compute_common_noise(samples[:count], levels[:count])
         earlier = estimate_from_traces(
             joint, noise_rad, identify, ends, block.plausible_samples, rng, earlier
         )
@@ -66,22 +69,27 @@ def estimate_from_recordings(
             raise BiogripError(
                 f"--after: {recorded.file}: found {earlier.misfit_rad:.3g} rad that the best fit "
                 f"leaves, allowed is at most {_UNLIKE:g} times the noise of {noise_rad:.3g} rad "
-                "(--noise, else design.noise_rad): is it of this sample, and was it recorded as "
-                "the configs say?"
+                "(--noise, --noise-share or --sd, else design.noise_rad): is it of this sample, "
+                "and was it recorded as the configs say?"
             )
     assert earlier is not None
     return earlier
 
 
-def _make_problem(recorded: Recorded, read_as: ReadAs, noise_rad: float) -> Problem:
+def _make_problem(recorded: Recorded, read_as: ReadAs, usual_rad: float) -> tuple[Problem, float]:
+    """Return the problem of a trace and its noise in rad, which is as usual if nothing is given."""
     if wrong := trace_file_problem(recorded.file):
         raise BiogripError(f"--after: {wrong}")
     problem = recorded.case.problem
+    share = read_as.noise_share or problem.noise_share
     case_problem = replace(
         problem,
-        noise_rad=noise_rad,
+        noise_rad=read_as.noise_rad or (None if share else usual_rad),
+        noise_share=share,
         offset=problem.offset if read_as.offset is None else read_as.offset,
         drift=problem.drift if read_as.drift is None else read_as.drift,
     )
     trace = read_as.read(recorded.file, recorded.case.gripper, case_problem)
-    return case_problem.of(trace.time_s, trace.rotation_rad[0])
+    case_problem = case_problem.weighted(trace.sd_rad)
+    assert case_problem.noise_rad is not None
+    return case_problem.of(trace.time_s, trace.rotation_rad[0]), case_problem.noise_rad
