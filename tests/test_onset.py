@@ -208,6 +208,24 @@ def test_a_fitted_onset_widens_limits(tmp_path: Path) -> None:
     assert all(fitted[name] > 0.99 * width for name, width in given.items())
 
 
+def test_a_posterior_that_takes_the_onset_as_exact_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Limits of profiles are those of all onsets; the posterior's interval of c_p is narrower."""
+    times, values = late(2)
+    found = identified(tmp_path, times, values, "--start", "fit", "--posterior")
+    told = {each["quantity"]: each for each in found["posterior"]["quantities"]}
+    assert (
+        "takes the fitted onset as exact, so its intervals are too narrow"
+        in (found["posterior"]["in_words"])
+    )
+    assert found["posterior"]["in_words"] in capsys.readouterr().out
+    for each in told.values():
+        if each["against_profile"] == "differs":
+            assert "uncertainty of the fitted onset" in each["why"]
+    assert all("posterior" not in note["text"] for note in found["notes"])
+
+
 def test_readings_before_the_onset_tell_the_zero(tmp_path: Path) -> None:
     times, values = late(2)
     declared = ("--offset", "--start")

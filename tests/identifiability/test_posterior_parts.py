@@ -187,9 +187,12 @@ def test_marginals_are_quantiles_of_what_counts() -> None:
     assert k.against(*np.exp([-width, width])) == AGREES
     assert k.against(*np.exp([-1.4 * width, width])) == DIFFERS
     assert k.against(None, 2.0) == PRIOR
-    assert "no lower limit (its upper 2)" in k.why(None, 2.0)
-    assert "no lower and upper limit." in k.why(None, None)
-    assert "takes the best fit at every value" in k.why(0.5, 2.0)
+    for exact in (True, False):
+        assert "no lower limit (its upper 2)" in k.why(None, 2.0, exact_onset=exact)
+        assert "no lower and upper limit." in k.why(None, None, exact_onset=exact)
+        favours = "takes the best fit at every value" in k.why(0.5, 2.0, exact_onset=exact)
+        assert favours is not exact
+    assert "which the posterior takes as exact" in k.why(0.5, 2.0, exact_onset=True)
 
 
 def jensen_shannon(p: Array, q: Array, x: Array) -> float:

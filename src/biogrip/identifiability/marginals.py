@@ -50,11 +50,20 @@ class Marginal:
         shifts = np.abs(np.log(np.divide(self.outer, (low, high))))
         return AGREES if np.max(shifts) <= _ALLOWED * width else DIFFERS
 
-    def why(self, low: float | None, high: float | None) -> str:
-        """Explain in a sentence how the interval compares with a profile's limits."""
+    def why(self, low: float | None, high: float | None, *, exact_onset: bool) -> str:
+        """Explain how the interval compares with a profile's limits.
+
+        With an exact onset, the profile allows for the uncertainty of the onset, and the interval
+        does not.
+        """
         label, verdict = self.quantity.label, self.against(low, high)
         if verdict == AGREES:
             return f"{label}: the interval is that of the profile."
+        if verdict == DIFFERS and exact_onset:
+            return (
+                f"{label}: the profile has {low:.3g} to {high:.3g}. It allows for the uncertainty "
+                "of the fitted onset, which the posterior takes as exact."
+            )
         if verdict == DIFFERS:
             return (
                 f"{label}: the profile has {low:.3g} to {high:.3g}. It takes the best fit at every "

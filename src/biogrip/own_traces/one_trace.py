@@ -38,7 +38,6 @@ from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import posterior, recording
 from biogrip.products.stages.judgement import (
-    ONSET_AS_FITTED,
     fit_judged,
     notes_on_fit,
 )
@@ -159,11 +158,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             near = diagnosis.likelihood.best
             doubts += note_late_onset(case_problem, recorded.time_s, recorded.rotation_rad[0], near)
         read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
-        assumptions = []
-        if case_problem.fit_start and case.posterior is not None:
-            assumptions.append(Note(HARMLESS, f"Of the posterior: {ONSET_AS_FITTED}"))
-        if case_problem.fixed:
-            assumptions.append(Note(HARMLESS, _NOT_COMPARED))
+        assumptions = [Note(HARMLESS, _NOT_COMPARED)] if case_problem.fixed else []
         instrument = case_problem.instrument
         said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *doubts], read)
         # Evidence is compared of fewer models than are tried where the config names none.

@@ -22,6 +22,10 @@ POSTERIOR = "results/posterior/{case}.json"
 SAMPLES = "results/posterior/{case}.parquet"
 
 _MOST_ROWS = 10_000
+_EXACT_ONSET = (
+    "The posterior takes the fitted onset as exact, so its intervals are too narrow; the limits of "
+    "the profiles are not."
+)
 
 Limits = Mapping[str, tuple[float | None, float | None]]
 """Confidence limits from profile likelihoods by quantity; None at an open end."""
@@ -33,8 +37,14 @@ def posterior_data(
     marginals: Sequence["Marginal"],
     sensitivities: Sequence["Sensitivity"],
     found: Limits,
+    *,
+    exact_onset: bool,
 ) -> dict[str, Any]:
-    """Return the summary of a posterior as plain data in SI units."""
+    """Return the summary of a posterior as plain data in SI units.
+
+    With an exact onset, the samples are of one that was fitted, and the limits allow for its
+    uncertainty.
+    """
     from biogrip.identifiability.prior_sensitivity import in_words
 
     steps, walkers, _ = samples.log_parameters.shape
@@ -48,11 +58,11 @@ def posterior_data(
         "bulk": rounded(convergence.bulk),
         "tail": rounded(convergence.tail),
         "converged": convergence.reached,
-        "in_words": convergence.words(),
+        "in_words": f"{convergence.words()} {_EXACT_ONSET if exact_onset else ''}".rstrip(),
         "prior_in_words": in_words(sensitivities),
         "quantities": [
             {
-                **_quantity(own, *found[own.quantity.label]),
+                **_quantity(own, *found[own.quantity.label], exact_onset=exact_onset),
                 "prior_sensitivity": rounded(each.prior),
                 "likelihood_sensitivity": rounded(each.likelihood),
             }
@@ -61,7 +71,9 @@ def posterior_data(
     }
 
 
-def _quantity(own: "Marginal", low: float | None, high: float | None) -> dict[str, Any]:
+def _quantity(
+    own: "Marginal", low: float | None, high: float | None, *, exact_onset: bool
+) -> dict[str, Any]:
     return {
         "quantity": own.quantity.label,
         "symbol": own.quantity.symbol,
@@ -76,7 +88,7 @@ def _quantity(own: "Marginal", low: float | None, high: float | None) -> dict[st
         "profile_high": rounded(high),
         "against_profile": own.against(low, high),
         "in_words": own.words(),
-        "why": own.why(low, high),
+        "why": own.why(low, high, exact_onset=exact_onset),
     }
 
 

@@ -96,7 +96,9 @@ def posterior_of_trace(
     data = {
         "model": case_problem.model.name,
         "confidence": case.confidence,
-        **posterior_data(found, block, marginals, sensitivities, limits),
+        **posterior_data(
+            found, block, marginals, sensitivities, limits, exact_onset=case_problem.fit_start
+        ),
         "evidence": _evidence(case, pose, case_problem.noise_rad, progress),
     }
     return data, drawn
