@@ -20,8 +20,8 @@ from biogrip.cli import main
 from biogrip.groups.power import cells_needed
 from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
-from biogrip.products.files.rows import RowFile
-from biogrip.products.report.answers import compared_rows, read_table, say_what_traces_tell
+from biogrip.products.files.rows import RowFile, read_table
+from biogrip.products.report.answers import compared_rows, say_what_traces_tell
 from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers

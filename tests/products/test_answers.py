@@ -5,10 +5,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from biogrip.products.files.rows import read_table
 from biogrip.products.report.answers import (
     compare_with_paper,
     compared_rows,
-    read_table,
     say_what_traces_tell,
     say_which_method_finds_it,
 )
@@ -139,5 +139,5 @@ def test_the_published_study_is_counted_as_pandas_counts_it() -> None:
 
 
 def test_a_table_that_is_not_there_is_named(tmp_path: Path) -> None:
-    with pytest.raises(Exception, match=r"errors.csv: cannot be read as a table"):
+    with pytest.raises(Exception, match=r"errors.csv: cannot be read"):
         read_table(tmp_path / "errors.csv")

@@ -16,11 +16,11 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
+from biogrip.products.files.rows import read_table
 from biogrip.products.files.traces import read_measurements
 from biogrip.products.files.verdicts import read_verdicts
 from biogrip.products.report.answers import (
     compare_with_paper,
-    read_table,
     say_what_traces_tell,
     say_which_method_finds_it,
 )

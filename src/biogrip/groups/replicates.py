@@ -127,7 +127,7 @@ class JointResiduals(Residuals):
         return JointResiduals(parts, (1 / self.weights).tolist())
 
     def shares_responses(self, other: Residuals) -> bool:
-        """Return whether problems differ only in traces; weights are part of the responses."""
+        """Return True if problems differ only in traces; weights are part of the responses."""
         return self is other
 
     def _stacked(self, found: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:

@@ -73,7 +73,7 @@ class Finding:
         return self.verdict != NOT_DETERMINED
 
     def allows(self, log_parameters: Array) -> bool:
-        """Return whether parameters, (n_parameters,), lie within the limits; NaN does."""
+        """Return True if parameters, (n_parameters,), lie within the limits; NaN does."""
         value = self.quantity.log(log_parameters)
         low, high = self.profile.low, self.profile.high
         beyond = (low is not None and value < low) or (high is not None and value > high)

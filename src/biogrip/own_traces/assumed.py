@@ -63,7 +63,7 @@ def by_default(config: Path | None) -> list[str]:
 
 
 def names_models(config: Path | None) -> bool:
-    """Return whether the config names the sample models to try (``model_selection.models``)."""
+    """Return True if the config names the sample models to try (``model_selection.models``)."""
     given = read_configs([config]) if config else {}
     return "models" in (given.get("model_selection") or {})
 

@@ -110,7 +110,7 @@ def second_opinion(
 
 
 def _differ(before: Finding, after: Finding) -> bool:
-    """Return whether verdicts differ, or the estimate moved out of the earlier interval."""
+    """Return True if verdicts differ, or the estimate moved out of the earlier interval."""
     if before.verdict != after.verdict:
         return True
     low, high = before.low or 0.0, before.high or np.inf

@@ -91,6 +91,6 @@ def _of_branches(statement: ast.stmt) -> list[ast.ExceptHandler] | list[ast.matc
 
 @cache
 def followed(name: str) -> bool:
-    """Return whether a module is the package's, and not one that only says what there is to do."""
+    """Return True if a module is the package's, and not one that only says what there is to do."""
     says_only = any(name == said or name.startswith(f"{said}.") for said in _SAYING)
     return name.startswith("biogrip.") and not says_only and _file(name) is not None

@@ -4,7 +4,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
-from biogrip.response.linear import StepResponse, rotation
+from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.nuisance import nuisance_basis, without
 
 # A lag of so many protocols is an integral of the torque.
@@ -27,13 +27,8 @@ def drift_is_flow(torque: TorqueHistory, time_s: Array) -> bool:
     """
     if torque.deforms:
         return False
-    drives = 1 if torque.symmetric else 2
-    static = np.eye(drives)[:, None, :]
-    lags = StepResponse(
-        static, np.full((drives, 1), -1 / (_LAG * torque.end_s)), -static[..., None]
-    )
     constant = nuisance_basis(time_s, offset=True, drift=False)
-    flows = without(constant, _LAG * rotation(lags, torque, time_s))
+    flows = without(constant, _LAG * lagged_torques(torque, (_LAG,))(time_s))
     drift = without(constant, time_s / torque.end_s)
     basis = np.linalg.qr(flows.T)[0].T
     return bool(np.sum(without(basis, drift) ** 2) < _TELLING * np.sum(drift**2))

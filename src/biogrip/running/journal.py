@@ -93,13 +93,13 @@ def journals_in(results: Path) -> list[Path]:
 
 
 def is_running(journal: Path) -> bool:
-    """Return whether another process on this host may still write to the journal."""
+    """Return True if another process on this host may still write to the journal."""
     host, process, begun_ns = _writer(journal)
     return host == os.uname().nodename and process != os.getpid() and lives(process, begun_ns)
 
 
 def lives(process: int, begun_ns: int) -> bool:
-    """Return whether the process that had a number on this host at a time still has it."""
+    """Return True if the process that had a number on this host at a time still has it."""
     import psutil
 
     with suppress(psutil.Error):
@@ -111,14 +111,14 @@ def lives(process: int, begun_ns: int) -> bool:
 
 
 def is_gone(process: str) -> bool:
-    """Return whether no process on this host has a number."""
+    """Return True if no process on this host has a number."""
     import psutil
 
     return process.isdigit() and int(process) < _PROCESSES and not psutil.pid_exists(int(process))
 
 
 def is_closed(journal: Path) -> bool:
-    """Return whether the journal's process has ended; on other computers assumed after a day."""
+    """Return True if the journal's process has ended; on other computers assumed after a day."""
     if _writer(journal)[0] == os.uname().nodename:
         return not is_running(journal)
     return time.time() - journal.stat().st_mtime > _DAY_S

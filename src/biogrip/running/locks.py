@@ -28,12 +28,12 @@ def sign_locks(snakemake_folder: Path) -> None:
 
 
 def is_locked(snakemake_folder: Path) -> bool:
-    """Return whether there are locks in a ``.snakemake`` folder."""
+    """Return True if there are locks in a ``.snakemake`` folder."""
     return bool(_locks(snakemake_folder))
 
 
 def is_locked_by_dead(snakemake_folder: Path) -> bool:
-    """Return whether all locks in a ``.snakemake`` folder belong to a run that has ended."""
+    """Return True if all locks in a ``.snakemake`` folder belong to a run that has ended."""
     locks = _locks(snakemake_folder)
     try:
         run = json.loads((snakemake_folder / _RUN).read_text())

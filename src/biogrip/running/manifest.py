@@ -111,7 +111,7 @@ class Manifest:
         return sorted({*self.files}.difference(names))
 
     def knows(self, path: str) -> bool:
-        """Return whether the study wrote a file of this path."""
+        """Return True if the study wrote a file of this path."""
         return path in self._records
 
     def last(self, path: str) -> Record:
@@ -119,7 +119,7 @@ class Manifest:
         return self._records[path][-1]
 
     def is_whole(self, path: str, *, thoroughly: bool = False) -> bool:
-        """Return whether a file has the content that was last written.
+        """Return True if a file has the content that was last written.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class Manifest:
                 os.utime(file, ns=(stat.st_atime_ns, modified_ns))
 
     def was_written(self, path: str) -> bool:
-        """Return whether a file has the content of its last write or of the one before."""
+        """Return True if a file has the content of its last write or of the one before."""
         return any(self._is(path, record, thoroughly=True) for record in self._records[path])
 
     def _is(self, path: str, record: Record, *, thoroughly: bool) -> bool:

@@ -116,7 +116,7 @@ def _outputs(rule: ProductRule, job: Wildcards) -> list[str]:
 
 
 def is_result(file: str) -> bool:
-    """Return whether a file that a rule names is in the results folder."""
+    """Return True if a file that a rule names is in the results folder."""
     return PurePosixPath(file).parts[0] == _RESULTS
 
 

@@ -68,7 +68,7 @@ class ProductRule:
         }
 
     def makes(self, file: str) -> bool:
-        """Return whether a job of the rule could write a file, planned or not."""
+        """Return True if a job of the rule could write a file, planned or not."""
         values = {name: f"(?:{value})" for name, value in self.constraints.items()}
         patterns = (pattern.replace(".", r"\.") for pattern in self.outputs.values())
         return any(re.fullmatch(pattern.format(**values), file) for pattern in patterns)

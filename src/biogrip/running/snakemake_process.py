@@ -76,7 +76,7 @@ def _cancelling(_: int, __: FrameType | None) -> None:
 
 
 def _waits_for_jobs(frame: FrameType | None) -> bool:
-    """Return whether the frame is Snakemake's scheduler waiting for a job to end."""
+    """Return True if the frame is Snakemake's scheduler waiting for a job to end."""
     names: list[str] = []
     while frame is not None and len(names) < 3:
         names.append(frame.f_code.co_name)

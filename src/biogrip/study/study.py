@@ -360,7 +360,7 @@ class Study:
         return dict(vars(self.config.search_range))
 
     def is_reconstructed(self, key: str) -> bool:
-        """Return whether a dotted key is marked as reconstructed, i.e. omitted in the paper."""
+        """Return True if a dotted key is marked as reconstructed, i.e. omitted in the paper."""
         return any(key == name or key.startswith(f"{name}.") for name in self.reconstructed)
 
     @property

@@ -10,7 +10,8 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.instrument.gripper import Gripper
-from biogrip.traces.any_response import extreme_responses, lagged_torques
+from biogrip.response.lagged_torques import lagged_torques
+from biogrip.traces.any_response import extreme_responses
 
 # Retardation times a decade; shortest over the sampling interval, longest over the protocol.
 _A_DECADE, _SHORTEST, _LONGEST = 4, 0.01, 10.0

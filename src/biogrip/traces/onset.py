@@ -11,9 +11,10 @@ from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.instrument.gripper import Gripper
+from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, without
-from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
+from biogrip.traces.any_response import extreme_responses, left_over
 
 # Relaxation times over the protocol's duration.
 _LAG_SHARES = tuple(np.geomspace(1e-6, 10.0, 16))
@@ -90,7 +91,7 @@ def _thinned(samples: int, within: IntArray) -> BoolArray:
 
 
 def begins_constant(time_s: Array, rotation_rad: Array, onset_s: float | None = None) -> bool:
-    """Return whether the readings before an onset are constant within the noise of the trace.
+    """Return True if the readings before an onset are constant within the noise of the trace.
 
     Without an onset, the first `FEWEST_BEFORE` readings are looked at.
     """

@@ -20,8 +20,9 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.instrument.instrument import Instrument, Quantity
+from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.nuisance import without
-from biogrip.traces.any_response import extreme_responses, lagged_torques, left_over
+from biogrip.traces.any_response import extreme_responses, left_over
 from biogrip.traces.onset import begins_constant, estimate_onset
 from biogrip.traces.recordings import TIME_UNITS, Columns, Recording, place, unit_of
 
@@ -289,7 +290,7 @@ def _fit(functions: _Functions) -> _Fit:
 
 
 def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool:
-    """Return whether the trace follows the torque.
+    """Return True if the trace follows the torque.
 
     It does not if a constant describes it better, or if white noise about zero would have as
     large a fit by an F test (chi-squared test with known noise).
@@ -309,7 +310,7 @@ def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool
 
 
 def _mirrored(functions: _Functions, gripper: Gripper, noise_rad: float | None) -> bool:
-    """Return whether the mirrored trace is far more likely to be a response.
+    """Return True if the mirrored trace is far more likely to be a response.
 
     It must be so also with a constant fitted along: an undeclared offset is not a wrong
     sign.

@@ -6,7 +6,14 @@ from pathlib import Path
 import pytest
 
 from biogrip.own_traces.many_traces import Outcome, write_table
-from biogrip.products.files.rows import as_it_was, escape_formula, read_frame, read_rows, write_rows
+from biogrip.products.files.rows import (
+    as_it_was,
+    escape_formula,
+    read_frame,
+    read_rows,
+    read_table,
+    write_rows,
+)
 
 FORMULAS = ("=1+1", "+1+1", "-1+1", "@SUM(A1)", "\t=1", "\r=1", "-x", "=", "'=1", "''=1", "+")
 PLAIN = ("-1", "+2.5", "-1e-05", "-inf", "-", "a=b", "'a", "", "1.5", "it's", "NaN-1")
@@ -36,6 +43,7 @@ def test_a_table_of_traces_names_those_that_look_like_formulas(tmp_path: Path) -
     with table.open(newline="") as stream:
         assert list(csv.reader(stream))[1][:2] == ["'=1+1.csv", "none"]
     assert read_rows(table)[1][:2] == ["=1+1.csv", "none"]
+    assert read_table(table)[0]["trace"] == "=1+1.csv"
 
 
 def test_a_name_that_is_no_text_is_written(tmp_path: Path) -> None:

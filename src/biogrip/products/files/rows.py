@@ -118,3 +118,9 @@ def read_rows(path: Path, columns: Sequence[str] | None = None) -> list[list[str
             f"{path}, line 1: found {','.join(rows[0])}; wanted {','.join(columns)}."
         )
     return rows
+
+
+def read_table(path: Path) -> list[dict[str, str]]:
+    """Read the rows of a table as text by column."""
+    header, *rows = read_rows(path)
+    return [dict(zip(header, row, strict=False)) for row in rows]

@@ -1,25 +1,13 @@
 """The study's answers in sentences and in one table, written from its tables."""
 
-import csv
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 
-from biogrip.errors import BiogripError
+from biogrip.identifiability.verdicts import DETERMINED
 
 Row = Mapping[str, str]
-_DETERMINED = "determined"
 # With fewer, no seed is outside of the middle 90 %.
 _FEWEST_SEEDS = 20
-
-
-def read_table(path: Path) -> list[dict[str, str]]:
-    """Read the rows of a table, CSV, as text by column."""
-    try:
-        with path.open(encoding="utf-8", newline="") as stream:
-            return list(csv.DictReader(stream))
-    except (OSError, UnicodeDecodeError) as error:
-        raise BiogripError(f"{path}: cannot be read as a table: {error}.") from error
 
 
 def compare_with_paper(
@@ -142,11 +130,11 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
 
 
 def _determined(verdicts: Iterable[Row]) -> dict[tuple[str, str], bool]:
-    return {(row["case"], row["quantity"]): row["verdict"] == _DETERMINED for row in verdicts}
+    return {(row["case"], row["quantity"]): row["verdict"] == DETERMINED for row in verdicts}
 
 
 def _is_close(value: str, limits: Row) -> bool:
-    """Return whether a value is within the limits of a trace without noise, on both sides."""
+    """Return True if a value is within the limits of a trace without noise, on both sides."""
     low, high = limits["expected_low"], limits["expected_high"]
     return bool(low and high) and float(low) <= float(value) <= float(high)
 

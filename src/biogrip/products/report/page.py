@@ -21,6 +21,7 @@ from biogrip.files import atomic_write
 from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
+from biogrip.products.files.rows import read_table
 from biogrip.products.files.traces import MEASUREMENTS
 from biogrip.products.files.verdicts import PATH as VERDICTS
 from biogrip.products.files.verdicts import read_verdicts
@@ -30,7 +31,6 @@ from biogrip.products.product import Product, Reads, Weight, of_cases
 from biogrip.products.report.answers import (
     compare_with_paper,
     compared_rows,
-    read_table,
     say_what_traces_tell,
     say_which_method_finds_it,
 )

@@ -222,7 +222,7 @@ class _Cell:
                 yield (*head, quantity.label, *numbers, missed, pressed)
 
     def _pressed(self, experiment: Experiment) -> bool:
-        """Return whether the jaws press the cell throughout an experiment."""
+        """Return True if the jaws press the cell throughout an experiment."""
         inputs = replace(self._planned.inputs, parameters=np.exp(self._truth)[None])
         return presses(inputs, experiment[0])
 

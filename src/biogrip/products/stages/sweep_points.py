@@ -133,7 +133,7 @@ def _judged(
 
 
 def in_basin(values: Array, truth: float, bound: float) -> BoolArray:
-    """Return whether identified values lie in the basin of the truth, (n_seeds,).
+    """Return True where identified values lie in the basin of the truth, (n_seeds,).
 
     The basin reaches to a factor of two or, where the noise allows no more, to four times the
     bound of the logarithm. Without noise the bound is NaN and the factor holds.
@@ -154,7 +154,7 @@ def _median(values: Array) -> float:
 
 
 def _succeeded(sweep: SweepContent, point: Case, time_s: Array, found: pd.DataFrame) -> np.ndarray:
-    """Return whether each seed is near the noise, (n_seeds,).
+    """Return True for each seed near the noise, (n_seeds,).
 
     Without noise, the misfit of the true values rounded to the genes' two digits takes its
     place.

@@ -74,7 +74,7 @@ def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tu
 
 
 def _as_close(truth: Truth, found: pd.DataFrame) -> BoolArray | None:
-    """Return whether each seed is as close to the truth as the paper in compared parameters."""
+    """Return True for each seed as close to the truth as the paper in compared parameters."""
     published = truth.published.identified
     columns = {p.name: p.column for p in SINGLE_BRANCH}
     names = [name for name in _ALL if name in published and truth.parameters.get(name)]

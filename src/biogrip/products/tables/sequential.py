@@ -68,7 +68,7 @@ def half_widths(found: pd.DataFrame) -> "pd.Series[float]":
 
 
 def known_well(found: pd.DataFrame) -> BoolArray:
-    """Return whether each row's interval is narrow enough to count as determined."""
+    """Return True for each row whose interval is narrow enough to count as determined."""
     return (half_widths(found) <= WELL).to_numpy()
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from biogrip.identifiability.verdicts import DETERMINED
 from biogrip.products.files.verdicts import PATH, read_verdicts
 from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.stages.expected import VERDICTS_EXPECTED
@@ -45,7 +46,7 @@ def verdicts(case: Case, measured: Path, expected: list[Path]) -> Table:
                 target_of(name, case.parameters),
                 found["fit"],
                 item["verdict"],
-                item["value"] if item["verdict"] == "determined" else None,
+                item["value"] if item["verdict"] == DETERMINED else None,
                 item["low"],
                 item["high"],
                 " and ".join(f"{start:.3g} to {end:.3g}" for start, end in item["excluded"]),
