@@ -144,7 +144,7 @@ def test_bad_traces_are_left_out_and_told(
     assert "treated_0_O.csv', allowed is a file that exists. Did you mean" in said
     found = json.loads((tmp_path / "d" / "groups.compared.json").read_text())
     assert [cell["cell"] for cell in found["cells"]] == ["control 0"]
-    assert "copy.csv: found the same rotations as in " in said
+    assert "copy.csv: found the same readings as in " in said
     left_out = [Path(each["trace"]).name for each in found["skipped"]]
     assert left_out == ["bad.csv", "treated_0_O.csv", "copy.csv"]
     assert found["differences"] == []

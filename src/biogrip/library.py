@@ -4,6 +4,7 @@ The commands and the workflow use the same functions.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,9 @@ from biogrip.identify.answer import Identification, silent
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
-from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Arm, Gripper
+from biogrip.instrument.instrument import Instrument
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.simulation import simulated_rotation
 
 if TYPE_CHECKING:
@@ -35,7 +38,7 @@ _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 
 
 def set_up(
-    gripper: Gripper,
+    gripper: Gripper | Instrument,
     protocol: tuple[Phase, ...],
     sample: Sample,
     *,
@@ -43,12 +46,15 @@ def set_up(
     fixed: Mapping[str, float] | None = None,
     nonlinear: bool = False,
 ) -> CaseProblem:
-    """Return an experiment: gripper, protocol and sample model, with search ranges.
+    """Return an experiment: instrument, protocol and sample model, with search ranges.
 
     Parameters
     ----------
-    gripper, protocol
-        Gripper, and phases of the torque.
+    gripper
+        Gripper, or one of `INSTRUMENTS`: ``INSTRUMENTS["strain"]`` is creep whose strain is read,
+        ``INSTRUMENTS["modulus"]`` relaxation whose modulus is.
+    protocol
+        Phases of the torque, or of what else is held.
     sample
         Constitutive model of the sample.
     ranges
@@ -58,18 +64,20 @@ def set_up(
     nonlinear
         If true, use the nonlinear equations.
     """
+    instrument = gripper if isinstance(gripper, Instrument) else GRIPPER
     return CaseProblem(
-        gripper,
+        NO_ARMS if isinstance(gripper, Instrument) else gripper,
         protocol,
         ranges or _RANGES,
-        sample,
+        replace(sample, per_area=instrument.per_area),
         dict(fixed or {}),
+        instrument,
         nonlinear=nonlinear,
     )
 
 
 def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: Array) -> Array:
-    """Simulate the closing rotation of the left arm without noise.
+    """Simulate what the instrument reads without noise: of a gripper, the left arm's rotation.
 
     Parameters
     ----------
@@ -83,7 +91,7 @@ def simulate(experiment: CaseProblem, parameters: Mapping[str, float], time_s: A
     Returns
     -------
     (n_samples,)
-        Rotation in rad.
+        In SI units; of a rotation, rad.
     """
     rotation: Array = simulated_rotation(
         experiment.gripper,
@@ -153,6 +161,7 @@ def plot(
 
 
 __all__ = [
+    "INSTRUMENTS",
     "Arm",
     "CaseProblem",
     "Diagnosis",

@@ -33,10 +33,11 @@ from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
+from biogrip.own_traces.assumed import gripper_in_limits
 from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
-from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
-from biogrip.own_traces.words import fixed_in_words
+from biogrip.own_traces.words import fixed_in_words, in_unit
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
@@ -196,6 +197,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
     findings = findings_of_groups(kept, names, confidence)
     certain = [cell for cell in kept if status[cell.name] == OK]
     without = findings_of_groups(certain, names, confidence) if certain else []
+    read = case_problem.instrument.read
     found = {
         WRITTEN_BY: __version__,
         "table": str(options.trace),
@@ -203,7 +205,8 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         "model_title": case_problem.model.title,
         "confidence": confidence,
         **fixed_data(case_problem),
-        "limits": _LIMITS,
+        "reads": {"quantity": read.name, "unit": read.unit},
+        "limits": _LIMITS if case_problem.instrument.has_jaws else gripper_in_limits(case_problem),
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
@@ -214,7 +217,8 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         ],
         "skipped": traces.skipped,
     }
-    write_text(output, json.dumps(rounded_numbers(found), indent=1) + "\n")
+    written = in_own_units(rounded_numbers(found), read)
+    write_text(output, json.dumps(written, indent=1) + "\n")
     return found
 
 
@@ -223,7 +227,7 @@ def in_words(found: dict[str, Any]) -> str:
     percent = f"{100 * found['confidence']:g} %"
     parts = [f"{visible(found['table'])}: {found['model_title']}, {percent} limits"]
     parts += [found["limits"], *fixed_in_words(found)]
-    parts += [_cell_in_words(cell) for cell in found["cells"]]
+    parts += [_cell_in_words(cell, found) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
     parts += _left_out_in_words(found["groups"])
     if found["rejected"]:
@@ -294,7 +298,7 @@ class _Traces:
         same = sha256(rotation_rad.tobytes()).digest()
         if (before := self._read.setdefault(same, trace)) != trace:
             raise BiogripError(
-                f"{visible(trace)}: found the same rotations as in {visible(before)}, "
+                f"{visible(trace)}: found the same readings as in {visible(before)}, "
                 "allowed is each trace once."
             )
         case_problem = case.problem.weighted(recorded.sd_rad)
@@ -410,11 +414,11 @@ def _difference_data(each: GroupDifference) -> dict[str, Any]:
     }
 
 
-def _cell_in_words(cell: dict[str, Any]) -> str:
+def _cell_in_words(cell: dict[str, Any], found: dict[str, Any]) -> str:
     width = max(len(item["quantity"]) for item in cell["quantities"])
     lines = [f"{cell['cell']} ({cell['group']}): fit {cell['fit']}"]
     lines += [
-        f"  {Path(trace['file']).name}: noise {trace['noise_rad']:.3g} rad"
+        f"  {Path(trace['file']).name}: noise {in_unit(trace['noise_rad'], found)}"
         for trace in cell["traces"]
     ]
     lines += [f"  {item['quantity']:<{width}}  {item['in_words']}" for item in cell["quantities"]]

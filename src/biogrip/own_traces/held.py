@@ -32,7 +32,7 @@ def with_instrument(
     Raises
     ------
     BiogripError
-        If nothing says what is held, or the trace cannot be read.
+        If nothing says what is held.
     """
     instrument = _instrument(merged, given)
     measurement = {instrument.read.name: instrument.read.column} | merged["measurement"]
@@ -50,10 +50,18 @@ def with_instrument(
                 "or a protocol in --config."
             )
         level = 1.0
-    time_s = read_recording(trace, read_as.columns(instrument.read)).time_s
-    end_s = float(time_s[-1]) - (read_as.start_s or min(float(time_s[0]), 0.0))
-    phase = {"duration_s": end_s, instrument.held.column: level}
+    phase = {"duration_s": _duration_s(trace, read_as, instrument), instrument.held.column: level}
     return {**found, "protocol": {"phases": [phase]}}
+
+
+def _duration_s(trace: Path, read_as: ReadAs, instrument: Instrument) -> float:
+    """Return the time from the start of the protocol to the end of a trace."""
+    try:
+        time_s = read_recording(trace, read_as.columns(instrument.read)).time_s
+    except BiogripError:
+        # Whoever needs the trace reads it again, and says what is wrong with it.
+        return 1.0
+    return float(time_s[-1]) - (read_as.start_s or min(float(time_s[0]), 0.0))
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

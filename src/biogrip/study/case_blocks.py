@@ -277,7 +277,7 @@ class CaseBlock(Shared):
         ):
             if value != "linear":
                 yield ("models", key), f"found {value}, allowed with {self.instrument} is linear."
-        for key in ("contact", "assumed_gripper"):
+        for key in ("contact", "assumed_gripper", "design"):
             if getattr(self, key) is not None:
                 yield (key,), f"is of the gripper; leave it out with {self.instrument}."
         if self.sample.size_m is not None:

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 
+from biogrip.digits import with_unit
 from biogrip.identifiability.verdicts import DETERMINED
 
 Row = Mapping[str, str]
@@ -111,7 +112,7 @@ def compared_rows(errors: Iterable[Row], verdicts: Iterable[Row]) -> list[dict[s
     return [
         {
             "case": row["case"].replace("_", " "),
-            "parameter": f"{row['parameter']} ({row['unit']})",
+            "parameter": with_unit(row["parameter"], row["unit"]),
             "target": _number(row["target"], 4),
             "paper": _with_error(row["paper_identified"], row["paper_error_percent"], 4),
             "this study: typical seed": _with_error(
