@@ -105,6 +105,12 @@ class SampleModel:
         return tuple(parameter.name for parameter in self.parameters)
 
     @property
+    def stiffness_unit(self) -> str:
+        """Unit of the stiffnesses of its elements."""
+        per_area = any(parameter.per_area for parameter in self.parameters)
+        return (_UNITS_PER_AREA if per_area else _UNITS)["stiffness"]
+
+    @property
     def power_law(self) -> bool:
         """True if it has a springpot, which stands for branches of all relaxation times."""
         return any(parameter.kind == "springpot" for parameter in self.parameters)

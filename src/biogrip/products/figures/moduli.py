@@ -61,7 +61,10 @@ def draw(study: Study, identifications: list[Path], targets: list[Path]) -> Figu
         _sensitivities(axes[1, column], case.problem.searched, time_s, relative)
         panel(axes[0, column], "abc"[column], case.truth.title, _TITLE_LETTERS)
         panel(axes[1, column], "def"[column], "when each parameter shows", _TITLE_LETTERS)
-    axes[0, 0].set_ylabel("modulus (N/m)")
+    units = [case.problem.model.stiffness_unit for case in study.cases.values()]
+    for column, unit in enumerate(units):
+        if column == 0 or unit != units[column - 1]:
+            axes[0, column].set_ylabel(f"modulus ({unit})")
     axes[1, 0].set_ylabel("sensitivity / noise")
     handles, labels = axes[0, 0].get_legend_handles_labels()
     drawn.legend(handles, labels, loc="outside upper center", ncols=len(labels))
@@ -123,7 +126,7 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
 
 
 def _modulus(network: Network, omega: Array) -> Array:
-    """Return complex stiffnesses of n samples in N/m at s = i omega, (n, n_omega)."""
+    """Return complex stiffnesses of n samples, in N/m or Pa, at s = i omega, (n, n_omega)."""
     s = 1j * omega
     rates = (network.k / network.c)[:, :, None]
     branches = np.sum(network.k[:, :, None] * s / (s + rates), axis=1)
@@ -141,7 +144,7 @@ MODULI = drawing(
     caption="Upper row: storage modulus G' (solid) and loss modulus G'' (dashed) of the true "
     "sample, and of all fits to its traces; shaded is the band in which nine tenths of the fits "
     f"near the noise agree on the modulus to {NEAR:.0%}, whatever their parameters. Lower row: how "
-    "much the rotation changes with the logarithm of each parameter, in standard deviations of one "
+    "much the trace changes with the logarithm of each parameter, in standard deviations of one "
     "measured value's noise; within the shaded band a single value does not show it.",
     uses=from_study(
         "shown_method fitting_method near_noise_tolerance",
