@@ -93,7 +93,14 @@ def test_a_wrong_set_up_determines_nothing(tmp_path: Path, wrong: str, noise_mod
     assert data["trades"] == []
     with table.open(newline="") as rows:
         assert [row["fit"] for row in csv.DictReader(rows)] == [REJECTED]
-    assert command("identify", trace, "--force", *options)[0] == 0
+
+
+def test_only_strict_makes_a_rejected_fit_a_failure(tmp_path: Path) -> None:
+    (tmp_path / "few.yaml").write_text(FEW)
+    trace = written(tmp_path / "t.csv", WRONG["jump"], 0)
+    status, said = command("identify", trace, "--config", tmp_path / "few.yaml")
+    assert f"{trace}: fit rejected" in said.splitlines()
+    assert status == 0
 
 
 @pytest.mark.parametrize("noise_model", ["white", "coloured"])

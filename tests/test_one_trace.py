@@ -537,7 +537,7 @@ def test_how_a_file_was_read_is_enough_to_repeat_it(
     tmp_path: Path, few: str, options: tuple[str, ...], noise: str
 ) -> None:
     """All assumed blocks as a config do what the options did, and options replace its keys."""
-    times, rotation = clean("endothelial_cell", 0.5)
+    times, rotation = clean("liquid_drop_2", 0.5)
     size = 0.02 * rotation.max()
     measured = rotation + size * np.random.default_rng(1).standard_normal(len(times))
     rows = zip(times + 5, measured / -2e-3, np.full(len(times), size / 2e-3), strict=True)

@@ -1,7 +1,9 @@
 """Traces that start before their torque: given onsets, fitted ones, and what is said without."""
 
 import json
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,17 @@ def identified(folder: Path, times: Array, values: Array, *options: str) -> dict
     assert main(["identify", str(trace), *given, *options]) == 0
     found: dict[str, Any] = json.loads(output.read_text())
     return found
+
+
+@pytest.fixture(scope="module")
+def started(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], str]]:
+    """What is written and said of one trace with its onset given and fitted."""
+    answers = {}
+    for start in (f"{ONSET_S}", "fit"):
+        with redirect_stdout(StringIO()) as said:
+            found = identified(tmp_path_factory.mktemp("late"), *late(2), "--start", start)
+        answers[start] = found, said.getvalue()
+    return answers
 
 
 def holding(found: dict[str, Any]) -> list[str]:
@@ -174,15 +187,15 @@ def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
 
 @pytest.mark.parametrize("start", [f"{ONSET_S}", "fit"])
 def test_limits_hold_the_truth_from_the_onset_on(
-    tmp_path: Path, start: str, capsys: pytest.CaptureFixture[str]
+    started: dict[str, tuple[dict[str, Any], str]], start: str
 ) -> None:
-    found = identified(tmp_path, *late(2), "--start", start)
+    found, said = started[start]
     assert found["fit"] == "ok"
     assert len(holding(found)) == 5
     assert found["samples"] == 301
     if start == "fit":
         assert found["onset_s"] == pytest.approx(ONSET_S, abs=0.1)
-        assert "The protocol starts at 8.0" in capsys.readouterr().out
+        assert "The protocol starts at 8.0" in said
     else:
         assert found["assumed"]["measurement"]["start_s"] == ONSET_S
 
@@ -196,13 +209,10 @@ def test_padding_before_the_onset_is_no_measurement(tmp_path: Path) -> None:
     assert found["fit"] == "ok"
 
 
-def test_a_fitted_onset_widens_limits(tmp_path: Path) -> None:
-    times, values = late(2)
+def test_a_fitted_onset_widens_limits(started: dict[str, tuple[dict[str, Any], str]]) -> None:
     given, fitted = (
         {q["quantity"]: q["high"] - (q["low"] or 0) for q in found["quantities"]}
-        for found in (
-            identified(tmp_path, times, values, "--start", start) for start in (f"{ONSET_S}", "fit")
-        )
+        for found, _ in started.values()
     )
     assert fitted["c_p"] > 1.05 * given["c_p"]
     assert all(fitted[name] > 0.99 * width for name, width in given.items())

@@ -51,7 +51,8 @@ LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
-# A trace fitted from few starts, and with few models; where it is asked for, a short posterior.
+# A trace fitted from few starts, with few models, of which the chosen one has two parameters unless
+# the document says which; where it is asked for, a short posterior.
 TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
@@ -127,7 +128,8 @@ def _typed(arguments: list[str]) -> list[str]:
         return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
     if arguments[0] == "identify" and "--config" not in arguments:
         config = "short.yaml" if "--posterior" in arguments else "tiny_fit.yaml"
-        return [*arguments, "--config", config]
+        model = [] if "--model" in arguments else ["--model", "maxwell"]
+        return [*arguments, *model, "--config", config]
     return arguments
 
 
