@@ -96,7 +96,7 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
     noise = NOISE_RAD * np.random.default_rng(draw).standard_normal(len(time_s))
     trace = library.simulate(made_by, {"k_p": 11.6, "c_p": 0.0125}, time_s) + noise
     chi2 = []
-    for seed in range(6):
+    for seed in range(3):
         found = library.identify_sample(fitted, time_s, trace, seed=seed)
         parameters = dict(zip(fitted.searched.names, found.parameters.tolist(), strict=True))
         residual = library.simulate(fitted, parameters, time_s) - trace
@@ -111,7 +111,7 @@ def test_parameters_are_those_of_the_misfit_told(draw: int) -> None:
 @pytest.mark.parametrize("name", MODELS_SETTLED)
 def test_settling_never_makes_a_fit_worse(name: str) -> None:
     """And the misfit told is that of the parameters told."""
-    for case_problem, _ in noisy(MODELS_SETTLED[name], 12):
+    for case_problem, _ in noisy(MODELS_SETTLED[name], 6):
         fits, found, trace = found_in(case_problem)
         best = refine_optima(fits, found, trace)
         for x, ahead, told in zip(found.x, best.x, best.misfit_rad, strict=True):
@@ -136,7 +136,7 @@ def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.Monk
         return np.full(x.shape, 0.5)
 
     model = MODELS_SETTLED[name]
-    for case_problem, _ in noisy(model, 6):
+    for case_problem, _ in noisy(model, 4):
         fits, found, trace = found_in(case_problem)
         monkeypatch.setattr(newton_refinement, "minimize", approached)
         monkeypatch.setattr(newton_refinement, "_newton_step", leap)

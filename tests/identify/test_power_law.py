@@ -46,17 +46,19 @@ def response(model: SampleModel, sample: list[float]) -> Array:
         (MODELS["springpots_in_parallel"], [60.0, 0.8, 5.0, 0.2], 0.01),
     ],
 )
-def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], level: float) -> None:
-    """40 seeds, 95 %: fewer than 33 hold it once in 3000 times."""
-    problems = case_problem(TIMES, response(model, truth), 40, model, level=level)
-    found = identified(problems, list(range(40)), FEW)
+def test_intervals_hold_the_exponent(
+    model: SampleModel, truth: list[float], level: float
+) -> None:
+    """20 seeds, 95 %: fewer than 15 hold it once in 3000 times."""
+    problems = case_problem(TIMES, response(model, truth), 20, model, level=level)
+    found = identified(problems, list(range(20)), FEW)
     likelihoods = [
         make_likelihood(problem, np.log(one.parameters), one.misfit_rad, confidence=0.95)
         for problem, one in zip(problems, found, strict=True)
     ]
     limits, _ = find_limits(likelihoods, parameters_and_sum(model))
     held = (limits[..., 0] <= np.log(truth)) & (np.log(truth) <= limits[..., 1])
-    assert np.all(held.sum(axis=0) >= 33)
+    assert np.all(held.sum(axis=0) >= 15)
     # And are of use: the exponent's are a fifth of it wide, or less.
     index = model.names.index("alpha")
     assert np.median(limits[:, index, 1] - limits[:, index, 0]) < 0.2

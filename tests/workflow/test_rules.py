@@ -1,10 +1,10 @@
 """Rules as Snakemake's own commands show them."""
 
 import csv
+import os
 import re
-import subprocess
-import sys
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any
 
 import pytest
@@ -14,6 +14,7 @@ from snakemake.settings.types import OutputSettings, Quietness, ResourceSettings
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.rules import ProductRule, inputs_of, make_rules
+from tests.helpers import loaded
 from tests.helpers.default import study_of
 from tests.helpers.places import ROOT
 from tests.helpers.runs import TINY, snakemake
@@ -31,10 +32,17 @@ STAGES = [
 
 def shown(folder: Path, *arguments: str) -> str:
     """What Snakemake says of the default study, without being told of processors."""
-    command = [sys.executable, "-m", "snakemake", "--directory", str(folder), *arguments]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
-    assert done.returncode == 0, done.stderr
-    return done.stdout + done.stderr
+    status, said = called(folder, *arguments)
+    assert status == 0, said
+    return said
+
+
+def called(folder: Path, *arguments: str) -> tuple[int, str]:
+    given = ["--directory", str(folder), *arguments]
+    with TemporaryFile("w+") as said:
+        status = loaded.call("snakemake", given, ROOT, os.environ, (said, said))
+        said.seek(0)
+        return status, said.read()
 
 
 @pytest.mark.parametrize("graph", ["--dag", "--rulegraph"])
@@ -61,9 +69,8 @@ def test_a_table_of_errors_plans_only_what_it_needs(tmp_path: Path) -> None:
 
 def test_linting_wants_conda_and_nothing_else(tmp_path: Path) -> None:
     """Which nobody needs here: the environment is locked."""
-    command = [sys.executable, "-m", "snakemake", "--directory", str(tmp_path), "--lint"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
-    wanted = {line.strip() for line in done.stderr.splitlines() if line.startswith("    * ")}
+    _, said = called(tmp_path, "--lint")
+    wanted = {line.strip() for line in said.splitlines() if line.startswith("    * ")}
     assert wanted == {"* Specify a conda environment or container for each rule.:"}
 
 
