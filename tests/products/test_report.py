@@ -16,6 +16,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
+from biogrip.products.catalogue import products
 from biogrip.products.files.rows import read_table
 from biogrip.products.files.traces import read_measurements
 from biogrip.products.files.verdicts import read_verdicts
@@ -24,8 +25,10 @@ from biogrip.products.report.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
+from biogrip.products.source_files import fingerprint
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
+from biogrip.running.manifest import Manifest
 from tests.helpers.browser import chromium, executable
 from tests.helpers.places import ROOT
 from tests.helpers.required import cannot_run
@@ -116,6 +119,20 @@ def test_the_page_says_how_to_cite_it_as_the_citation_file_does(opened: Opened) 
     assert f"{', '.join(names)}: {paper['title']}." in said
     assert f"{author['name']}: {citation['title']}, version {citation['version']}. " in said
     assert f"{citation['abstract']}. Software, {citation['license']} licence." in said
+
+
+def test_the_page_names_the_documentation_and_the_record(report: Path) -> None:
+    said = report.read_text("utf-8").partition('<h2 id="provenance">')[2].partition("<details>")[0]
+    named = re.findall(r"<code>([\w/]+\.(?:md|jsonl))</code>", said)
+    documents = [name for name in named if name.endswith(".md")]
+    assert documents[-1] == "CONTRIBUTING.md"
+    assert [name for name in documents if not (ROOT / name).is_file()] == []
+    assert "results/manifest.jsonl" in named
+
+
+def test_the_manifest_has_the_code_that_the_page_was_made_by(tiny: Path) -> None:
+    code = fingerprint(products()["report"].module)
+    assert Manifest(tiny / "results").last("report.html").settings.endswith(f"-{code}")
 
 
 def test_it_is_legible_on_a_phone(browser: Any, report: Path) -> None:
