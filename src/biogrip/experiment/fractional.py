@@ -147,10 +147,10 @@ def fractional_zener(parameters: ArrayLike) -> Network:
 
     ::
 
-              +---/\/\/-------<  >----+
-        B o---+     k    k_alpha, alpha---o C
-              +--------/\/\/----------+
-                        k_p
+              +---/\/\/-------<  >------+
+        B o---+     k    k_alpha, alpha +---o C
+              +---------/\/\/-----------+
+                         k_p
     """
     k, k_p, modulus, exponent = columns_of(parameters)
     gel = series(spring(k), ladder(modulus, exponent))
@@ -166,10 +166,10 @@ def fractional_solid(parameters: ArrayLike) -> Network:
 
     ::
 
-              +---<  >------[==]---+
-        B o---+ k_alpha, alpha c   +---o C
-              +------/\/\/---------+
-                      k_p
+              +-----<  >--------[==]----+
+        B o---+ k_alpha, alpha    c     +---o C
+              +---------/\/\/-----------+
+                         k_p
     """
     k_p, *of_liquid = columns_of(parameters)
     modulus, exponent, c = of_liquid
@@ -185,10 +185,10 @@ def fractional_jeffreys(parameters: ArrayLike) -> Network:
 
     ::
 
-              +---<  >------[==]---+
-        B o---+ k_alpha, alpha c   +---o C
-              +-------[==]---------+
-                      c_p
+              +-----<  >--------[==]----+
+        B o---+ k_alpha, alpha    c     +---o C
+              +---------[==]------------+
+                         c_p
     """
     modulus, exponent, c, c_p = columns_of(parameters)
     liquid = series(damper(c), ladder(modulus, exponent))
