@@ -46,9 +46,7 @@ def response(model: SampleModel, sample: list[float]) -> Array:
         (MODELS["springpots_in_parallel"], [60.0, 0.8, 5.0, 0.2], 0.01),
     ],
 )
-def test_intervals_hold_the_exponent(
-    model: SampleModel, truth: list[float], level: float
-) -> None:
+def test_intervals_hold_the_exponent(model: SampleModel, truth: list[float], level: float) -> None:
     """20 seeds, 95 %: fewer than 15 hold it once in 3000 times."""
     problems = case_problem(TIMES, response(model, truth), 20, model, level=level)
     found = identified(problems, list(range(20)), FEW)
