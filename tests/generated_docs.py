@@ -17,6 +17,7 @@ import pandas as pd
 
 import biogrip.products.files
 from biogrip.cli import main
+from biogrip.digits import with_unit
 from biogrip.groups.power import cells_needed
 from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
@@ -36,6 +37,7 @@ DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 RANKS = DISHES.with_name("ranks.csv")
 SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
+MEASURED = PUBLISHED / "measured"
 SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
 CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
@@ -56,6 +58,13 @@ _WAYS = {
     "each designed after those before": "the paper's, then each designed after those before",
     "designed for the ranges, repeated": "one designed for all these cells, repeated",
     "designed for the true cell, repeated": "one designed for the true cell, repeated",
+}
+# Of the independent fit of HL60's stretch, and of pyRheo's demonstrations.
+_MEASURED = {
+    "hl60": {"alpha": 0.701},
+    "mucus": {"k_alpha": 0.5593, "alpha": 0.1056, "c_p": 0.3113},
+    "fish_muscle": {"k_alpha": 869957.81, "alpha": 0.67438, "k_beta": 22074.487, "beta": 0.11006},
+    "cellulose_hydrogel": {"k_p": 73.72, "k_alpha": 175.07, "alpha": 0.8148},
 }
 _RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
@@ -79,6 +88,41 @@ def answer() -> str:
     sentence = say_what_traces_tell(_verdicts(), " of the paper's experiment")
     told, _, where = sentence.partition(": ")
     return f"**{told}**: {where}"
+
+
+def measured() -> str:
+    """Published values of measured traces beside ours."""
+    rows = []
+    for sample, published in _MEASURED.items():
+        found = {
+            row["quantity"]: row
+            for row in read_table(MEASURED / "tables" / f"verdicts_{sample}.csv")
+        }
+        best = min(
+            (row for row in read_table(MEASURED / "tables" / "models.csv") if row["case"] == sample),
+            key=lambda row: float(row["median_delta_bic"]),
+        )
+        for quantity, value in published.items():
+            own = found[quantity]
+            rows.append(
+                {
+                    "sample": sample.replace("_", " "),
+                    "fit": own["fit"],
+                    "quantity": with_unit(quantity, own["unit"]),
+                    "published": f"{value:.5g}",
+                    "ours, 95 % limits": _limits_of(own),
+                    "lowest BIC": best["model"],
+                }
+            )
+    return _table(iter(rows))
+
+
+def _limits_of(row: dict[str, str]) -> str:
+    if row["verdict"] == "determined":
+        return f"{float(row['value']):.4g} ({float(row['low']):.4g} to {float(row['high']):.4g})"
+    if row["verdict"] == "bounded above":
+        return f"at most {float(row['high']):.3g}"
+    return row["verdict"]
 
 
 def _percent(text: str) -> str:
@@ -365,6 +409,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
         "status": simulated_statuses,
         "methods": methods_compared,
     },
+    ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
     ROOT / "docs" / "groups.md": {
         "cells": cells_needed_table,
