@@ -99,7 +99,11 @@ def measured() -> str:
             for row in read_table(MEASURED / "tables" / f"verdicts_{sample}.csv")
         }
         best = min(
-            (row for row in read_table(MEASURED / "tables" / "models.csv") if row["case"] == sample),
+            (
+                row
+                for row in read_table(MEASURED / "tables" / "models.csv")
+                if row["case"] == sample
+            ),
             key=lambda row: float(row["median_delta_bic"]),
         )
         for quantity, value in published.items():

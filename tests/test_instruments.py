@@ -29,7 +29,7 @@ OF_A_GRIPPER = re.compile(
     r"\b(jaws?|torques?|rotations?|gripper|arms?|rad)\b|_rad\b", re.IGNORECASE
 )
 # What is held, SI units, by what is read.
-HELD = {
+CONTROLLED = {
     "displacement": 3e-9,
     "strain": 5.0,
     "compliance": 1.0,
@@ -69,11 +69,11 @@ def by_name(found: dict[str, Any]) -> dict[str, dict[str, Any]]:
     return {item["quantity"]: item for item in found["quantities"]}
 
 
-@pytest.mark.parametrize("reading", HELD)
+@pytest.mark.parametrize("reading", CONTROLLED)
 def test_every_reading_is_identified_in_its_own_units_and_words(
     tmp_path: Path, reading: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    instrument, held = INSTRUMENTS[reading], HELD[reading]
+    instrument, held = INSTRUMENTS[reading], CONTROLLED[reading]
     column = instrument.read.column
     trace = written(tmp_path / "trace.csv", column, noisy(response(reading, held)))
     page = tmp_path / "page.html"

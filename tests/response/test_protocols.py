@@ -39,7 +39,7 @@ PROTOCOL = ProtocolBlock(
         PhaseBlock(15.0, torque_Nm=0.5e-9),
     )
 )
-TORQUE = torque_history(PROTOCOL.held(GRIPPER, TABLE_2))
+TORQUE = torque_history(PROTOCOL.make_phases(GRIPPER, TABLE_2))
 PER_SQUARE_VOLT = float(torque_of_voltage(TABLE_2, 1.0))
 EDGES = np.array([0.0, 20.0, 50.0, 60.0, 75.0, 90.0])
 

@@ -38,6 +38,7 @@ class JointResiduals(Residuals):
         self.samples = sum(part.samples for part in parts)
         self.duration_s = max(part.duration_s for part in parts)
         self.model, self.nonlinear = parts[0].model, parts[0].nonlinear
+        self.instrument = parts[0].instrument
         whole = compute_common_noise([part.samples for part in parts], noise_rad)
         self.weights = np.array([whole / own for own in noise_rad])
         peaks = (w * part.peak_rad for w, part in zip(self.weights, parts, strict=True))

@@ -136,8 +136,8 @@ def _fitted_along(case_problem: CaseProblem, time_s: Array) -> str:
     terms = ["an offset"] * case_problem.offset + ["a drift"] * case_problem.drift
     if not terms:
         return ""
-    held = case_problem.instrument.held.name
-    or_flow = f" (or the sample flows: under this {held} both give the same line)"
+    controlled = case_problem.instrument.controlled.name
+    or_flow = f" (or the sample flows: under this {controlled} both give the same line)"
     doubt = or_flow if case_problem.drift and drift_is_flow(case_problem.torque, time_s) else ""
     verb = "are" if len(terms) > 1 else "is"
     return f" {' and '.join(terms)} of the instrument{doubt} {verb} fitted along, and"

@@ -41,7 +41,7 @@ class Instrument:
 
     kind: str
     """`gripper`, `creep` or `relaxation`."""
-    held: Quantity
+    controlled: Quantity
     """What the protocol holds."""
     read: Quantity
     """What a trace is of."""

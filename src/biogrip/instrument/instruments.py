@@ -13,5 +13,5 @@ INSTRUMENTS: dict[str, Instrument] = {
 KINDS = tuple(dict.fromkeys(instrument.kind for instrument in INSTRUMENTS.values()))
 """Values of the config key `instrument`."""
 
-HELD = tuple(dict.fromkeys(instrument.held for instrument in INSTRUMENTS.values()))
+CONTROLLED = tuple(dict.fromkeys(instrument.controlled for instrument in INSTRUMENTS.values()))
 """Quantities that protocols hold."""

@@ -44,8 +44,8 @@ def _block(case: Case, name: str) -> Any:
 def gripper_in_limits(case_problem: CaseProblem) -> str:
     """Return a sentence on the part that the gripper's uncertainty has in the limits."""
     if not case_problem.instrument.has_jaws:
-        held = case_problem.instrument.held.name
-        return f"Limits are statistical only: the {held} is taken as exact."
+        controlled = case_problem.instrument.controlled.name
+        return f"Limits are statistical only: the {controlled} is taken as exact."
     if not case_problem.uncertain_keys:
         return "Limits are statistical only: the gripper is taken as exact."
     keys = ", ".join(key.removesuffix(".share") for key in case_problem.uncertain_keys)

@@ -29,7 +29,7 @@ from biogrip.own_traces.assumed import (
     versions,
 )
 from biogrip.own_traces.fitted_models import judge_again, models_tried
-from biogrip.own_traces.held import with_instrument
+from biogrip.own_traces.instrument_of_trace import with_instrument
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
 from biogrip.own_traces.second_opinion import second_opinion

@@ -86,9 +86,9 @@ def second_opinion(
         "explain the trace far better "
         f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
     )
-    held = case_problem.instrument.held.name
+    controlled = case_problem.instrument.controlled.name
     or_flows = (
-        f" Or the sample flows: as long as the {held} is constant, a drift and a damper without a "
+        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper without a "
         "spring give the same line."
     )
     if case_problem.instrument.deforms:
@@ -96,8 +96,8 @@ def second_opinion(
     if not case_problem.drift and drift_is_flow(case_problem.torque, recorded.time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
-            f"sample flows. Under this {held} both give the same line, and the trace cannot tell "
-            f"which it is: a {held} that changes would."
+            f"sample flows. Under this {controlled} both give the same line, and the trace cannot tell "
+            f"which it is: a {controlled} that changes would."
         )
     else:
         text = (

@@ -13,10 +13,10 @@ from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
-from biogrip.response.held_modes import compute_held_modes
 from biogrip.response.linear import LEFT
 from biogrip.response.noise_estimate import estimate_noise, measure_rounding
 from biogrip.response.nuisance import taken_out
+from biogrip.response.protocol_modes import compute_protocol_modes
 from biogrip.response.sensitivity import (
     corrections,
     differences,
@@ -243,7 +243,7 @@ class Residuals:
                 gripper, model, torque, time_s, parameters, inertia=inertia, slopes=slopes
             )
             return condensed.rows(rotations)
-        modes = compute_held_modes(gripper, model, torque, parameters, slopes=slopes)
+        modes = compute_protocol_modes(gripper, model, torque, parameters, slopes=slopes)
         return condensed.of_modes(modes)
 
     def condensed_corrections(self, log_parameters: Array, *, slopes: bool = True) -> Array:

@@ -12,9 +12,9 @@ from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.instrument.gripper import Gripper
-from biogrip.response.held_modes import compute_held_modes
 from biogrip.response.inertia import ring, while_ringing
 from biogrip.response.nonlinear import COARSE, Correction, correction
+from biogrip.response.protocol_modes import compute_protocol_modes
 from biogrip.response.ringing import compute_responses, ringing_responses
 
 # The correction is of second order; differences give its derivative to 1e-6 of that.
@@ -43,7 +43,7 @@ def linear_responses(
     """
     if inertia and not model.power_law:
         return ringing_responses(gripper, model, torque, time_s, parameters, slopes=slopes)
-    modes = compute_held_modes(gripper, model, torque, parameters, slopes=slopes)
+    modes = compute_protocol_modes(gripper, model, torque, parameters, slopes=slopes)
     rows = np.empty((len(parameters), 1 + modes.rate_slopes.shape[1], len(time_s)))
     for some in parts(len(time_s), _AT_ONCE):
         rows[:, :, some] = compute_responses(modes, torque, time_s[some])

@@ -5,9 +5,9 @@ from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import Network
 from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.linkage import displacement_of_tip
-from biogrip.response.held_modes import relaxation
 from biogrip.response.linear import LEFT, RIGHT, rotation, step_response
 from biogrip.response.nonlinear import nonlinear_rotation
+from biogrip.response.protocol_modes import relaxation
 
 
 def simulated_rotation(

@@ -205,11 +205,11 @@ class CaseBlock(Shared):
         return self.measurement.file is not None
 
     @property
-    def held_by(self) -> Instrument:
+    def instrument_used(self) -> Instrument:
         """The instrument, by its kind, and by what the protocol holds and the trace is of."""
         kind = _of_kind(self.instrument)
         bases = self.protocol.phases[0].bases
-        fitting = [each for each in kind if each.held.column in bases] or kind
+        fitting = [each for each in kind if each.controlled.column in bases] or kind
         named = [each for each in fitting if each.read.name in self.measurement.readings]
         return (named or fitting)[0]
 
@@ -266,10 +266,12 @@ class CaseBlock(Shared):
             if name not in allowed:
                 text = f"is not what {self.instrument} reads; allowed is {' or '.join(allowed)}."
                 yield ("measurement", name), text
-            elif name != self.held_by.read.name:
-                text = f"is not read where {self.held_by.held.name} is held; allowed is "
-                yield ("measurement", name), f"{text}{self.held_by.read.name}."
-        if self.held_by.has_jaws:
+            elif name != self.instrument_used.read.name:
+                text = (
+                    f"is not read where {self.instrument_used.controlled.name} is held; allowed is "
+                )
+                yield ("measurement", name), f"{text}{self.instrument_used.read.name}."
+        if self.instrument_used.has_jaws:
             return
         for key, value in (
             ("target", self.models.target),
@@ -285,7 +287,7 @@ class CaseBlock(Shared):
 
     def comb_problems(self, comb: CombDrive) -> Iterator[Problem]:
         """Find a sample that does not fit between the jaws, and what is no comb drive's."""
-        if not self.held_by.has_jaws:
+        if not self.instrument_used.has_jaws:
             return
         in_volts = all(phase.voltage_V is not None for phase in self.protocol.phases)
         for path, text in self.gripper.comb_problems(comb, in_volts=in_volts):

@@ -10,13 +10,13 @@ from pydantic import Field
 from biogrip.experiment.protocol import Harmonic, Load, Phase, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
 from biogrip.instrument.instrument import Instrument
-from biogrip.instrument.instruments import HELD
+from biogrip.instrument.instruments import CONTROLLED
 from biogrip.keys import Block, Problem
 
 _LONGEST_S = 1e9
 _MOST_PERIODS = 10_000
 _VOLTAGE = "voltage_V"
-_BASES = (HELD[0].column, _VOLTAGE, *(held.column for held in HELD[1:]))
+_BASES = (CONTROLLED[0].column, _VOLTAGE, *(each.column for each in CONTROLLED[1:]))
 # What a comb drive pulls with.
 _PULLS = _BASES[:2]
 # A load or a deformation, either way.
@@ -141,7 +141,7 @@ class ProtocolBlock(Block):
         """Duration of the protocol."""
         return sum(phase.duration_s for phase in self.phases)
 
-    def held(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
+    def make_phases(self, instrument: Instrument, comb: CombDrive) -> tuple[Phase, ...]:
         """Return all phases in units of what the instrument holds.
 
         Voltages are converted to torques (eq. 9). What a relative reading is divided by is one.
@@ -166,7 +166,7 @@ class ProtocolBlock(Block):
 
     def instrument_problems(self, instruments: Sequence[Instrument]) -> Iterator[Problem]:
         """Find phases that hold what none of some instruments, of one kind, holds."""
-        columns = list(dict.fromkeys(instrument.held.column for instrument in instruments))
+        columns = list(dict.fromkeys(instrument.controlled.column for instrument in instruments))
         allowed = [*columns, _VOLTAGE] if _BASES[0] in columns else columns
         for index, phase in enumerate(self.phases):
             for base in phase.bases:
@@ -184,7 +184,7 @@ def _further(base: str) -> tuple[str, str]:
 
 
 def _unit(base: str) -> str:
-    return next((f" {held.unit}".rstrip() for held in HELD if held.column == base), " V")
+    return next((f" {each.unit}".rstrip() for each in CONTROLLED if each.column == base), " V")
 
 
 def _divided(phase: Phase, by: float) -> Phase:

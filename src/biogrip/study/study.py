@@ -53,7 +53,7 @@ class Case:
     """True if the trace was recorded, not simulated."""
     actuator = _of_case(lambda case: case.study.config.actuator)
     """Comb drive of the study."""
-    instrument = _of_case(lambda case: case.block.held_by)
+    instrument = _of_case(lambda case: case.block.instrument_used)
     """What is held and read."""
     sample = _of_case(
         lambda case: replace(case.block.sample.sample, per_area=case.instrument.per_area)
@@ -124,7 +124,7 @@ class Case:
     @cached_property
     def phases(self) -> tuple[Phase, ...]:
         """Phases of the protocol, in torques or what else the instrument holds."""
-        return self.block.protocol.held(self.instrument, self.actuator)
+        return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
     def gripper(self) -> Gripper:
@@ -346,12 +346,14 @@ class Study:
     def phases(self) -> tuple[Phase, ...]:
         """Protocol of all cases if it is the same, else of the study."""
         own = {case.phases for case in self.cases.values()}
-        return own.pop() if len(own) == 1 else self.config.protocol.held(GRIPPER, self.actuator)
+        return (
+            own.pop() if len(own) == 1 else self.config.protocol.make_phases(GRIPPER, self.actuator)
+        )
 
     @property
     def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
         """Protocol and sampling, for cases that do not change them."""
-        phases = self.config.protocol.held(GRIPPER, self.config.actuator)
+        phases = self.config.protocol.make_phases(GRIPPER, self.config.actuator)
         return phases, self.config.measurement.sampling
 
     @property

@@ -157,18 +157,18 @@ def check_recording(
         _check_turn(recording, largest, free, path, columns, None)
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
-    read, held = columns.quantity, instrument.held.name
+    read, controlled = columns.quantity, instrument.controlled.name
     if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.reading}': found no response to the "
-            f"{held}, but {trace.mean():.3g}{_unit(read)} throughout, give or take "
+            f"{controlled}, but {trace.mean():.3g}{_unit(read)} throughout, give or take "
             f"{trace.std():.2g}{_unit(read)}; allowed is a {read.name} from zero that follows the "
-            f"{held} and stands out of the noise."
+            f"{controlled} and stands out of the noise."
         )
     if _mirrored(functions, gripper, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.reading}': found a {read.name} that "
-            f"goes against the {held}, allowed is {_sign(instrument)}, or if an offset or drift of "
+            f"goes against the {controlled}, allowed is {_sign(instrument)}, or if an offset or drift of "
             "the instrument, where it has one, were declared."
         )
     if not instrument.has_jaws:

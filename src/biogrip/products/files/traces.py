@@ -22,7 +22,7 @@ SINGLE_TRACES = "results/traces/{case}/seed_{seed}.csv"
 TARGET_COLUMNS = ("time_s", "torque_Nm", "rotation_rad", "jaw_force_N")
 
 _WITHOUT_JAWS = {
-    ("time_s", each.held.column, each.read.column)
+    ("time_s", each.controlled.column, each.read.column)
     for each in INSTRUMENTS.values()
     if not each.has_jaws
 }
@@ -80,14 +80,14 @@ def write_target(
 
 
 def write_target_without_jaws(
-    path: Path, time_s: Array, held: Array, read: Array, instrument: Instrument
+    path: Path, time_s: Array, controlled: Array, read: Array, instrument: Instrument
 ) -> None:
     """Write a noise-free trace of another instrument, as `write_target` does."""
     rows = (
         (f"{t:.10g}", f"{x:.10g}", _WRITTEN.format(y))
-        for t, x, y in zip(time_s, held, read, strict=True)
+        for t, x, y in zip(time_s, controlled, read, strict=True)
     )
-    write_rows(path, ("time_s", instrument.held.column, instrument.read.column), rows)
+    write_rows(path, ("time_s", instrument.controlled.column, instrument.read.column), rows)
 
 
 def as_written(rotation_rad: Array) -> Array:

@@ -89,12 +89,12 @@ def read_checked(
     return Measurements(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps)
 
 
-def without_steps(trace: Recording, held: TorqueHistory) -> tuple[Recording, int]:
+def without_steps(trace: Recording, protocol: TorqueHistory) -> tuple[Recording, int]:
     """Leave out readings at the very instant of a step, and count them.
 
     Without inertia a sample jumps there, and nothing tells on which side a reading was taken.
     """
-    steps = [start for start, order, _ in held.jumps if order == 0]
+    steps = [start for start, order, _ in protocol.jumps if order == 0]
     kept = ~np.isin(trace.time_s, steps)
     return _part(trace, kept), int(np.count_nonzero(~kept))
 

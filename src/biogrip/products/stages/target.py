@@ -33,8 +33,8 @@ def simulate(case: Case, target: Path) -> None:
     if not case.instrument.has_jaws:
         read = simulated_rotation(case.gripper, network, torque, time_s, nonlinear=False)[0]
         _check_finite(case, time_s, read)
-        held = torque_at(torque, time_s)
-        write_target_without_jaws(target, time_s, held, read, case.instrument)
+        controlled = torque_at(torque, time_s)
+        write_target_without_jaws(target, time_s, controlled, read, case.instrument)
         return
     rotation, force = _response(case, network, torque, time_s)
     _check(case, time_s, rotation)

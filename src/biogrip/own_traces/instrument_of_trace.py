@@ -45,12 +45,15 @@ def with_instrument(
             return found
         if not instrument.relative:
             raise BiogripError(
-                f"--hold: is missing; allowed is the {instrument.held.name}"
-                f"{f' in {instrument.held.unit}' if instrument.held.unit else ''} that was held, "
+                f"--hold: is missing; allowed is the {instrument.controlled.name}"
+                f"{f' in {instrument.controlled.unit}' if instrument.controlled.unit else ''} that was held, "
                 "or a protocol in --config."
             )
         level = 1.0
-    phase = {"duration_s": _duration_s(trace, read_as, instrument), instrument.held.column: level}
+    phase = {
+        "duration_s": _duration_s(trace, read_as, instrument),
+        instrument.controlled.column: level,
+    }
     return {**found, "protocol": {"phases": [phase]}}
 
 
@@ -71,8 +74,8 @@ def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrume
             return INSTRUMENTS[name]
     kind = given.get("instrument", GRIPPER.kind)
     some = [each for each in INSTRUMENTS.values() if each.kind == kind] or [GRIPPER]
-    held = {*_keys(merged.get("protocol"))}
-    return next((each for each in some if each.held.column in held), some[0])
+    keys = {*_keys(merged.get("protocol"))}
+    return next((each for each in some if each.controlled.column in keys), some[0])
 
 
 def _keys(protocol: Any) -> Iterator[str]:

@@ -16,7 +16,7 @@ from biogrip.response.modes import COMPLEX_STEP, Modes, complex_step_network, co
 _AT_ONCE = 1e30
 
 
-def compute_held_modes(
+def compute_protocol_modes(
     gripper: Gripper,
     model: SampleModel,
     torque: TorqueHistory,
