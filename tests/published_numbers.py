@@ -87,7 +87,9 @@ def _rows(table: str, conditions: str, published: Path) -> pd.DataFrame:
 
 
 def _table(table: str, published: Path) -> pd.DataFrame:
-    files = sorted(published.rglob(f"{table}.csv"))
+    # Of tables that overlays have as well, that of the default study is meant.
+    default = published / "tables" / f"{table}.csv"
+    files = [default] if default.is_file() else sorted(published.rglob(f"{table}.csv"))
     if files:
         return pd.read_csv(files[0], dtype=str, keep_default_na=False, na_values=[""])
     sections = json.loads(BENCHMARKS.read_text(encoding="utf-8"))
