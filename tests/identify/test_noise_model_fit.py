@@ -124,16 +124,3 @@ def test_degrees_of_freedom_are_those_of_the_variances_that_come_out() -> None:
         scaled = direction / np.exp(likelihood._log_scale(x))
         freedoms.append(likelihood.freedom(noise_model, scaled, np.ones((1, 400)) / 20))
     assert 0.4 < np.median(freedoms) / (2 / np.var(logs)) < 2.5
-
-
-@pytest.mark.parametrize("decades", [2.0, 4.0])
-def test_noise_that_grows_over_decades_hides_no_small_rotation(decades: float) -> None:
-    """Correlated noise, of which there is none, is below twice that of the smallest tenth."""
-    time_s = np.geomspace(0.01, 100.0, 400)
-    rotation = np.geomspace(10.0**-decades, 1.0, len(time_s))
-    for seed in range(3):
-        residual = 0.03 * rotation * np.random.default_rng(seed).standard_normal(len(time_s))
-        found = NoiseModelLikelihood(time_s, residual, rotation[None], rotation).best()
-        size = np.sqrt(np.mean(rotation**2))
-        correlated = size * np.sqrt(found.ar1 + found.flicker)
-        assert correlated < 2 * rotation[len(time_s) // 10]

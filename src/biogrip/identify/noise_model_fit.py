@@ -163,7 +163,8 @@ class NoiseModelLikelihood:
 
 
 def _logarithms(noise_model: NoiseModel) -> Array:
-    odds = np.array([noise_model.ar1, noise_model.flicker]) / noise_model.white
+    independent = noise_model.white + noise_model.proportional
+    odds = np.array([noise_model.ar1, noise_model.flicker]) / independent
     logarithms = [np.log(odds[0]), np.log(noise_model.time_s), np.log(odds[1])]
     if noise_model.proportional:
         logarithms.append(np.log(noise_model.proportional / noise_model.white))
@@ -171,16 +172,12 @@ def _logarithms(noise_model: NoiseModel) -> Array:
 
 
 def _noise_model(x: Array) -> NoiseModel:
-    """Return the noise model of log odds and the logarithm of a time.
-
-    All odds are over white noise that is the same everywhere. Correlated noise is so, too, and
-    even a ten thousandth of noise that grows over decades would hide the smallest rotations.
-    """
+    """Return the noise model of log odds and the logarithm of a time."""
     ar1, flicker = np.exp(x[0]), np.exp(x[2])
-    growing = np.exp(x[3]) if len(x) > 3 else 0.0
-    whole = 1 + growing + ar1 + flicker
+    whole = 1 + ar1 + flicker
+    growing = 1 / (1 + np.exp(-x[3])) / whole if len(x) > 3 else 0.0
     return NoiseModel(
-        float(ar1 / whole), float(np.exp(x[1])), float(flicker / whole), float(growing / whole)
+        float(ar1 / whole), float(np.exp(x[1])), float(flicker / whole), float(growing)
     )
 
 
