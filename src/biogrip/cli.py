@@ -309,6 +309,15 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
     command.add_argument("--reading-unit", help="unit of another reading, likewise")
     command.add_argument("--skip", type=int, metavar="N", help="lines before the header [0]")
     command.add_argument(
+        "--block", type=int, metavar="N", help="table to read, where a file has several"
+    )
+    command.add_argument(
+        "--average-repeated",
+        action="store_true",
+        default=None,
+        help="average the readings of equal times",
+    )
+    command.add_argument(
         "--scale", type=float, metavar="FACTOR", help="rotation = FACTOR times the column [1]"
     )
     command.add_argument(
@@ -458,6 +467,8 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         reading_unit=options.reading_unit,
         skip=options.skip,
         scale=options.scale,
+        block=options.block,
+        average_repeated=options.average_repeated,
         start_s=None if options.start == FIT else options.start,
         fit_start=options.start == FIT or None,
         noise_rad=options.noise,

@@ -49,6 +49,12 @@ class Progress:
         self._phase = f", {visible(phase)}"
         self._say("")
 
+    def note(self, text: str) -> None:
+        """Print lines for people, unless progress is not to be printed."""
+        if QUIET not in os.environ:
+            cleared = _CLEARED if self._live else ""
+            print(f"{cleared}{visible_lines(text)}", file=sys.stderr, flush=True)
+
     def within(self, evaluations: int, misfit_rad: float) -> None:
         """Print the progress of an identification within a piece."""
         self._say(f", {evaluations} responses, misfit {misfit_rad:.4g} rad")

@@ -21,13 +21,14 @@ from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nuisance import nuisance_basis
+from biogrip.traces.columns import Columns
 from biogrip.traces.plausibility import (
     LARGEST_SHARE,
     SMALLEST_SHARE,
     check_recording,
     free_rotation,
 )
-from biogrip.traces.recordings import Columns, Recording
+from biogrip.traces.recordings import Recording
 
 FILE = Path("trace.csv")
 SI = Columns("time_s", "rotation_rad")

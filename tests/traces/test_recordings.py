@@ -7,14 +7,10 @@ import pytest
 
 from biogrip.errors import BiogripError
 from biogrip.instrument.gripper import ROTATION
-from biogrip.traces import recordings
-from biogrip.traces.recordings import (
-    TIME_UNITS,
-    Columns,
-    Recording,
-    read_recording,
-    unit_of,
-)
+from biogrip.traces import recordings, rows
+from biogrip.traces.columns import Columns
+from biogrip.traces.recordings import Recording, read_recording
+from biogrip.traces.units import TIME_UNITS, unit_of
 
 PLAIN = Columns("time_s", "rotation_rad")
 ROWS = tuple(f"{i},{i}e-6" for i in range(12))
@@ -183,7 +179,7 @@ def test_gaps_are_left_out_and_counted(tmp_path: Path, gap: str, separator: str)
 def test_lines_and_gaps_at_random_places_are_told_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows_at_once: int
 ) -> None:
-    monkeypatch.setattr(recordings, "_ROWS_AT_ONCE", rows_at_once)
+    monkeypatch.setattr(rows, "_ROWS_AT_ONCE", rows_at_once)
     rng = np.random.default_rng(rows_at_once)
     lines, expected, gaps = ["time_s;rotation_rad"], [], 0
     for i, kind in enumerate(rng.choice(["row", "gap", "comment", "empty"], 300)):
@@ -271,7 +267,7 @@ def test_a_time_column_that_a_row_lacks_is_named(tmp_path: Path) -> None:
 def test_times_are_compared_over_gaps_and_blocks(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recordings, "_ROWS_AT_ONCE", 2)
+    monkeypatch.setattr(rows, "_ROWS_AT_ONCE", 2)
     lines = ["time_s,rotation_rad", *ROWS, "11,nan", "# note", "11,2e-6"]
     said = refusal(written(tmp_path / "t.csv", lines))
     assert said.startswith(", line 16, column 'time_s': found 11 repeated (line 13)")
@@ -401,18 +397,25 @@ def test_a_preamble_is_skipped_and_volts_are_scaled(tmp_path: Path, row: str) ->
 @pytest.mark.parametrize(
     ("columns", "hint"),
     [
-        (Columns("Zeit (s)", "U (V)"), "skip: 4 there."),
+        (Columns("time_s", "rotation_rad"), "skip: 4 there."),
         (Columns("time_s", "rotation_rad", by_options=True), "--skip 4."),
         (Columns("time_s", "U (V)", skip=4), None),
     ],
 )
-def test_a_header_below_a_preamble_is_found(
+def test_a_header_below_a_preamble_is_named(
     tmp_path: Path, columns: Columns, hint: str | None
 ) -> None:
     path = written(tmp_path / "t.csv", [*PREAMBLE, *(f"{i};{i},5" for i in range(12))])
     said = refusal(path, columns)
     assert "found no such column" in said
     assert said.endswith(f" Line 5 looks like the header: {hint}") == (hint is not None)
+
+
+def test_a_header_below_a_preamble_that_has_the_columns_is_read(tmp_path: Path) -> None:
+    path = written(tmp_path / "t.csv", [*PREAMBLE, *(f"{i};{i},5" for i in range(12))])
+    found = read_recording(path, Columns("Zeit (s)", "U (V)", None, "mrad"))
+    np.testing.assert_array_equal(found.lines, np.arange(6, 18))
+    assert found.rotation_rad == pytest.approx(1e-3 * (np.arange(12) + 0.5))
 
 
 @pytest.mark.parametrize("encoding", ["utf-16-le", "utf-32"])
@@ -451,8 +454,9 @@ def test_a_file_with_too_many_rows_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = written(tmp_path / "t.csv", ["time_s,rotation_rad", *ROWS])
-    monkeypatch.setattr(recordings, "MOST_ROWS", 12)
+    monkeypatch.setattr(rows, "MOST_ROWS", 12)
     assert len(read_recording(path, PLAIN).time_s) == 12
+    monkeypatch.setattr(rows, "MOST_ROWS", 11)
     monkeypatch.setattr(recordings, "MOST_ROWS", 11)
     assert refusal(path) == ": found over 11 rows, allowed are 11."
 

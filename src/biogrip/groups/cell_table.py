@@ -8,7 +8,7 @@ from pathlib import Path
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
-from biogrip.traces.recordings import place
+from biogrip.traces.columns import place
 
 COLUMNS = ("file", "cell", "group")
 

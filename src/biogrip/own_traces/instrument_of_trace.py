@@ -51,7 +51,7 @@ def with_instrument(
             )
         level = 1.0
     phase = {
-        "duration_s": _duration_s(trace, read_as, instrument),
+        "duration_s": _duration_s(trace, read_as.with_config(measurement), instrument),
         instrument.controlled.column: level,
     }
     return {**found, "protocol": {"phases": [phase]}}

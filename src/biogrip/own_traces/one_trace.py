@@ -48,7 +48,7 @@ from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.sample_block import fixed_problems
 from biogrip.study.source import dotted
-from biogrip.study.study import Study
+from biogrip.study.study import Case, Study
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.late_onset import note_late_onset
 
@@ -127,7 +127,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     (case,) = study.cases.values()
     pieces = 5 + (case.posterior is not None)
     with Progress(str(options.trace), pieces, live=True) as progress:
-        recorded, case = read_trace(options.trace, case, options.config)
+        recorded, case = read_trace(options.trace, case, options.config, progress.note)
         progress.done()
         progress.doing(f"fitting {len(recorded.time_s)} samples")
         case_problem = case.problem.weighted(recorded.sd_rad)
@@ -172,6 +172,7 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             "confidence": confidence,
             "instrument": instrument.kind,
             "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
+            **_read_as(case, recorded),
             **fixed_data(case_problem),
             "limits": gripper_in_limits(case_problem),
             **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
@@ -198,6 +199,12 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
             samples = np.exp(drawn)
     write_text(output, json.dumps(_written(data), indent=1) + "\n")
     return Identified(data, case_problem, recorded, samples)
+
+
+def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
+    """Return what was recognised in an unusual file, or nothing."""
+    form = recorded.recognised
+    return {"read_as": form.data()} if form and not form.is_usual(case.columns) else {}
 
 
 def _written(data: dict[str, Any]) -> dict[str, Any]:

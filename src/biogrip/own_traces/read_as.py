@@ -1,6 +1,6 @@
 """Command-line options for reading the file of a recorded trace."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,8 @@ from biogrip.products.stages import recording
 from biogrip.study.measurement_block import COLOURED, KNOWN_NOISE, READINGS
 from biogrip.study.study import Case
 from biogrip.study.validation import measurement_problem
-from biogrip.traces.recordings import Columns
+from biogrip.traces.columns import Columns
+from biogrip.traces.recognised import Recognised
 
 _USUAL_TIME = "time_s"
 # Options that are no keys of ``measurement``.
@@ -41,6 +42,10 @@ class ReadAs:
         What is held from 0 to the end of the trace, SI units, where no config says so.
     skip, scale
         Lines before the header, and rotation over the number in the column.
+    block
+        Number of the block of a file that has several.
+    average_repeated
+        If true, average the readings of equal times.
     start_s, fit_start
         Time of the clock at which the protocol starts, or true to fit it along.
     noise_rad
@@ -64,6 +69,8 @@ class ReadAs:
     reading_unit: str | None = None
     skip: int | None = None
     scale: float | None = None
+    block: int | None = None
+    average_repeated: bool | None = None
     start_s: float | None = None
     fit_start: bool | None = None
     noise_rad: float | None = None
@@ -74,7 +81,7 @@ class ReadAs:
     noise_share: float | None = None
 
     @property
-    def block(self) -> dict[str, str | float | bool]:
+    def given(self) -> dict[str, str | float | bool]:
         """Keys of the ``measurement`` block that are given."""
         given = {key: value for key, value in asdict(self).items() if value is not None}
         named = dict([self.reading]) if self.reading else {}
@@ -87,9 +94,18 @@ class ReadAs:
         """
         replaced: set[str] = set()
         for one_of in ({"start_s", "fit_start"}, {*READINGS}):
-            replaced |= one_of if one_of & self.block.keys() else set()
+            replaced |= one_of if one_of & self.given.keys() else set()
         kept = {key: value for key, value in measurement.items() if key not in replaced}
-        return {"time": _USUAL_TIME} | kept | self.block
+        return {"time": _USUAL_TIME} | kept | self.given
+
+    def with_config(self, measurement: Mapping[str, Any]) -> "ReadAs":
+        """Return the options with those keys of a ``measurement`` block that are valid."""
+        valid = {
+            key: value for key, value in measurement.items() if not measurement_problem(key, value)
+        }
+        named = [(name, valid[name]) for name in READINGS if name in valid]
+        own = {key: valid[key] for key in valid if key in asdict(self)}
+        return replace(self, **own, reading=named[0] if named else self.reading)
 
     def columns(self, read: Quantity) -> Columns:
         """Return names and units of the columns of a file with readings of a quantity."""
@@ -106,6 +122,8 @@ class ReadAs:
             by_options=True,
             sd=self.sd,
             quantity=read,
+            block=self.block,
+            average_repeated=bool(self.average_repeated),
         )
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:
@@ -142,7 +160,7 @@ class ReadAs:
                 f"--reading: found '{self.reading[0]}', allowed are {', '.join(allowed)}."
                 + nearest(self.reading[0], allowed)
             )
-        for key, value in self.block.items():
+        for key, value in self.given.items():
             option = _OPTIONS.get(key, key).replace("_", "-")
             if self.noise_model == COLOURED and key in KNOWN_NOISE:
                 raise BiogripError(
@@ -158,7 +176,9 @@ class ReadAs:
             raise BiogripError("--scale: found 0, allowed is another number.")
 
 
-def read_trace(file: Path, case: Case, config: Path | None) -> tuple[Measurements, Case]:
+def read_trace(
+    file: Path, case: Case, config: Path | None, show: Callable[[str], None] = lambda _: None
+) -> tuple[Measurements, Case]:
     """Read a trace by the options and the config that a case holds, and find its search ranges.
 
     Parameters
@@ -169,6 +189,8 @@ def read_trace(file: Path, case: Case, config: Path | None) -> tuple[Measurement
         The case of the trace.
     config
         The user's config file, if there is one.
+    show
+        Function that is given a table of what was recognised in an unusual file.
 
     Returns
     -------
@@ -183,6 +205,11 @@ def read_trace(file: Path, case: Case, config: Path | None) -> tuple[Measurement
         With file, line and column, if the trace cannot be used.
     """
     columns = replace(case.columns, by_options=True)
-    trace = recording.read_checked(file, case.gripper, case.problem, columns)
+
+    def show_unusual(form: Recognised) -> None:
+        if not form.is_usual(columns):
+            show(form.in_words(file))
+
+    trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
     case = with_own_ranges(case, trace, config)
     return recording.with_fitted_onset(trace, case.problem), case

@@ -13,7 +13,8 @@ from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.keys import Block, OneOf, Problem
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.traces.recordings import TIME_UNITS, Columns
+from biogrip.traces.columns import Columns
+from biogrip.traces.units import TIME_UNITS
 
 COLOURED = "coloured"
 NOISE_MODELS = ("white", COLOURED)
@@ -24,7 +25,8 @@ READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
 _COLUMNS = ("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale")
-_OF_FILE = (*_COLUMNS, *KNOWN_NOISE, "start_s", "fit_start")
+_TABLE = ("block", "average_repeated")
+_OF_FILE = (*_COLUMNS, *_TABLE, *KNOWN_NOISE, "start_s", "fit_start")
 _Column = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
 
@@ -70,7 +72,12 @@ class MeasurementBlock(Block):
     """Unit of what another instrument reads, where the column's name does not end in it; of strains
     by default 1."""
     skip: Annotated[int | None, Field(ge=0, le=1_000_000)] = None
-    """Number of lines in the file before its header, as programs of instruments write them."""
+    """Number of lines in the file before its header, as programs of instruments write them; of
+    those of rheometers the header is found."""
+    block: Annotated[int | None, Field(ge=1, le=1_000_000)] = None
+    """Number of the block to read, where several tables follow one another in the file."""
+    average_repeated: bool = False
+    """If true, average the readings of equal times, as a rounded clock writes them."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
     rotation that is positive where the arm opens. By default 1."""
@@ -122,6 +129,8 @@ class MeasurementBlock(Block):
             self.start_s,
             sd=self.sd,
             quantity=INSTRUMENTS[name].read,
+            block=self.block,
+            average_repeated=self.average_repeated,
         )
 
     @property

@@ -13,7 +13,7 @@ from biogrip.instrument.gripper import ROTATION
 from biogrip.keys import CONFLICT, TWICE, Problem
 from biogrip.study.plain import built
 from biogrip.study.schema import Schema, schema_of
-from biogrip.traces.recordings import TIME_UNITS, nearest_unit
+from biogrip.traces.units import TIME_UNITS, nearest_unit
 
 T = TypeVar("T")
 MOST_EXPLAINED = 1000

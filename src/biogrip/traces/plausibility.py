@@ -23,8 +23,10 @@ from biogrip.instrument.instrument import Instrument, Quantity
 from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.nuisance import without
 from biogrip.traces.any_response import extreme_responses, left_over
+from biogrip.traces.columns import Columns, place
 from biogrip.traces.onset import begins_constant, estimate_onset
-from biogrip.traces.recordings import TIME_UNITS, Columns, Recording, place, unit_of
+from biogrip.traces.recordings import Recording
+from biogrip.traces.units import TIME_UNITS, unit_of
 
 LARGEST_SHARE = 1.5
 """Largest plausible rotation, as a multiple of the free rotation.

@@ -11,7 +11,7 @@ from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
 from biogrip.products.files.traces import read_jaw_force, read_measurements, read_target
 from biogrip.products.stages import joined, recording, target
-from biogrip.traces.recordings import Columns
+from biogrip.traces.columns import Columns
 from tests.helpers.default import STUDY, seen
 from tests.helpers.places import EXAMPLE
 

@@ -14,6 +14,7 @@ from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.products.files.parquet import column_names, read_columns, table_of, write_tables
 from biogrip.products.files.rows import write_rows
+from biogrip.traces.recognised import Recognised
 
 TARGETS = "results/targets/{case}.csv"
 MEASUREMENTS = "results/measurements/{case}/{batch}.parquet"
@@ -57,6 +58,8 @@ class Measurements:
     at_steps: int = 0
     """Number of readings of a recording that were left out, for they are at the instant of a step
     of a load or a deformation."""
+    recognised: Recognised | None = None
+    """What was recognised in the file of a recording."""
 
 
 def write_target(

@@ -1,6 +1,7 @@
 """Stage 2 for recorded traces: conversion of the user's file to a measurement."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,10 +20,12 @@ from biogrip.products.uses import from_case
 from biogrip.progress import warn
 from biogrip.response.whitening import MOST_SAMPLES
 from biogrip.study.study import Case, Study
+from biogrip.traces.columns import Columns, place
 from biogrip.traces.noise_share import proportional_deviations
 from biogrip.traces.onset import guess_onset
 from biogrip.traces.plausibility import check_recording
-from biogrip.traces.recordings import Columns, Recording, place, read_recording
+from biogrip.traces.recognised import Recognised
+from biogrip.traces.recordings import Recording, read_recording
 
 
 def record(case: Case, recorded: Path, measurements: Path) -> None:
@@ -41,10 +44,20 @@ def record(case: Case, recorded: Path, measurements: Path) -> None:
 
 
 def read_checked(
-    recorded: Path, gripper: Gripper, problem: CaseProblem, columns: Columns
+    recorded: Path,
+    gripper: Gripper,
+    problem: CaseProblem,
+    columns: Columns,
+    show: Callable[[Recognised], None] = lambda _: None,
 ) -> Measurements:
-    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol."""
+    """Read a recorded trace, and refuse one that is impossible with its gripper and protocol.
+
+    Before it is refused, `show` is called with what was recognised in the file.
+    """
     trace = read_recording(recorded, columns)
+    if trace.recognised is not None:
+        show(trace.recognised)
+        columns = trace.recognised.stated(columns)
     weighted = columns.sd is not None or problem.noise_share is not None
     if (problem.coloured or weighted) and len(trace.time_s) > MOST_SAMPLES:
         raise BiogripError(
@@ -86,7 +99,10 @@ def read_checked(
         )
     rotations = {0: trace.rotation_rad}
     gaps = trace.without_number
-    return Measurements(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps)
+    return Measurements(
+        *(trace.time_s, None, rotations, gaps, sd_rad, suspicion, onset_s, at_steps),
+        trace.recognised,
+    )
 
 
 def without_steps(trace: Recording, protocol: TorqueHistory) -> tuple[Recording, int]:
@@ -117,13 +133,8 @@ def without_padding(trace: Recording) -> Recording:
     """
     differs = np.flatnonzero(trace.rotation_rad != trace.rotation_rad[0])
     first = max(min([*differs[:1], np.count_nonzero(trace.time_s < 0)]) - 1, 0)
-    return Recording(
-        trace.time_s[first:],
-        trace.rotation_rad[first:],
-        trace.lines[first:],
-        trace.without_number + first,
-        None if trace.sd_rad is None else trace.sd_rad[first:],
-    )
+    kept = np.arange(len(trace.time_s)) >= first
+    return replace(_part(trace, kept), without_number=trace.without_number + first)
 
 
 def with_fitted_onset(trace: Measurements, problem: CaseProblem) -> Measurements:
@@ -151,6 +162,10 @@ def notes_on_recording(trace: Measurements) -> list[str]:
     if trace.gaps:
         rows = f"{counted(trace.gaps, 'row')} of {len(trace.time_s) + trace.gaps}"
         notes.append(f"Left out for want of a number: {rows}.")
+    if trace.recognised is not None and trace.recognised.averaged:
+        notes.append(
+            f"Averaged at repeated times: {counted(trace.recognised.averaged, 'reading')}."
+        )
     if trace.at_steps:
         notes.append(
             f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "
