@@ -39,12 +39,9 @@ def interval(number: int, style: str, separator: str, *, decimal: str = ",") -> 
     """One interval with its preamble, in one of the two styles that there are."""
     first = {"old": [], "new": ["Interval data:"]}[style]
     empty = [""] * len(first)
-    head = {
-        "old": ["Interval:", str(number)],
-        "new": ["Interval and data points:", f"{number}", "14"],
-    }
+    heads = {"old": ["Interval:"], "new": ["Interval and data points:", str(ROWS)]}
     rows = [
-        head[style],
+        [heads[style][0], str(number), *heads[style][1:]],
         [*first, *NAMES],
         [""] * (len(first) + len(NAMES)),
         [*empty, *UNITS],
@@ -320,25 +317,20 @@ def test_too_few_times_are_left(tmp_path: Path) -> None:
     assert refusal(tmp_path / "t.csv", columns).startswith(": found 8 times with a number in both")
 
 
-@pytest.mark.parametrize(
-    ("name", "unit", "quantity"),
-    [("Creep Compliance", "1/Pa", COMPLIANCE), ("Relaxation Modulus", "Pa", MODULUS)],
-)
-def test_a_plain_table_between_tabs(tmp_path: Path, name: str, unit: str, quantity: object) -> None:
+def test_what_was_recognised_is_a_small_table(tmp_path: Path) -> None:
     rows = [f"{t}\t{g}" for t, g in numbers(0).T]
-    (tmp_path / "t.tsv").write_text("\n".join([f"Time\t{name}", *rows]))
-    columns = Columns("Time", name, "s", unit, quantity=quantity)  # type: ignore[arg-type]
-    found = read_recording(tmp_path / "t.tsv", columns)
-    np.testing.assert_array_equal(found.rotation_rad, numbers(0)[1])
-    assert found.recognised is not None
-    assert found.recognised.in_words(Path("t.tsv")) == (
-        "t.tsv is read as\n"
-        f"  text{' ' * (len(quantity.name) - 2)}UTF-8, cells between tabs, decimal point\n"  # type: ignore[attr-defined]
-        f"  header{' ' * (len(quantity.name) - 4)}line 1\n"  # type: ignore[attr-defined]
-        f"  time{' ' * (len(quantity.name) - 2)}Time, in s\n"  # type: ignore[attr-defined]
-        f"  {quantity.name}  {name}, in {unit}\n"  # type: ignore[attr-defined]
-        f"  rows{' ' * (len(quantity.name) - 2)}14, from 0.5 to 7 s"  # type: ignore[attr-defined]
-    )
+    (tmp_path / "t.tsv").write_text("\n".join(["Time\tRelaxation Modulus", *rows, "8\t"]))
+    columns = Columns("Time", "Relaxation Modulus", "s", "Pa", quantity=MODULUS)
+    form = read_recording(tmp_path / "t.tsv", columns).recognised
+    assert form is not None
+    assert form.in_words(Path("t.tsv")).split("\n") == [
+        "t.tsv is read as",
+        "  text     UTF-8, cells between tabs, decimal point",
+        "  header   line 1",
+        "  time     Time, in s",
+        "  modulus  Relaxation Modulus, in Pa",
+        "  rows     15, 1 gap, from 0.5 to 7 s",
+    ]
 
 
 def test_a_usual_table_is_usual(tmp_path: Path) -> None:
@@ -359,34 +351,33 @@ def test_names_in_a_comment_are_no_header(tmp_path: Path) -> None:
 
 
 def damaged(content: bytes, rng: np.random.Generator) -> bytes:
-    """Content with a few bytes replaced, a piece left out or repeated, or its end missing."""
-    made = bytearray(content)
-    for _ in range(int(rng.integers(1, 6))):
-        start = int(rng.integers(len(made)))
-        end = start + int(rng.integers(1, 200))
-        piece = made[start:end]
-        made[start:end] = [rng.bytes(3), b"", 2 * bytes(piece), b"\n", b"[step]\n", b'"'][
-            rng.integers(6)
-        ]
-    return bytes(made[: int(rng.integers(len(made) // 2, len(made) + 1))])
+    """Content with a piece replaced, left out or repeated, and perhaps without its end."""
+    start = int(rng.integers(len(content)))
+    piece = content[start : start + int(rng.integers(1, 60))]
+    others = [rng.bytes(1), b"", 2 * piece, b"\n", b"[step]\n", b'"', b"9", b"Time\t"]
+    made = content[:start] + others[rng.integers(len(others))] + content[start + len(piece) :]
+    return made if rng.integers(2) else made[: int(rng.integers(len(made)))]
 
 
 @pytest.mark.parametrize("kind", ["old", "new", "trios"])
-def test_a_damaged_export_is_refused_or_leaves_a_trace(tmp_path: Path, kind: str) -> None:
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_a_damaged_export_is_refused_or_leaves_a_trace(
+    tmp_path: Path, kind: str, encoding: str
+) -> None:
     path = tmp_path / "t.csv"
-    content = (trios(path) if kind == "trios" else anton_paar(path, 2, kind)).read_bytes()
+    written = trios(path) if kind == "trios" else anton_paar(path, 2, kind, "utf-8")
+    content = written.read_text("utf-8").encode(encoding)
     rng = np.random.default_rng(5)
     columns = Columns("Step time", "Modulus", quantity=MODULUS) if kind == "trios" else RELAXATION
     read = 0
     for number in range(400):
         path.write_bytes(damaged(content, rng))
-        block = [None, 1, 2, 3][number % 4]
+        block = [3 if kind == "trios" else 1, None, 2][number % 3]
         try:
             found = read_recording(
-                path, replace(columns, block=block, average_repeated=number % 3 == 0)
+                path, replace(columns, block=block, average_repeated=number > 99)
             )
-        except BiogripError as error:
-            assert str(error).startswith(str(path))
+        except BiogripError:
             continue
         read += 1
         assert np.all(np.diff(found.time_s) > 0)

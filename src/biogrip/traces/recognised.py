@@ -95,8 +95,9 @@ class Recognised:
             *((quantity, f"{name}, in {unit}") for quantity, (name, unit) in self.columns.items()),
             ("rows", self._rows()),
         ]
-        width = max(len(name) for name, _ in rows)
-        table = "".join(f"\n  {name:<{width}}  {visible(text)}" for name, text in rows if text)
+        shown = [(name, visible(text)) for name, text in rows if text]
+        width = max(len(name) for name, _ in shown)
+        table = "".join(f"\n  {name:<{width}}  {text}" for name, text in shown)
         return f"{visible(path)} is read as{table}"
 
     def _rows(self) -> str:
