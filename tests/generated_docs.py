@@ -108,7 +108,9 @@ def measured() -> str:
         )
         for number, (quantity, value) in enumerate(published.items()):
             own = found[quantity]
-            once = (sample.replace("_", " "), own["fit"], best["model"]) if number == 0 else [""] * 3
+            once = (
+                (sample.replace("_", " "), own["fit"], best["model"]) if number == 0 else [""] * 3
+            )
             rows.append(
                 {
                     "sample": once[0],

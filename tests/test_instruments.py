@@ -189,6 +189,31 @@ def test_readings_at_the_instant_of_a_step_are_left_out(tmp_path: Path) -> None:
     )
 
 
+def test_readings_that_scatter_more_at_first_are_doubted_and_can_be_left_out(
+    tmp_path: Path,
+) -> None:
+    """As a rheometer's, which averages for longer and longer."""
+    times = np.geomspace(0.05, 60.0, 400)
+    experiment = set_up(INSTRUMENTS["modulus"], (hold(60.0, 1.0),), SOLID)
+    clean = simulate(experiment, TRUTH, times)
+    scatter = np.random.default_rng(1).standard_normal(len(times))
+    trace = written(tmp_path / "g.csv", "modulus_Pa", clean + 3 / times * scatter, times)
+    options = ["--reading", "modulus=modulus_Pa", "--model", SOLID.name]
+    found = identified(trace, *options)
+    assert found["fit"] == "doubtful"
+    assert "The noise differs from one part of the trace to another" in " ".join(found["reasons"])
+    later = identified(trace, *options, "--from", "10")
+    assert later["samples"] == np.count_nonzero(times >= 10)
+    assert by_name(later)["k_p"]["value"] == pytest.approx(TRUTH["k_p"], rel=0.01)
+    # A protocol that is not the right one is still rejected.
+    ramp = (
+        "instrument: relaxation\n"
+        "protocol:\n  phases:\n"
+        "    - {duration_s: 6, strain: 0, to_strain: 1}\n    - {duration_s: 54, strain: 1}\n"
+    )
+    assert identified(trace, *options, config=ramp + FEW)["fit"] == "rejected"
+
+
 def test_what_is_assumed_is_a_config_that_gives_the_same(tmp_path: Path) -> None:
     trace = written(tmp_path / "f.csv", "force_N", noisy(response("force", 2e-6)))
     options = ["--reading", "force=force_N", "--model", SOLID.name]

@@ -326,6 +326,14 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
         metavar="SECONDS",
         help="time of the clock at which the protocol starts, or fit to fit it along [0]",
     )
+    for name, what in (("from", "first"), ("until", "last")):
+        command.add_argument(
+            f"--{name}",
+            type=float,
+            dest=f"{name}_s",
+            metavar="SECONDS",
+            help=f"{what} time of the clock to use [all]",
+        )
     command.add_argument("--noise", type=float, metavar="RAD", help="known noise of the trace")
     for name, what in (("--offset", "an offset"), ("--drift", "a linear drift")):
         command.add_argument(
@@ -469,6 +477,8 @@ def _read_as(options: argparse.Namespace) -> "ReadAs":
         scale=options.scale,
         block=options.block,
         average_repeated=options.average_repeated,
+        from_s=options.from_s,
+        until_s=options.until_s,
         start_s=None if options.start == FIT else options.start,
         fit_start=options.start == FIT or None,
         noise_rad=options.noise,

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.experiment.sample import SampleModel
 from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTION, Note, compute_status
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.range_ends import note_range_ends
-from biogrip.identifiability.slow_misfit import has_fast_noise
+from biogrip.identifiability.slow_misfit import has_fast_noise, has_uneven_noise
 from biogrip.identifiability.verdicts import Finding, Trade, compute_findings, find_trade_offs
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise
 from biogrip.identify.answer import Identification
@@ -161,11 +162,18 @@ def _noise(likelihood: Likelihood) -> Iterator[Note]:
     bulk = even[~outliers_of(even, residuals.rounding_rad)]
     bulk_rad = float(np.sqrt(np.mean(bulk**2)))
     if bulk_rad > _TOO_MUCH * scale:
-        yield _misfit(likelihood, bulk_rad / scale)
+        yield _misfit(likelihood, bulk_rad / scale, residual)
 
 
-def _misfit(likelihood: Likelihood, times: float) -> Note:
+def _misfit(likelihood: Likelihood, times: float, residual: Array) -> Note:
     """Return the note on a misfit that is some times the noise."""
+    if has_uneven_noise(residual, likelihood.problem.residuals.rounding_rad):
+        return Note(
+            DOUBT,
+            "The noise differs from one part of the trace to another, and the intervals do not "
+            "allow for that: leave out the readings that scatter most (--from, --until), or give "
+            "standard deviations (--sd).",
+        )
     if has_fast_noise(likelihood.problem.residuals, likelihood.best):
         return Note(
             DOUBT,

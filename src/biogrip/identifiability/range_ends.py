@@ -32,7 +32,9 @@ def note_range_ends(likelihood: Likelihood, model: SampleModel) -> Iterator[Note
     problem, x = likelihood.problem, likelihood.best
     for index, parameter in enumerate(model.parameters):
         for end, outward, word in ((problem.low, -1.0, "lower"), (problem.high, 1.0, "upper")):
-            if abs(x[index] - end[index]) > _AT_END:
+            # An exponent at its upper end is that of a damper: there is nothing beyond.
+            bounded = outward > 0 and np.isfinite(parameter.below)
+            if bounded or abs(x[index] - end[index]) > _AT_END:
                 continue
             start, low, high = x.copy(), problem.low.copy(), problem.high.copy()
             start[index] += outward * _BEYOND

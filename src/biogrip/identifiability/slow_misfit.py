@@ -7,6 +7,7 @@ from biogrip.identifiability.fit_status import DOUBT, REJECTION, Note
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood
 from biogrip.instrument.gripper import GRIPPER
 from biogrip.instrument.instrument import Instrument
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.residuals import Residuals
 from biogrip.response.whitening import MOST_SAMPLES, NoiseModel
 
@@ -16,6 +17,11 @@ _MOST, _SLOW, _NOTICEABLE, _LONG = 0.5, 0.02, 1 / 3, 0.2
 # Of so many stretches of a trace with stationary noise, which is correlated for less than half a
 # stretch, none has so large a share of the sum of squares.
 _STRETCHES, _IN_ONE = 20, 0.3
+# Of stretches with fewer readings the scatter is hardly known. Scales of white noise in twenty of
+# them differ by more once in hundreds of traces.
+_IN_A_STRETCH, _FEWEST_STRETCHES, _UNEVEN = 50, 3, 3.0
+# Mean square over that of the scatter: of white noise 1.05 to 1.4, as the scatter is uncertain.
+_AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
@@ -54,3 +60,27 @@ def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     noise_model = NoiseModelLikelihood(time_s, residual, sensitivity).best()
     fast = noise_model.time_s <= _SLOW * residuals.duration_s
     return fast and noise_model.ar1 > _NOTICEABLE
+
+
+def has_uneven_noise(residual: Array, rounding_rad: float) -> bool:
+    """Return True if what a fit leaves is as large as the scatter around it, where that differs.
+
+    So it is where an instrument averages for longer and longer, or settles at first. A misfit of
+    the model is smooth, and larger than the scatter of neighbours wherever it is.
+
+    Parameters
+    ----------
+    residual : (n_samples,)
+        What the fit leaves.
+    rounding_rad
+        Step of the readings.
+    """
+    count = min(_STRETCHES, len(residual) // _IN_A_STRETCH)
+    if count < _FEWEST_STRETCHES:
+        return False
+    stretches = np.array_split(residual, count)
+    scales = [estimate_noise(each, rounding_rad) for each in stretches]
+    if max(scales) < _UNEVEN * min(scales):
+        return False
+    own = np.concatenate([each / scale for each, scale in zip(stretches, scales, strict=True)])
+    return bool(np.mean(own**2) < _AS_THE_SCATTER)

@@ -44,10 +44,11 @@ def with_instrument(
         if instrument.has_jaws:
             return found
         if not instrument.relative:
+            controlled = instrument.controlled
+            unit = f" in {controlled.unit}" if controlled.unit else ""
             raise BiogripError(
-                f"--hold: is missing; allowed is the {instrument.controlled.name}"
-                f"{f' in {instrument.controlled.unit}' if instrument.controlled.unit else ''} that was held, "
-                "or a protocol in --config."
+                f"--hold: is missing; allowed is the {controlled.name}{unit} that was held, or a "
+                "protocol in --config."
             )
         level = 1.0
     phase = {

@@ -21,7 +21,7 @@ from biogrip.traces.recognised import Recognised
 _USUAL_TIME = "time_s"
 # Options that are no keys of ``measurement``.
 _ELSEWHERE = ("hold", "reading")
-_OPTIONS = {"noise_rad": "noise", "start_s": "start"}
+_OPTIONS = {"noise_rad": "noise", "start_s": "start", "from_s": "from", "until_s": "until"}
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,8 @@ class ReadAs:
         Lines before the header, and rotation over the number in the column.
     block
         Number of the block of a file that has several.
+    from_s, until_s
+        First and last time of the clock to use.
     average_repeated
         If true, average the readings of equal times.
     start_s, fit_start
@@ -71,6 +73,8 @@ class ReadAs:
     scale: float | None = None
     block: int | None = None
     average_repeated: bool | None = None
+    from_s: float | None = None
+    until_s: float | None = None
     start_s: float | None = None
     fit_start: bool | None = None
     noise_rad: float | None = None
@@ -124,6 +128,8 @@ class ReadAs:
             quantity=read,
             block=self.block,
             average_repeated=bool(self.average_repeated),
+            from_s=self.from_s,
+            until_s=self.until_s,
         )
 
     def read(self, file: Path, gripper: Gripper, problem: CaseProblem) -> Measurements:

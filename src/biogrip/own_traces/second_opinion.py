@@ -88,16 +88,16 @@ def second_opinion(
     )
     controlled = case_problem.instrument.controlled.name
     or_flows = (
-        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper without a "
-        "spring give the same line."
+        f" Or the sample flows: as long as the {controlled} is constant, a drift and a damper "
+        "without a spring give the same line."
     )
     if case_problem.instrument.deforms:
         or_flows = ""
     if not case_problem.drift and drift_is_flow(case_problem.torque, recorded.time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
-            f"sample flows. Under this {controlled} both give the same line, and the trace cannot tell "
-            f"which it is: a {controlled} that changes would."
+            f"sample flows. Under this {controlled} both give the same line, and the trace cannot "
+            f"tell which it is: a {controlled} that changes would."
         )
     else:
         text = (

@@ -57,8 +57,11 @@ def _branches(network: Network) -> tuple[NDArray[Any], NDArray[Any]]:
     """
     bare = np.stack((network.k_p, _AT_ONCE * network.c_p), axis=1)
     fixed = np.broadcast_to([0.0, -_AT_ONCE], bare.shape)
-    rates = np.concatenate((-network.k / network.c, fixed), axis=1)
-    return rates, np.concatenate((network.k, bare), axis=1)
+    # A branch so weak that its numbers underflow is none.
+    there = network.c.real > 0
+    rates = -network.k / np.where(there, network.c, 1.0)
+    weights = np.where(there, network.k, 0.0)
+    return np.concatenate((rates, fixed), axis=1), np.concatenate((weights, bare), axis=1)
 
 
 def _split(values: NDArray[Any], count: int) -> tuple[Array, Array]:

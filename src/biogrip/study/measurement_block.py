@@ -25,7 +25,7 @@ READINGS = tuple(INSTRUMENTS)
 """Keys that name the column of the readings, one for each quantity that an instrument reads."""
 
 _COLUMNS = ("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale")
-_TABLE = ("block", "average_repeated")
+_TABLE = ("block", "average_repeated", "from_s", "until_s")
 _OF_FILE = (*_COLUMNS, *_TABLE, *KNOWN_NOISE, "start_s", "fit_start")
 _Column = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
@@ -78,6 +78,11 @@ class MeasurementBlock(Block):
     """Number of the block to read, where several tables follow one another in the file."""
     average_repeated: bool = False
     """If true, average the readings of equal times, as a rounded clock writes them."""
+    from_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    """First time of the file's clock to use: readings before it are left out, as where a rheometer
+    has not yet reached its strain. The protocol stays. By default all are used."""
+    until_s: Annotated[float | None, Field(ge=-1e9, le=1e9)] = None
+    """Last time of the file's clock to use, as before a sample slips."""
     scale: Annotated[float | None, Field(ge=-1e30, le=1e30)] = None
     """Rotation, in its unit, over the number in the column: for a sensor's volts, or -1 for a
     rotation that is positive where the arm opens. By default 1."""
@@ -131,6 +136,8 @@ class MeasurementBlock(Block):
             quantity=INSTRUMENTS[name].read,
             block=self.block,
             average_repeated=self.average_repeated,
+            from_s=self.from_s,
+            until_s=self.until_s,
         )
 
     @property

@@ -39,6 +39,10 @@ class Columns:
     """Number of the block to read, from 1, where a file has several; None for the only one."""
     average_repeated: bool = False
     """True to average the readings of equal times."""
+    from_s: float | None = None
+    """First time of the clock to use; None for all."""
+    until_s: float | None = None
+    """Last time of the clock to use."""
 
     @property
     def unit_key(self) -> str:

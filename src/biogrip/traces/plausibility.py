@@ -21,11 +21,12 @@ from biogrip.experiment.protocol import TorqueHistory, torque_at
 from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.instrument.instrument import Instrument, Quantity
 from biogrip.response.lagged_torques import lagged_torques
+from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import without
 from biogrip.traces.any_response import extreme_responses, left_over
 from biogrip.traces.columns import Columns, place
 from biogrip.traces.onset import begins_constant, estimate_onset
-from biogrip.traces.recordings import Recording
+from biogrip.traces.recordings import FEWEST_SAMPLES, Recording
 from biogrip.traces.units import TIME_UNITS, unit_of
 
 LARGEST_SHARE = 1.5
@@ -62,6 +63,8 @@ _ROUNDING = 1e-9
 _FAR_ABOVE = 10.0
 # Multiple of the free rotation that neither noise nor a wrong unit explains.
 _ABSURD = 1e9
+# Ratio of scatter from which a part of a trace looks like none.
+_UNEVEN = 10.0
 # Number of samples processed at once.
 _AT_ONCE = 65_536
 
@@ -160,24 +163,39 @@ def check_recording(
     functions = _functions(recording, lagged, nuisance)
     fit = _fit(functions)
     read, controlled = columns.quantity, instrument.controlled.name
-    if np.ptp(trace) == 0 or not _responds(functions, fit, noise_rad):
+    # Only the force of a spring is constant, as long as its deformation is.
+    constant, still = instrument.deforms, np.ptp(trace) == 0 and not instrument.deforms
+    if still or not _responds(functions, fit, noise_rad, constant=constant):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.reading}': found no response to the "
             f"{controlled}, but {trace.mean():.3g}{_unit(read)} throughout, give or take "
             f"{trace.std():.2g}{_unit(read)}; allowed is a {read.name} from zero that follows the "
             f"{controlled} and stands out of the noise."
+            f"{_hint_on_part(recording, columns)}"
         )
     if _mirrored(functions, gripper, noise_rad):
         raise BiogripError(
             f"{_extent(recording, path)}, column '{columns.reading}': found a {read.name} that "
-            f"goes against the {controlled}, allowed is {_sign(instrument)}, or if an offset or drift of "
-            "the instrument, where it has one, were declared."
+            f"goes against the {controlled}, allowed is {_sign(instrument)}, or if an offset or "
+            "drift of the instrument, where it has one, were declared."
         )
     if not instrument.has_jaws:
         return None
     turns = (fit.weights @ lagged(recording.time_s[some]) for some in parts(len(trace), _AT_ONCE))
     turn = max(float(np.abs(part).max()) for part in turns)
     return _check_turn(recording, turn, free, path, columns, typical_rad)
+
+
+def _hint_on_part(recording: Recording, columns: Columns) -> str:
+    """Return a hint if the readings scatter far more in the first than in the last tenth."""
+    few = max(FEWEST_SAMPLES, len(recording.time_s) // 10)
+    tenths = recording.rotation_rad[:few], recording.rotation_rad[-few:]
+    early, late = map(estimate_noise, tenths)
+    if max(early, late) < _UNEVEN * min(early, late):
+        return ""
+    where, how = ("first", "from") if early > late else ("last", "until")
+    said = f"--{how}" if columns.by_options else f"{how}_s under measurement"
+    return f" The {where} readings scatter far more than the others: {said} leaves them out."
 
 
 def _unit(quantity: Quantity) -> str:
@@ -291,7 +309,7 @@ def _fit(functions: _Functions) -> _Fit:
     return _Fit(weights @ basis, weights, int(rank))
 
 
-def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool:
+def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None, *, constant: bool) -> bool:
     """Return True if the trace follows the torque.
 
     It does not if a constant describes it better, or if white noise about zero would have as
@@ -302,7 +320,7 @@ def _responds(functions: _Functions, fit: _Fit, noise_rad: float | None) -> bool
     trace = without(functions.nuisance, functions.trace)
     explained = np.sum(fit.response**2)
     rest = np.sum((trace - fit.response) ** 2)
-    if np.sum(without(functions.constant, trace) ** 2) <= rest:
+    if not constant and np.sum(without(functions.constant, trace) ** 2) <= rest:
         return False
     if noise_rad is not None:
         return bool(explained > noise_rad**2 * chdtri(fit.unknowns, FALSE_ALARM))

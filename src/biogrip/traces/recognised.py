@@ -40,6 +40,8 @@ class Recognised:
     """Number of rows that were left out as gaps."""
     averaged: int = 0
     """Number of readings that were averaged, for they have equal times."""
+    outside: int = 0
+    """Number of readings that were left out, for they are not among the times to use."""
     range_s: tuple[float, float] = (0.0, 0.0)
     """First and last time."""
 
@@ -48,7 +50,7 @@ class Recognised:
         return (
             (self.encoding, self.separator, self.decimal_comma) == (UTF_8, ",", False)
             and self.units_line is self.block is columns.block is None
-            and not (columns.skip or self.title or self.averaged)
+            and not (columns.skip or self.title or self.averaged or self.outside)
             and (columns.time, columns.reading) == ("time_s", columns.quantity.column)
         )
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.digits import counted
 from biogrip.errors import BiogripError
 from biogrip.traces.blocks import Block, Header, Lines, chosen, find_blocks, find_header
@@ -118,6 +118,9 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         kept, lines, averaged = average_repeated(kept, lines)
         _check_count(path, columns, len(kept), without_number, "time")
     _check_order(path, columns, kept[:, 0], lines)
+    used = _is_used(columns, table.sizes[0] * kept[:, 0])
+    kept, lines, outside = kept[used], lines[used], int(np.count_nonzero(~used))
+    _check_count(path, columns, len(kept), without_number, "time to use")
     factors = np.array([1.0, columns.scale, abs(columns.scale)][: len(table.sizes)])
     time_s, rotation_rad, *sd_rad = (
         own * size for own, size in zip(kept.T, table.sizes * factors, strict=True)
@@ -127,10 +130,18 @@ def read_recording(path: Path, columns: Columns) -> Recording:
         rows=len(table.lines),
         gaps=without_number,
         averaged=averaged,
+        outside=outside,
         range_s=(float(time_s[0]), float(time_s[-1])),
     )
     known_sd = sd_rad[0] if sd_rad else None
     return Recording(time_s, rotation_rad, lines, without_number, known_sd, form)
+
+
+def _is_used(columns: Columns, time_s: Array) -> BoolArray:
+    """Return True for times, (n_rows,), that are to be used."""
+    first = -np.inf if columns.from_s is None else columns.from_s
+    last = np.inf if columns.until_s is None else columns.until_s
+    return (time_s >= first) & (time_s <= last)
 
 
 def average_repeated(values: Array, lines: IntArray) -> tuple[Array, IntArray, int]:

@@ -166,6 +166,10 @@ def notes_on_recording(trace: Measurements) -> list[str]:
         notes.append(
             f"Averaged at repeated times: {counted(trace.recognised.averaged, 'reading')}."
         )
+    if trace.recognised is not None and trace.recognised.outside:
+        notes.append(
+            f"Left out by from_s and until_s: {counted(trace.recognised.outside, 'reading')}."
+        )
     if trace.at_steps:
         notes.append(
             f"Left out at the instant of a step: {counted(trace.at_steps, 'reading')}, of which "
