@@ -138,8 +138,8 @@ def chosen(path: Path, lines: Lines, blocks: list[Block], columns: Columns) -> i
             f"allowed is one: say which by {columns.said_by('block')}."
             f"{_in_words(lines, blocks, columns)}"
         )
-    wanted = {*map(plain_name, columns.named.values())}
-    common = [len(wanted & {*map(plain_name, block.header.names)}) for block in blocks]
+    needed = {*map(plain_name, columns.named.values())}
+    common = [len(needed & {*map(plain_name, block.header.names)}) for block in blocks]
     return common.index(max(common))
 
 
