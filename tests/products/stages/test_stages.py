@@ -9,6 +9,7 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, hold
 from biogrip.experiment.sample import Sample
 from biogrip.experiment.sampling import Sampling
+from biogrip.instrument.gripper import GRIPPER
 from biogrip.products.files.traces import read_jaw_force, read_measurements, read_target
 from biogrip.products.stages import joined, recording, target
 from biogrip.traces.columns import Columns
@@ -19,6 +20,7 @@ from tests.helpers.places import EXAMPLE
 def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
     return seen(
         name="Drop",
+        instrument=GRIPPER,
         gripper=STUDY.gripper,
         phases=(hold(100.0, torque_Nm), *more),
         sampling=Sampling(rate_Hz=1.0),
