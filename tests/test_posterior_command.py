@@ -9,7 +9,7 @@ import pytest
 from biogrip.cli import main
 from biogrip.identifiability.convergence import FEWEST, MOST_R_HAT
 from biogrip.identifiability.prior_sensitivity import NOTABLE
-from biogrip.own_traces.words import evidence_in_words
+from biogrip.own_traces.words import POSTERIOR_OF_REJECTED, evidence_in_words
 from biogrip.products.files.parquet import column_names, read_columns
 from tests.helpers.places import EXAMPLE
 from tests.helpers.problems import clean
@@ -138,3 +138,23 @@ def test_evidence_is_told_with_what_is_near_and_what_is_not_to_be_relied_on() ->
         "The evidence is highest for the Burgers fluid; less than 20 times lower is that of "
         "Maxwell liquid. Not to be relied on: Maxwell liquid."
     ]
+
+
+def test_the_posterior_of_a_rejected_fit_is_not_shown(
+    trace: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    times, response = np.loadtxt(trace, delimiter=",", skiprows=1).T
+    # A jump of the instrument.
+    jumped = written(
+        tmp_path / "jumped.csv", times, response + 0.5 * response.max() * (times > 300)
+    )
+    config, page = tmp_path / "short.yaml", tmp_path / "page.html"
+    config.write_text(SHORT)
+    options = ["--config", str(config), "--posterior", "--report", str(page)]
+    assert main(["identify", str(jumped), "--model", "liquid_drop", *options]) == 0
+    said = capsys.readouterr().out
+    assert "fit rejected" in said
+    for text in (said, page.read_text()):
+        assert POSTERIOR_OF_REJECTED in text
+        assert "Posterior, median" not in text
+        assert "Posterior: median" not in text

@@ -12,7 +12,8 @@ __version__ = "0.1.0"
 
 _LIBRARY = frozenset(
     (
-        *("INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper", "Identification", "Noise"),
+        *("INSTRUMENTS", "Arm", "CaseProblem", "Diagnosis", "GeneRange", "Gripper"),
+        *("Identification", "Noise"),
         *("Phase", "Sample", "add_noise", "hold", "identify_sample", "judge", "plot", "set_up"),
         "simulate",
     )

@@ -11,9 +11,11 @@ from matplotlib.figure import Figure
 
 from biogrip import __version__
 from biogrip.files import write_text
+from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.one_trace import Identified
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.words import (
+    POSTERIOR_OF_REJECTED,
     evidence_in_words,
     for_a_paper,
     further_notes,
@@ -72,6 +74,7 @@ class Page:
             written_by=f"{WRITTEN_BY} {__version__}",
             labels=labels_of(self._traces),
             in_unit=in_unit,
+            not_shown=POSTERIOR_OF_REJECTED,
         )
         write_text(page, text)
 
@@ -86,7 +89,7 @@ def _figures(identified: Identified) -> dict[str, Figure]:
         "Residuals: over time, autocorrelation, distribution": draw_residuals(fit),
         "Profile likelihoods": draw_profiles("", {}, data),
     }
-    if identified.samples is not None:
+    if identified.samples is not None and data["fit"] != REJECTED:
         figures["Posterior: marginals and pairs of parameters"] = draw_corner(
             problem.searched.parameters, identified.samples, data["posterior"], {}, ""
         )

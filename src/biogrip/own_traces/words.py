@@ -24,6 +24,11 @@ from biogrip.terminal import visible, visible_lines
 STRONG = 3.0
 """Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
 
+POSTERIOR_OF_REJECTED = (
+    "The posterior assumes the model and set-up that are rejected, so it is not shown."
+)
+"""Sentence in the place of the posterior of a rejected fit."""
+
 _COLOURS = {
     DETERMINED: 32,
     BOUNDED_ABOVE: 33,
@@ -59,7 +64,9 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
-    lines += _posterior(found["posterior"]) if "posterior" in found else []
+    if "posterior" in found:
+        rejected = found["fit"] == REJECTED
+        lines += [POSTERIOR_OF_REJECTED] if rejected else _posterior(found["posterior"])
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
 
