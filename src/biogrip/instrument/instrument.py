@@ -25,9 +25,8 @@ class Quantity:
     @property
     def suffix(self) -> str:
         """End of the names of columns and keys: the SI unit."""
-        return "".join(f"_{part}" for part in self.unit.replace("1/", "per ").split()).replace(
-            "N_m", "Nm"
-        )
+        plain = self.unit.replace("1/", "per_").replace(" ", "")
+        return f"_{plain}" if plain else ""
 
     @property
     def column(self) -> str:

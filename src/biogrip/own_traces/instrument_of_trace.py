@@ -63,9 +63,10 @@ def _duration_s(trace: Path, read_as: ReadAs, instrument: Instrument) -> float:
     try:
         time_s = read_recording(trace, read_as.columns(instrument.read)).time_s
     except BiogripError:
-        # Whoever needs the trace reads it again, and says what is wrong with it.
+        # Whoever uses the trace reads it again, and says what is wrong with it.
         return 1.0
-    return float(time_s[-1]) - (read_as.start_s or min(float(time_s[0]), 0.0))
+    lasts = float(time_s[-1]) - (read_as.start_s or min(float(time_s[0]), 0.0))
+    return lasts if lasts > 0 else 1.0
 
 
 def _instrument(merged: Mapping[str, Any], given: Mapping[str, Any]) -> Instrument:

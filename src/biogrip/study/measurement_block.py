@@ -194,9 +194,10 @@ class MeasurementBlock(Block):
         name, *others = self.readings
         for other in others:
             yield (other,), f"does not go with {name}; allowed is one of {', '.join(READINGS)}."
-        key, other_key = ("rotation_unit", "reading_unit")[:: 1 if name == ROTATION.name else -1]
-        if getattr(self, other_key) is not None:
-            yield (other_key,), f"does not go with {name}; allowed is {key}."
+        if name == ROTATION.name and self.reading_unit is not None:
+            yield ("reading_unit",), f"does not go with {name}; allowed is rotation_unit."
+        if name != ROTATION.name and self.rotation_unit is not None:
+            yield ("rotation_unit",), f"does not go with {name}; allowed is reading_unit."
         allowed = INSTRUMENTS[name].read.units
         if self.reading_unit is not None and self.reading_unit not in allowed:
             text = f"found '{self.reading_unit}', allowed are {', '.join(allowed)}."
