@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.results import Fit, scale_of, typical_fit
@@ -18,6 +19,8 @@ from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.uses import every, from_case
 from biogrip.study.study import Case
 
+# Ratio of the longest to the shortest interval from which times are drawn on a logarithmic scale.
+_SPARSER = 30.0
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 
 
@@ -46,6 +49,11 @@ def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
     return factor, unit
 
 
+def _is_over_decades(time_s: Array) -> bool:
+    """Return True for times that are dense at first and sparse at last, after zero."""
+    return bool(time_s[0] > 0 and np.max(np.diff(time_s)) > _SPARSER * np.min(np.diff(time_s)))
+
+
 def _scale(fit: Fit) -> tuple[float, str]:
     """Return factor and unit with a prefix, where the unit of the readings may have one."""
     plain = fit.read.unit.isalpha()
@@ -62,16 +70,21 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     traces.set_ylim(factor * (low - margin), factor * (high + margin))
     drawn.legend(loc="outside upper left", ncols=2)
     traces.set_title(title)
-    residual = factor * (fit.measured_rad - fit.fitted_rad)
+    residual = fit.measured_rad - fit.fitted_rad
+    residual = factor * residual if fit.sd_rad is None else residual / fit.sd_rad
     residuals.plot(fit.time_s, residual, color=MEASURED, **_READINGS)
     if fit.target_rad is not None:
         residuals.plot(fit.time_s, factor * (fit.target_rad - fit.fitted_rad), color=TARGET)
     residuals.axhline(0, color=FITTED, linestyle="--", linewidth=0.8)
     bound = 1.15 * float(np.max(np.abs(residual)))
     residuals.set_ylim(-bound, bound)
-    residuals.set_ylabel(with_unit("residual", unit))
+    residuals.set_ylabel(with_unit("residual", unit) if fit.sd_rad is None else "residual / sd")
     residuals.set_xlabel("time (s)")
     residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
+    if _is_over_decades(fit.time_s):
+        residuals.set_xscale("log")
+        if low > 0:
+            traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))
     drawn.align_ylabels()
     return drawn
 
