@@ -95,8 +95,9 @@ bench: $(BENCH_READY)
 	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
 	$(BENCH_BIN)/python -m benchmarks $(SECTIONS)
 
+# All of it, or with SECTIONS=measured only the measured traces.
 bench-field: $(FIELD_READY)
-	PYTHONPATH=src $(FIELD_BIN)/python -m benchmarks.field
+	PYTHONPATH=src $(FIELD_BIN)/python -m benchmarks.field $(SECTIONS)
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml

@@ -5,13 +5,15 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.field import by_biogrip, fitted
+from benchmarks.field import by_biogrip, fitted, measured
 from benchmarks.field.by_biogrip import OURS
 from benchmarks.field.compared import compared
 from benchmarks.field.elements import Kelvin, Maxwell
 from benchmarks.field.fitted import Fitted, Method
+from benchmarks.field.measured import BIOGRIP, COLUMNS, PYRHEO, TASKS, Answer, Program, Task
 from benchmarks.field.traces import GRIPPER, SAMPLES, Trace, as_compliance
 from biogrip.arrays import Array
+from tests.helpers.power_law import mittag_leffler
 
 
 @pytest.mark.parametrize("branches", SAMPLES)
@@ -95,3 +97,59 @@ def test_what_fails_or_takes_too_long_has_reached_nothing(monkeypatch: pytest.Mo
         assert set(row["parameter_errors"].values()) == {None}
     assert known["reached"] == 2
     assert (known["intervals"], known["intervals_hold"]) == (4, 2)
+
+
+def _task(title: str) -> Task:
+    return next(task for task in TASKS if task.title == title)
+
+
+def test_measured_traces_and_their_steps_are_those_of_the_files() -> None:
+    whole, stretched = _task("HL60 cell, recovery too"), _task("HL60 cell, while stretched")
+    load = (whole.time_s > 1.0) & (whole.time_s < 5.0)
+    np.testing.assert_array_equal(stretched.data, whole.data[load])
+    np.testing.assert_allclose(stretched.time_s, whole.time_s[load] - 1.0, atol=1e-12)
+    # The springpot's compliance by its formula.
+    own = {"k_alpha": 140.0, "alpha": 1.0}
+    np.testing.assert_allclose(stretched.curve(own), stretched.time_s / 140.0, rtol=1e-9)
+
+
+def test_what_maxwell_branches_leave_is_evaluated_exactly() -> None:
+    task = _task("Mucus, Maxwell branches")
+    sample = Maxwell(0.4, np.array([10.0, 0.2]), np.array([0.03, 4.0]))
+    k, c = sample.k, sample.k * sample.tau
+    given = {"k_p": 0.4, "k_1": k[0], "k_2": k[1], "c_1": c[0], "c_2": c[1]}
+    np.testing.assert_allclose(task.curve(given), sample.compliance(task.time_s), rtol=1e-9)
+
+
+def test_what_pyrheo_printed_leaves_more_than_it_said_and_than_ours() -> None:
+    task = _task("Mucus")
+    (row,) = measured.compared((PYRHEO,), task, rounds=1)
+    assert PYRHEO.fit(task).curve == pytest.approx(row["drawn"] * row["best"])
+    k, a, c = (row["said"][name][0] for name in ("k_alpha", "alpha", "c_p"))
+    curve = [t / c * mittag_leffler(1 - a, 2.0, k / c * t ** (1 - a)) for t in task.time_s]
+    left = float(np.sum((np.array(curve) / task.data - 1) ** 2))
+    assert row["exact"] * row["best"] == pytest.approx(left, rel=1e-6)
+    assert row["exact"] > row["drawn"] > 1
+
+
+def test_what_a_trace_does_not_determine_is_said_by_each() -> None:
+    def wrong(task: Task) -> Answer:
+        raise ValueError
+
+    def loose(task: Task) -> Answer:
+        values = {"k_p": 80.4, "k_alpha": 1e3, "alpha": 0.99}
+        said = {"k_p": (80.4, 78.0, 82.0), "k_alpha": (1e3, None, None), "alpha": (0.99, 0.5, None)}
+        return Answer(task.curve(values), values, lambda: said)
+
+    programs = [
+        BIOGRIP,
+        *(Program(n, f, BIOGRIP.takes, BIOGRIP.measure) for n, f in (("a", loose), ("b", wrong))),
+    ]
+    rows = measured.compared(programs, _task("Cellulose hydrogel"), rounds=1)
+    ours, a, b = ({head: cell(row) for head, cell in COLUMNS.items()} for row in rows)
+    assert "alpha not determined" in ours["what it says (95 % limits)"]
+    assert a["what it says (95 % limits)"] == (
+        "k_p 80.40 (78.00 to 82.00); k_alpha 1,000, no limits; alpha 0.9900 (0.5000 to open)"
+    )
+    assert (b["leaves, of the best"], b["by its own curve"]) == ("–", "–")
+    assert b["what it says (95 % limits)"] == "ValueError 1 times"

@@ -1,6 +1,7 @@
 """Runs the comparison and writes `benchmarks/field/results`."""
 
 import os
+import sys
 
 # One thread for every competitor. Libraries read this once, while they are imported.
 for variable in (
@@ -17,4 +18,4 @@ os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_paralleli
 if __name__ == "__main__":
     from benchmarks.field.report import run
 
-    run()
+    run(sys.argv[1:])

@@ -9,9 +9,11 @@ from benchmarks.field import by_biogrip, by_lmfit, by_mcreep, by_pyvisco, by_rhe
 from benchmarks.field.by_biogrip import OURS
 from benchmarks.field.compared import compared
 from benchmarks.field.fitted import CREEP, TIME_LIMIT_S
+from benchmarks.field.measured import BIOGRIP, PYRHEO, measured_section
+from benchmarks.field.measured_peers import PEERS as MEASURED_BY
 from benchmarks.field.traces import DURATION_S, INTERVALS, NOISE, SAMPLES
 from benchmarks.machine import machine
-from benchmarks.section import Row, markdown, number, times_ours
+from benchmarks.section import Row, Section, markdown, number, renewed, times_ours, written
 from benchmarks.timing import clocked
 from biogrip.files import write_text
 
@@ -58,23 +60,42 @@ medians (lowest to highest). A fit may take {TIME_LIMIT_S:g} s, and so may its l
 takes longer has not reached anything."""
 
 
-def run() -> None:
-    """Run the comparison and write `benchmarks/field/results`."""
+def run(sections: Sequence[str] = ()) -> None:
+    """Run the comparison and write `benchmarks/field/results`.
+
+    Parameters
+    ----------
+    sections
+        Of the report; what it has of the others stays. By default all are run.
+    """
+    if unknown := set(sections) - {"measured"}:
+        raise SystemExit(f"found {min(unknown)}, allowed is measured.")
+    page, numbers = RESULTS / "field.md", RESULTS / "field.json"
+    rows = [] if sections else _simulated()
+    described = machine(PEERS)
+    measured = measured_section((BIOGRIP, *MEASURED_BY, PYRHEO))
+    if sections:
+        text = renewed(page.read_text(encoding="utf-8"), described, [measured])
+        found = json.loads(numbers.read_text(encoding="utf-8"))
+        found |= {"measured": measured.rows, "machine_of": {"measured": described}}
+    else:
+        text = report(described, rows, measured)
+        found = {"machine": described, "field": rows, "measured": measured.rows}
+    write_text(page, text)
+    write_text(numbers, json.dumps(found, indent=1) + "\n")
+    print(f"\n{text}")
+
+
+def _simulated() -> list[Row]:
     rows: list[Row] = []
     for branches in SAMPLES:
         seconds, found = clocked(partial(compared, METHODS, OURS, branches, COUNT))
         print(f"{_branches(branches)}: {seconds:.0f} s", flush=True)
         rows += found
-    described = machine(PEERS)
-    text = report(described, rows)
-    write_text(RESULTS / "field.md", text)
-    write_text(
-        RESULTS / "field.json", json.dumps({"machine": described, "field": rows}, indent=1) + "\n"
-    )
-    print(f"\n{text}")
+    return rows
 
 
-def report(described: Mapping[str, str], rows: Sequence[Row]) -> str:
+def report(described: Mapping[str, str], rows: Sequence[Row], measured: Section) -> str:
     """Return everything as Markdown."""
     parts = [_INTRODUCTION, markdown([described])]
     for branches in SAMPLES:
@@ -82,7 +103,7 @@ def report(described: Mapping[str, str], rows: Sequence[Row]) -> str:
         cells = [{head: cell(row) for head, cell in COLUMNS.items()} for row in own]
         parts += [f"## {_branches(branches).capitalize()}", markdown(cells)]
     parts += ["## Where a peer is better", _better(rows), "## Failures", _failures(rows)]
-    return "\n\n".join(parts) + "\n"
+    return "\n\n".join([*parts, written(measured)]) + "\n"
 
 
 def _limits_share(row: Row) -> float | None:

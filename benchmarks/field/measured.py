@@ -1,0 +1,399 @@
+"""Measured creep and relaxation (`data/measured`), and what every program leaves of them.
+
+What a fit leaves is evaluated exactly, by biogrip, from the parameters that a program prints, and
+beside it by the curve that the program draws. Programs weigh readings differently, some with no way
+to change that: a fit is compared with the best one in its own measure.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from benchmarks.field.fitted import TIME_LIMIT_S, kept_in_bounds
+from benchmarks.section import Row, Section, number
+from benchmarks.timing import Timed, clocked
+from biogrip.arrays import Array, BoolArray
+from biogrip.identifiability.verdicts import DETERMINED
+from biogrip.identify.answer import Identification
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.library import Phase, Sample, hold, identify_sample, judge, simulate
+from biogrip.own_traces.search_ranges import ranges_of
+from biogrip.products.files.traces import Measurements
+from biogrip.products.stages.recording import read_checked
+from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import Case
+
+Result = TypeVar("Result")
+
+ROOT = Path(__file__).parents[2]
+CONFIGS = ("config/config.yaml", "config/measured.yaml")
+ROUNDS = 3
+
+KNOWN, RELATIVE, EQUAL = "known", "relative", "equal"
+"""What readings are divided by before their squares are summed: their known standard deviations,
+themselves, or nothing."""
+
+Said = Mapping[str, tuple[float | None, float | None, float | None]]
+"""Value and limits by parameter, as a program prints them; what it does not give is none."""
+
+
+@cache
+def _recorded(name: str) -> tuple[Case, Measurements]:
+    files = [ROOT / file for file in CONFIGS]
+    case = load_study(read_configs(files), files).cases[name]
+    file = ROOT / f"data/measured/{name}.csv"
+    return case, read_checked(file, case.gripper, case.problem, case.columns)
+
+
+@dataclass(frozen=True)
+class Task:
+    """A measured trace and the model to fit.
+
+    Parameters
+    ----------
+    title
+        In the table.
+    name
+        Case of `config/measured.yaml`.
+    sample
+        The model.
+    fixed
+        What of it is known.
+    load_s
+        Start and end of the stretch that is taken for a step, if not the whole recording is.
+    """
+
+    title: str
+    name: str
+    sample: Sample
+    fixed: Mapping[str, float] = field(default_factory=dict)
+    load_s: tuple[float, float] | None = None
+
+    @cached_property
+    def _chosen(self) -> BoolArray:
+        time_s = _recorded(self.name)[1].time_s
+        start, end = self.load_s or (-np.inf, np.inf)
+        chosen: BoolArray = (time_s > start) & (time_s < end)
+        return chosen
+
+    @property
+    def time_s(self) -> Array:
+        """Times since the step, (n_samples,)."""
+        start = self.load_s[0] if self.load_s else 0.0
+        return np.asarray(_recorded(self.name)[1].time_s[self._chosen] - start)
+
+    @property
+    def data(self) -> Array:
+        """Readings in SI units, (n_samples,)."""
+        return np.asarray(_recorded(self.name)[1].rotation_rad[0][self._chosen])
+
+    def deviations(self, measure: str) -> Array | None:
+        """Return what readings are divided by, (n_samples,), or none if by nothing."""
+        if measure == RELATIVE:
+            return np.abs(self.data)
+        return _recorded(self.name)[1].sd_rad if measure == KNOWN else None
+
+    def experiment(self, measure: str) -> CaseProblem:
+        """Return what biogrip is told, with the search ranges of `biogrip identify`."""
+        given = _recorded(self.name)[0].problem
+        phases: tuple[Phase, ...] = given.phases
+        if self.load_s:
+            phases = (hold(self.load_s[1] - self.load_s[0], 1.0),)
+        told = CaseProblem(
+            given.gripper,
+            phases,
+            given.ranges,
+            replace(self.sample, per_area=given.sample.per_area),
+            self.fixed,
+            given.instrument,
+        ).weighted(self.deviations(measure))
+        return replace(told, ranges={**given.ranges, **ranges_of(told, self.time_s, self.data)})
+
+    def curve(self, parameters: Mapping[str, float]) -> Array:
+        """Return the exact response of a sample, (n_samples,)."""
+        return simulate(self.experiment(EQUAL), {**self.fixed, **parameters}, self.time_s)
+
+    def left(self, curve: Array, measure: str) -> float:
+        """Return the sum of squares that a curve leaves; infinite for no number."""
+        deviations = self.deviations(measure)
+        rest = (curve - self.data) / (1.0 if deviations is None else deviations)
+        found = float(rest @ rest)
+        return found if np.isfinite(found) else np.inf
+
+
+STRETCH_S = (1.0, 5.0)
+_NO_DAMPER = {"c_p": 0.0}
+TASKS = (
+    Task("HL60 cell, recovery too", "hl60", Sample("springpot")),
+    Task("HL60 cell, while stretched", "hl60", Sample("springpot"), load_s=STRETCH_S),
+    Task("Mucus", "mucus", Sample("springpot_beside_damper")),
+    Task("Mucus, Maxwell branches", "mucus", Sample("generalized_maxwell", 2), _NO_DAMPER),
+    Task("Fish muscle", "fish_muscle", Sample("springpots_in_series")),
+    Task(
+        "Fish muscle, Maxwell branches", "fish_muscle", Sample("generalized_maxwell", 3), _NO_DAMPER
+    ),
+    Task("Fish muscle, a damper beside", "fish_muscle", Sample("fractional_jeffreys")),
+    Task("Cellulose hydrogel", "cellulose_hydrogel", Sample("fractional_kelvin_voigt")),
+    Task(
+        "Cellulose hydrogel, Maxwell branches",
+        "cellulose_hydrogel",
+        Sample("generalized_maxwell", 2),
+        _NO_DAMPER,
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a program found.
+
+    Parameters
+    ----------
+    curve : (n_samples,)
+        What it draws through the readings, or what it says that this leaves.
+    parameters
+        By name, if the program has the model; else none.
+    said
+        Returns what it prints of its parameters.
+    """
+
+    curve: Array | float
+    parameters: Mapping[str, float] | None
+    said: Callable[[], Said]
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program and the tasks that it can take.
+
+    Parameters
+    ----------
+    name
+        In the table.
+    fit
+        Identifies the sample of a task.
+    takes
+        Whether a task is one for it.
+    measure
+        Of its fit to a task.
+    """
+
+    name: str
+    fit: Callable[[Task], Answer]
+    takes: Callable[[Task], bool]
+    measure: Callable[[Task], str]
+    timed: bool = True
+
+
+def natural(task: Task) -> str:
+    """Return the measure of the config: with the standard deviations of the file, if it has any."""
+    return EQUAL if task.deviations(KNOWN) is None else KNOWN
+
+
+def by_biogrip(task: Task, measure: str | None = None) -> Answer:
+    """Identify a sample as `identify_sample` and `judge` do."""
+    experiment = task.experiment(measure or natural(task))
+    found = identify_sample(experiment, task.time_s, task.data)
+    value = dict(zip(experiment.searched.names, map(float, found.parameters), strict=True))
+    return Answer(task.curve(value), value, partial(_judged, task, experiment, found))
+
+
+def _judged(task: Task, experiment: CaseProblem, found: Identification) -> Said:
+    diagnosis = judge(experiment, task.time_s, task.data, found)
+    return {
+        f.quantity.label: (f.value if f.verdict == DETERMINED else None, f.low, f.high)
+        for f in diagnosis.findings
+        if f.quantity.label in experiment.searched.names
+    }
+
+
+OURS = "biogrip"
+BIOGRIP = Program(OURS, by_biogrip, lambda task: True, natural)
+
+# Parameters and sums of relative squares that pyRheo's demonstrations print; see data/measured.
+_PRINTED: Mapping[str, tuple[Mapping[str, float], float]] = {
+    "mucus": (
+        {"k_alpha": 0.5592623161935315, "alpha": 0.10559343301296215, "c_p": 0.311345334419145},
+        0.001431460447772356,
+    ),
+    "fish_muscle": (
+        {
+            "k_alpha": 869957.8100803907,
+            "alpha": 0.6743835722938449,
+            "k_beta": 22074.487016914965,
+            "beta": 0.1100620057209222,
+        },
+        0.01075590006240943,
+    ),
+}
+
+
+def by_pyrheo(task: Task) -> Answer:
+    """Return what pyRheo's demonstrations print, with its Padé approximation `Pade54`."""
+    parameters, left = _PRINTED[task.name]
+    return Answer(left, parameters, lambda: {n: (v, None, None) for n, v in parameters.items()})
+
+
+def _is_pyrheos(task: Task) -> bool:
+    return task.name in _PRINTED and set(task.sample.model.names) == set(_PRINTED[task.name][0])
+
+
+PYRHEO = Program("pyRheo, as published", by_pyrheo, _is_pyrheos, lambda task: RELATIVE, timed=False)
+
+
+@dataclass
+class _Runs:
+    fit_s: list[float] = field(default_factory=list)
+    whole_s: list[float] = field(default_factory=list)
+    answer: Answer | None = None
+    said: Said | None = None
+    failures: Counter[str] = field(default_factory=Counter)
+
+    def fit(self, program: Program, task: Task) -> None:
+        """Fit a task, and keep what came of it."""
+        fit_s, self.answer = clocked(partial(self._attempt, partial(program.fit, task)))
+        self.fit_s.append(fit_s)
+
+    def ask(self) -> None:
+        """Have it say what it prints of the parameters."""
+        said = self.answer.said if self.answer else dict
+        said_s, self.said = clocked(partial(self._attempt, said))
+        self.whole_s.append(self.fit_s[-1] + said_s)
+
+    def _attempt(self, call: Callable[[], Result]) -> Result | None:
+        """Call others' code: whatever it raises is a result, too."""
+        try:
+            with kept_in_bounds():
+                return call()
+        except Exception as error:
+            self.failures[type(error).__name__] += 1
+            return None
+
+
+def compared(programs: Sequence[Program], task: Task, rounds: int = ROUNDS) -> list[Row]:
+    """Fit a task by every program that takes it, in turn, after a warm-up; a row a program."""
+    own = [program for program in programs if program.takes(task)]
+    runs = {program.name: _Runs() for program in own}
+    for program in own:
+        _Runs().fit(program, task)
+    for _ in range(rounds):
+        for program in own:
+            runs[program.name].fit(program, task)
+            runs[program.name].ask()
+    exact = {name: _exact(task, run.answer) for name, run in runs.items()}
+    timed = {
+        "fit": Timed({name: np.array(run.fit_s) for name, run in runs.items()}),
+        "whole": Timed({name: np.array(run.whole_s) for name, run in runs.items()}),
+    }
+    best = {
+        measure: min(_left(task, curve, measure) for curve in (*exact.values(), ours))
+        for measure, ours in _our_curves(task, {program.measure(task) for program in own}).items()
+    }
+    rows: list[Row] = []
+    for program in own:
+        measure, run = program.measure(task), runs[program.name]
+        row: Row = {
+            "task": task.title,
+            "program": program.name,
+            "measure": measure,
+            "best": best[measure],
+            "drawn": _over(best[measure], _drawn(task, run.answer, measure)),
+            "exact": _over(best[measure], _left(task, exact[program.name], measure)),
+            "said": {n: list(of) for n, of in (run.said or {}).items()},
+            "failures": dict(run.failures),
+        }
+        if program.timed:
+            for part, times in timed.items():
+                row |= {f"{part}_{k}": x for k, x in times.against(program.name, OURS).items()}
+        rows.append(row)
+    return rows
+
+
+def _our_curves(task: Task, measures: Iterable[str]) -> dict[str, Array]:
+    return {measure: np.asarray(by_biogrip(task, measure).curve) for measure in sorted(measures)}
+
+
+def _exact(task: Task, answer: Answer | None) -> Array | None:
+    if answer is None or answer.parameters is None:
+        return None
+    return task.curve(answer.parameters)
+
+
+def _left(task: Task, curve: Array | None, measure: str) -> float:
+    return np.inf if curve is None else task.left(curve, measure)
+
+
+def _drawn(task: Task, answer: Answer | None, measure: str) -> float:
+    if answer is None:
+        return np.inf
+    return answer.curve if isinstance(answer.curve, float) else task.left(answer.curve, measure)
+
+
+def _over(best: float, left: float) -> float | None:
+    """JSON has no infinity."""
+    return left / best if np.isfinite(left) else None
+
+
+def measured_section(programs: Sequence[Program]) -> Section:
+    """Compare the programs on all tasks."""
+    rows = [row for task in TASKS for row in compared(programs, task)]
+    return Section("measured", "Measured traces", TEXT, COLUMNS, rows)
+
+
+def _ratio(value: float | None) -> str:
+    return "–" if value is None else number(value, 5)
+
+
+def _time(row: Row, key: str) -> str:
+    return number(row[key], 2) if key in row else ""
+
+
+def _says(row: Row) -> str:
+    said = "; ".join(f"{n} {_limited(*of)}" for n, of in row["said"].items())
+    failed = ", ".join(f"{kind} {count} times" for kind, count in row["failures"].items())
+    return "; ".join(filter(None, [said, failed]))
+
+
+def _limited(value: float | None, low: float | None, high: float | None) -> str:
+    ends = [None if x is None or not np.isfinite(x) else number(x, 4) for x in (low, high)]
+    between = f"({ends[0] or 'open'} to {ends[1] or 'open'})"
+    if value is None:
+        return between if any(ends) else "not determined"
+    return f"{number(value, 4)} {between}" if any(ends) else f"{number(value, 4)}, no limits"
+
+
+COLUMNS: dict[str, Callable[[Row], str]] = {
+    "trace, model": lambda row: row["task"] if row["program"] == OURS else "",
+    "program": lambda row: row["program"],
+    "weights": lambda row: row["measure"],
+    "leaves, of the best": lambda row: _ratio(row["exact"]),
+    "by its own curve": lambda row: _ratio(row["drawn"]),
+    "time of the fit (ms)": lambda row: _time(row, "fit_time_ms"),
+    "times ours": lambda row: _time(row, "fit_times_ours"),
+    "with limits, times ours": lambda row: _time(row, "whole_times_ours"),
+    "what it says (95 % limits)": _says,
+}
+
+TEXT = f"""\
+The traces of `data/measured` with the models that were published for them, with Maxwell branches,
+and, of a step of strain, with a damper beside, which no reading tells anything of
+(`benchmarks/field/measured.py`; the other programs: `measured_peers.py`). *Leaves*: sum of squares
+over the least that any program with the model leaves in the same weights, evaluated exactly from
+the printed parameters, and by the curve that the program draws. *Weights*: readings are divided by
+their known standard deviations, by themselves (relative), or equal. What a program cannot change of
+its weights is no fault of its search, so each is compared in its own; biogrip is fitted in all, and
+shown in those of `config/measured.yaml`. A dash: it lacks the model, or its optimum is not one of
+it. mcreep's branches have a damper in series more.
+
+RheoJAX takes no standard deviations; it and mcreep take steps only, so HL60's recovery is for
+biogrip and for lmfit, whose user writes the curve: here it is biogrip's. lmfit's limits are of
+`conf_interval`, or, where that fails or takes {TIME_LIMIT_S:g} s, 1.96 of its standard errors.
+pyRheo cannot be installed from PyPI; its rows are what its demonstrations of 2026-02 print, with
+the approximation `Pade54` of Mittag-Leffler functions, and its hydrogel is a mean of ten others.
+Parameters are named as the program names them. Times are medians of {ROUNDS} rounds after a
+warm-up."""
