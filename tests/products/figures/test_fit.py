@@ -31,5 +31,5 @@ def test_residuals_of_weighted_readings_are_in_standard_deviations() -> None:
     fit = relaxing(times, np.full(50, 0.5))
     _, residuals = draw_fit(fit, "fit", "").axes
     assert residuals.get_ylabel() == "residual / sd"
-    points = residuals.lines[0].get_ydata()
+    points = np.asarray(residuals.lines[0].get_ydata(), dtype=float)
     np.testing.assert_allclose(points, (fit.measured_rad - fit.fitted_rad) / 0.5)
