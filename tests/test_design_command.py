@@ -395,7 +395,7 @@ def one_torque(inputs: DesignInputs) -> Torque:
             SLOW.replace("candidates: 128", "candidates: 128, quantities: [c_p]"),
             [],
             "no torque of steps with which readings at 20 Hz tell c_p, even to a factor of e to "
-            "the 10; allowed are a faster camera (`fastest_Hz`)",
+            "the 10; allowed are faster readings (`fastest_Hz`)",
         ),
         (ASKED, ["--offset"], "found options of a trace, allowed are these with --after only"),
         (

@@ -11,9 +11,11 @@ from biogrip.design.views import Views
 from biogrip.design.waveform import Limits, Waveform, hold, linear, swinging
 from biogrip.experiment.protocol import Phase, load, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import NO_ARMS, Gripper
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.ringing import ringing_responses
+from biogrip.response.sensitivity import linear_responses
 
 MODEL = MODELS["generalized_maxwell"]
 SAMPLES = np.array([[35.0, 12.3, 299.9, 1e-3], [9.5, 1e-4, 10.0, 1e-4]])
@@ -31,7 +33,8 @@ WAVEFORMS = {
 def phases_of(waveform: Waveform) -> tuple[Phase, ...]:
     frequencies = 1 / waveform.periods_s
     columns = (waveform.durations_s, waveform.levels, waveform.ends, waveform.amplitudes)
-    loads = [load(*row) for row in zip(*columns, frequencies, strict=True)]
+    rows = zip(*columns, frequencies, strict=True)
+    loads = [load(*most, amplitude or None, frequency) for *most, amplitude, frequency in rows]
     pairs = zip(waveform.durations_s, loads, strict=True)
     return tuple(Phase(duration, one, one) for duration, one in pairs)
 
@@ -65,6 +68,39 @@ def test_against_responses(request: pytest.FixtureRequest, arms: str, name: str)
             )
             turned = ringing_responses(gripper, MODEL, torque, end, sample[None])[0, 0, 0]
             assert moving.last_rotation[row, k] == pytest.approx(turned, rel=1e-7)
+
+
+# Springs in Pa; a sample that flows, one that a load does not strain at once, one of many branches.
+WITHOUT_ARMS = {
+    "zener_maxwell": [300.0, 200.0, 900.0],
+    "maxwell": [300.0, 900.0],
+    "kelvin_voigt": [300.0, 900.0],
+    "burgers": [300.0, 900.0, 200.0, 50.0],
+    "springpot": [120.0, 0.3],
+}
+
+
+@pytest.mark.parametrize("waveform", WAVEFORMS)
+@pytest.mark.parametrize("name", WITHOUT_ARMS)
+@pytest.mark.parametrize("reading", ["strain", "stress"])
+def test_without_arms_against_responses(reading: str, name: str, waveform: str) -> None:
+    """A slowest share of 1e-7 is the error, relative to the largest response."""
+    instrument, model = INSTRUMENTS[reading], MODELS[name]
+    sample = np.array([WITHOUT_ARMS[name]])
+    elapsed = np.geomspace(1e-4, 0.015, 20)
+    views = Views(NO_ARMS, model, sample, np.append(elapsed, 30.0), instrument)
+    moving = views.under(WAVEFORMS[waveform])
+    view = moving.respond(np.arange(4), elapsed)
+    held = torque_history(phases_of(WAVEFORMS[waveform]), deforms=instrument.deforms)
+    times = (held.time_s[:, None] + elapsed).ravel()
+    exact = linear_responses(NO_ARMS, model, held, times, sample, inertia=False)[0]
+    exact = exact.reshape(len(exact), 4, -1)
+    peaks = np.abs(exact).max(axis=(1, 2), keepdims=True)
+    np.testing.assert_allclose(view.rotation[0], exact[0], atol=1e-6 * peaks[0, 0, 0])
+    np.testing.assert_allclose(view.sensitivity[0] / peaks[0], exact[1:] / peaks[0], atol=1e-6)
+    ends = np.nextafter(held.time_s + DURATIONS, 0)
+    last = linear_responses(NO_ARMS, model, held, ends, sample, inertia=False)[0, 0]
+    np.testing.assert_allclose(moving.last_rotation[0], last, atol=1e-6 * peaks[0, 0, 0])
 
 
 @pytest.mark.parametrize("name", SHAPES)

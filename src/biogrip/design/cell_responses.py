@@ -28,7 +28,8 @@ class CellResponses:
     turned_rad: float
     """Largest rotation."""
     pull: float
-    """Largest shortfall of a sample's force below its margin, relative to its largest."""
+    """Largest shortfall of a sample's force below its margin, relative to its largest; without jaws
+    0."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ def compute_cell_responses(
         np.concatenate([part.sensitivity for part in parts], axis=2),
         np.concatenate([part.capacity for part in parts]),
         max(turned, float(np.max(np.abs(moving.last_rotation)))),
-        float(np.max((margin - lowest) / largest[:, None])),
+        float(np.max((margin - lowest) / largest[:, None])) if views.instrument.has_jaws else 0.0,
     )
 
 

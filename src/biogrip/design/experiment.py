@@ -7,11 +7,12 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.waveform import Limits
-from biogrip.experiment.protocol import Phase, TorqueHistory
+from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import SampleModel
 from biogrip.experiment.sampling import Sampling
-from biogrip.instrument.gripper import Gripper
-from biogrip.response.ringing import ringing_responses
+from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.instrument import Instrument
+from biogrip.response.sensitivity import linear_responses
 
 Experiment = tuple[tuple[Phase, ...], Sampling]
 """Protocol and sampling."""
@@ -34,9 +35,9 @@ class DesignInputs:
     parameters: Array
     """Parameters of the plausible samples, (n, n_parameters)."""
     noise_rad: float
-    """Standard deviation of the sensor's noise."""
+    """Standard deviation of the sensor's noise, in the unit of what is read."""
     samples: int
-    """Number of readings of the rotation."""
+    """Number of readings."""
     fastest_Hz: float
     """Largest number of readings per second."""
     limits: Limits
@@ -44,9 +45,9 @@ class DesignInputs:
     shapes: tuple[str, ...]
     """Names in `biogrip.design.shapes.SHAPES` of the torque's allowed families."""
     largest_Nm: float
-    """Largest torque."""
+    """Largest torque, or what else is held."""
     stroke_rad: float
-    """Largest rotation of the arms."""
+    """Largest rotation of the arms, infinite without them."""
     criterion: Criterion
     """Criterion to be minimized."""
     before: Array
@@ -55,10 +56,23 @@ class DesignInputs:
     `NO_BOUND`."""
     out_of_reach: tuple[int, ...] = ()
     """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
+    instrument: Instrument = GRIPPER
+    """What is held and read."""
+
+    def history(self, phases: tuple[Phase, ...]) -> TorqueHistory:
+        """Return what phases hold against time."""
+        return torque_history(phases, deforms=self.instrument.deforms)
 
     def sensitivities(self, torque: TorqueHistory, time_s: Array) -> Array:
-        """Compute sensitivities with inertia over the noise, (n, n_parameters, n_times)."""
-        rows = ringing_responses(self.gripper, self.model, torque, time_s, self.parameters)
+        """Compute sensitivities over the noise, arms with inertia: (n, n_parameters, n_times)."""
+        rows = linear_responses(
+            self.gripper,
+            self.model,
+            torque,
+            time_s,
+            self.parameters,
+            inertia=self.instrument.has_jaws,
+        )
         return rows[:, 1:] / self.noise_rad
 
     def bounds(self, information: Array) -> Array:

@@ -90,7 +90,9 @@ def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
 
 
 def presses(inputs: DesignInputs, phases: Sequence[Phase]) -> bool:
-    """Return True if the jaws press all plausible samples at all instants that are checked."""
+    """Return True if the jaws, if any, press all plausible samples at all instants checked."""
+    if not inputs.instrument.has_jaws:
+        return True
     network = inputs.model.network(inputs.parameters)
     _, force = forces(inputs.gripper, network, phases)
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
@@ -108,7 +110,7 @@ def sampling_problem(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Samplin
     order = np.argsort(middle, kind="stable")
     sensitivity = np.empty((*inputs.parameters.shape, len(middle)))
     times_s = middle[order] / inputs.fastest_Hz
-    sensitivity[..., order] = inputs.sensitivities(torque_history(phases), times_s)
+    sensitivity[..., order] = inputs.sensitivities(inputs.history(phases), times_s)
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
     return SamplingProblem(each, starts, sensitivity, capacity)
 
@@ -136,7 +138,7 @@ def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
     few = in_few_bins(sensitivity, best.samples, capacity, _late(problem.each), inputs.before)
     counts = whole(few, capacity)
     bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
-    history = torque_history(phases)
+    history = inputs.history(phases)
     rows = inputs.sensitivities(history, Sampling(bursts=bursts).over(history.end_s))
     information = compute_information(rows) + inputs.before
     return Plan(phases, bursts, information, best.gap)

@@ -48,7 +48,9 @@ class TorqueSearch:
         self._inputs, self._shape = inputs, shape
         self._time_bins = time_bins(round(inputs.limits.longest_s * inputs.fastest_Hz), _GROWTH)
         elapsed_s = self._time_bins.middle / inputs.fastest_Hz
-        self._views = Views(inputs.gripper, inputs.model, inputs.parameters, elapsed_s)
+        self._views = Views(
+            inputs.gripper, inputs.model, inputs.parameters, elapsed_s, inputs.instrument
+        )
 
     def torque(self, shares: Array) -> Torque:
         """Return the torque of some shares, as large as limits of torque and stroke allow."""

@@ -8,10 +8,24 @@ from pydantic import Field
 
 from biogrip.design.criteria import CRITERIA, OVER
 from biogrip.design.shapes import SHAPES
+from biogrip.instrument.instrument import Instrument
 from biogrip.keys import Block, Distinct, OneOf, Problem
+
+NOISES = ("noise_rad", "noise_m", "noise_strain", "noise_N", "noise_Pa")
+_VOLTAGE = "largest_voltage_V"
+LARGEST = (
+    "largest_torque_Nm",
+    _VOLTAGE,
+    "largest_force_N",
+    "largest_stress_Pa",
+    "largest_displacement_m",
+    "largest_strain",
+)
 
 # Shortest duration of a step by default, readings in it by default, and its fewest readings.
 _SHORTEST_S, _READINGS, _FEWEST = 0.01, 10, 2
+
+_Size = Annotated[float | None, Field(gt=0, le=1e12)]
 
 _Ends = Annotated[
     tuple[Annotated[float, Field(gt=0, le=1e12)], ...], Field(min_length=2, max_length=2)
@@ -30,20 +44,36 @@ class SequenceSettings(Block):
 
 @dataclass(frozen=True, kw_only=True)
 class DesignSettings(Block):
-    """Settings of `biogrip design`, which searches for the best torque and sampling times."""
+    """Settings of `biogrip design`, which searches for what to hold and when to read."""
 
-    noise_rad: Annotated[float, Field(ge=1e-15, le=1.0)]
-    """Standard deviation of the sensor's noise."""
     readings: Annotated[int, Field(ge=10, le=1_000_000)]
     """Total number of readings."""
     fastest_Hz: Annotated[float, Field(ge=1e-3, le=1e9)]
     """Most readings in a second."""
     longest_s: Annotated[float, Field(ge=1e-6, le=1e6)]
     """Duration of the experiment."""
+    noise_rad: Annotated[float | None, Field(ge=1e-15, le=1.0)] = None
+    """Standard deviation of the sensor's noise."""
+    noise_m: _Size = None
+    """The same of a displacement, where the instrument is `creep`."""
+    noise_strain: _Size = None
+    """The same of a strain, likewise."""
+    noise_N: _Size = None
+    """The same of a force, where the instrument is `relaxation`."""
+    noise_Pa: _Size = None
+    """The same of a stress, likewise."""
     largest_torque_Nm: Annotated[float | None, Field(gt=0, le=1.0)] = None
     """Largest torque, as an increment on what closes the jaws onto the sample."""
     largest_voltage_V: Annotated[float | None, Field(gt=0, le=1e4)] = None
     """Largest voltage, instead; counted like a protocol's."""
+    largest_force_N: _Size = None
+    """Largest force, where the instrument is `creep`."""
+    largest_stress_Pa: _Size = None
+    """Largest stress, likewise."""
+    largest_displacement_m: _Size = None
+    """Largest displacement, where the instrument is `relaxation`."""
+    largest_strain: _Size = None
+    """Largest strain, likewise."""
     shortest_step_s: Annotated[float | None, Field(ge=1e-6, le=1e6)] = None
     """All steps, ramps and sinusoids last whole multiples of this. By default 0.01 s, or ten
     readings at `fastest_Hz` if these take longer."""
@@ -52,8 +82,8 @@ class DesignSettings(Block):
     shapes: Annotated[
         tuple[Annotated[str, OneOf(SHAPES)], ...], Field(min_length=1), Distinct()
     ] = ("steps",)
-    """Torques that the generator can make: trains of `steps`, of `ramps` that never jump,
-    `sinusoids` on held torques; the best of them is taken. By default steps."""
+    """Torques, or what else is held, that can be made: trains of `steps`, of `ramps` that never
+    jump, `sinusoids` on held torques; the best of them is taken. By default steps."""
     criterion: Annotated[str, OneOf(CRITERIA)] = "largest"
     """Function of the covariance of the logarithms asked for to minimize: `largest`, the largest
     relative bound (the default); `D`, its determinant; `A`, the mean of the squared bounds; `E`,
@@ -79,15 +109,43 @@ class DesignSettings(Block):
             return self.shortest_step_s
         return max(_SHORTEST_S, _READINGS / self.fastest_Hz)
 
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the noise, in the unit of what is read."""
+        return next(value for key in NOISES if (value := getattr(self, key)) is not None)
+
+    def largest(self, instrument: Instrument) -> float | None:
+        """Return the largest value of what an instrument controls, if it is given."""
+        value: float | None = getattr(self, largest_key(instrument))
+        return value
+
+    def instrument_problems(self, instrument: Instrument) -> Iterator[Problem]:
+        """Find keys in another unit than the instrument's."""
+        if instrument.relative:
+            text = f"found readings of {instrument.read.name}, allowed with a design are those of "
+            yield (), f"{text}{'stress' if instrument.deforms else 'strain'}."
+            return
+        own = [largest_key(instrument), *([_VOLTAGE] if instrument.has_jaws else [])]
+        for keys, allowed in ((LARGEST, own), (NOISES, [noise_key(instrument)])):
+            for key in keys:
+                if getattr(self, key) is not None and key not in allowed:
+                    text = f"is not of {instrument.controlled.name} that is held and "
+                    text += f"{instrument.read.name} that is read; allowed is "
+                    yield (key,), f"{text}{' or '.join(allowed)}."
+        if self.sequence and not instrument.has_jaws:
+            yield ("sequence",), f"is of the gripper; leave it out with {instrument.kind}."
+
     def problems(self) -> Iterator[Problem]:
         """Find keys whose values conflict."""
+        for keys, ours in ((NOISES, 1), (LARGEST, 2)):
+            given = [key for key in keys if getattr(self, key) is not None]
+            if len(given) != 1:
+                text = f"found {' and '.join(given) or 'neither'}, allowed is one of "
+                text += f"{' and '.join(keys[:ours])}, or with another instrument of "
+                yield (), f"{text}{', '.join(keys[ours:])}."
         if self.sequence and not self.ranges:
             text = "found no design.ranges, which cells are drawn from; allowed is one at least."
             yield ("sequence",), text
-        given = [key for key in ("largest_torque_Nm", "largest_voltage_V") if getattr(self, key)]
-        if len(given) != 1:
-            text = f"found {' and '.join(given) or 'neither'}, allowed is one of largest_torque_Nm "
-            yield (), f"{text}and largest_voltage_V."
         if self.unit_s * self.fastest_Hz < _FEWEST:
             text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
             yield ("shortest_step_s",), f"{text}{_FEWEST / self.fastest_Hz:g} s."
@@ -108,3 +166,13 @@ class DesignSettings(Block):
         if fastest_Hz > self.fastest_Hz:
             return f", or a fastest_Hz of at least {fastest_Hz:g}"
         return f", or a shortest_step_s of at most {longest_s:g}"
+
+
+def noise_key(instrument: Instrument) -> str:
+    """Return the key of the noise of what an instrument reads."""
+    return f"noise_{instrument.read.column.rpartition('_')[2]}"
+
+
+def largest_key(instrument: Instrument) -> str:
+    """Return the key of the largest value of what an instrument controls."""
+    return f"largest_{instrument.controlled.column}"

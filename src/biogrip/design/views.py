@@ -12,6 +12,14 @@ e the time since, G the mode's response at the step, and q = r / (r^2 + w^2), th
 The left arm's equation gives the force: b F = tau - I phi'' - c phi' - k phi, where a mode's
 phi' is r times its weight, g and the torque together; the torque's own slope drops out, for arms
 with inertia do not start to turn at once.
+
+Without a gripper modes are those of the sample (`biogrip.response.protocol_modes`). Where the
+protocol is a deformation x, a mode's load is h = g + x (`biogrip.response.mode_decay`). With h for
+G + v, the response is
+
+    h e^(r e) + s (e^(r e) - 1) / r + a q [w e^(r e) + w^2/r sin(w e) - w cos(w e)]
+
+which is what the torque and g make together above.
 """
 
 from dataclasses import dataclass
@@ -20,10 +28,18 @@ import numpy as np
 
 from biogrip.arrays import Array, ComplexArray, IntArray
 from biogrip.design.waveform import Waveform
+from biogrip.experiment.protocol import hold as hold_load
+from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import SampleModel
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
+from biogrip.instrument.instrument import Instrument
 from biogrip.response.modes import Modes
+from biogrip.response.protocol_modes import compute_protocol_modes
 from biogrip.response.ringing import ringing_modes
+
+# Share of a mode that decays within the longest time, at least; twice the rounding error over it
+# is lost under ramps.
+_SLOWEST = 1e-7
 
 
 @dataclass(frozen=True)
@@ -55,19 +71,27 @@ class _Factors:
 
 
 class Views:
-    """Modes of plausible samples with inertia, prepared for responses to many torques.
+    """Modes of plausible samples, prepared for responses to many torques.
 
-    Both arms are driven alike. Responses are computed at times after a step, by default those given
-    here, (n_times,).
+    Arms have inertia, and are driven alike. Responses are computed at times after a step, by
+    default those given here, (n_times,).
     """
 
     def __init__(
-        self, gripper: Gripper, model: SampleModel, parameters: Array, elapsed_s: Array
+        self,
+        gripper: Gripper,
+        model: SampleModel,
+        parameters: Array,
+        elapsed_s: Array,
+        instrument: Instrument = GRIPPER,
     ) -> None:
         arm, self.lever_m = gripper.left, gripper.lever_m
+        self.instrument = instrument
         self.stiffness = arm.stiffness_Nm_per_rad
-        self.rates, self.weights, rate_slopes, weight_slopes = _side_by_side(
-            gripper, model, parameters
+        self.rates, self.weights, rate_slopes, weight_slopes = (
+            _side_by_side(gripper, model, parameters)
+            if instrument.has_jaws
+            else _without_arms(model, parameters, instrument, float(elapsed_s[-1]))
         )
         # Factors of a mode's response, and of its derivative by the rate: (n, p, m).
         self.by_growth, self.by_slope = weight_slopes, self.weights[:, None] * rate_slopes
@@ -95,22 +119,33 @@ class Moving:
     def __init__(self, views: Views, waveform: Waveform) -> None:
         self._views, self._waveform = views, waveform
         r = views.rates
-        v, s, a = (
-            part[:, None, None] for part in (waveform.levels, waveform.slopes, waveform.amplitudes)
-        )
+        deforms = views.instrument.deforms
+        steps = waveform.jumps if deforms else waveform.levels
+        v, s, a = (part[:, None, None] for part in (steps, waveform.slopes, waveform.amplitudes))
         self._omega = 2 * np.pi / waveform.periods_s
         w, d = self._omega[:, None, None], waveform.durations_s[:, None, None]
         squares = r**2 + w**2
         q, q_slope = r / squares, (w**2 - r**2) / squares**2
+        # The same, which of a bare damper would leave rounding errors only.
+        lagging = w**2 / squares if deforms else 1 - q * r
         growing = np.expm1(r * d)
         sine, cosine = np.sin(w * d), np.cos(w * d)
         # Response to a step's own slope and sinusoid, whatever came before.
         swung = a * (q * w * (1 + growing) - q * r * sine - q * w * cosine)
         added = s * (growing / r - d) + swung
+        ramped = s * growing / r
+        swayed = a * (q * w * (1 + growing) + lagging * sine - q * w * cosine)
         added_slope = s * (d * (1 + growing) / r - growing / r**2) + a * (
             (q_slope + q * d) * w * (1 + growing) - (q_slope * r + q) * sine - q_slope * w * cosine
         )
-        before, slope_before = _carried(waveform, growing, added, added_slope)
+        before, slope_before = _carried(
+            waveform.durations_s,
+            steps,
+            growing,
+            ramped + swayed if deforms else added,
+            added_slope,
+            deforms=deforms,
+        )
         amplitude = before + v
         zero = np.zeros_like(amplitude)
         self._growth = _Factors(
@@ -126,14 +161,12 @@ class Moving:
             -a * q_slope * w,
         )
         self._pushed = _Factors(
-            s / r, amplitude + a * q * w, zero, zero, zero, a * (1 - q * r), -a * q * w
+            s / r, amplitude + a * q * w, zero, zero, zero, a * lagging, -a * q * w
         )
         last = before + amplitude * growing + added
-        pushed = (
-            amplitude * (1 + growing)
-            + s * growing / r
-            + a * (q * w * (1 + growing) + (1 - q * r) * sine - q * w * cosine)
-        )
+        pushed = amplitude * (1 + growing) + ramped + swayed
+        if deforms:
+            self._growth, last = self._pushed, pushed
         rotation = np.sum(views.weights * last, axis=2).real
         torque = (v + s * d + a * sine)[..., 0]
         force = torque - np.sum(views.inert * pushed, axis=2).real - views.stiffness * rotation
@@ -192,17 +225,49 @@ class Moving:
 
 
 def _carried(
-    waveform: Waveform, growing: ComplexArray, added: ComplexArray, added_slope: ComplexArray
+    durations_s: Array,
+    steps: Array,
+    growing: ComplexArray,
+    added: ComplexArray,
+    added_slope: ComplexArray,
+    *,
+    deforms: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Return responses of modes at each step, and derivatives, (n_steps, n, n_modes)."""
+    """Return responses of modes at each step, and derivatives, (n_steps, n, n_modes).
+
+    Steps are levels or, of what deforms, jumps.
+    """
     reached = np.zeros(growing.shape, dtype=complex)
     slanted = np.zeros_like(reached)
-    before = zip(waveform.durations_s[:-1].tolist(), waveform.levels[:-1].tolist(), strict=True)
-    for k, (duration_s, level) in enumerate(before):
-        amplitude = reached[k] + level
-        reached[k + 1] = reached[k] + amplitude * growing[k] + added[k]
+    before = zip(durations_s[:-1].tolist(), steps[:-1].tolist(), strict=True)
+    for k, (duration_s, step) in enumerate(before):
+        amplitude = reached[k] + step
+        reached[k + 1] = (amplitude if deforms else reached[k]) + amplitude * growing[k] + added[k]
         slanted[k + 1] = (slanted[k] + amplitude * duration_s) * (1 + growing[k]) + added_slope[k]
     return reached, slanted
+
+
+def _without_arms(
+    model: SampleModel, parameters: Array, instrument: Instrument, longest_s: float
+) -> list[ComplexArray]:
+    """Return the modes of all samples under a load or a deformation.
+
+    A mode that hardly changes within the longest time gets a rate with which that is `_SLOWEST`, so
+    that little is lost in rounding. Of creep its flow, weight times rate, remains.
+    """
+    held = torque_history((hold_load(1.0, 1.0),), deforms=instrument.deforms)
+    rates, weights, rate_slopes, weight_slopes = compute_protocol_modes(
+        NO_ARMS, model, held, parameters
+    )
+    weights, weight_slopes = weights[:, 0], weight_slopes[:, :, 0]
+    slowed = np.minimum(rates, -_SLOWEST / longest_s)
+    if not instrument.deforms:
+        share = rates / slowed
+        slow = (share < 1)[:, None]
+        flows = weight_slopes * share[:, None] + (weights / slowed)[:, None] * rate_slopes
+        weight_slopes, weights = np.where(slow, flows, weight_slopes), weights * share
+        rate_slopes = np.where(slow, 0.0, rate_slopes)
+    return [part.astype(complex) for part in (slowed, weights, rate_slopes, weight_slopes)]
 
 
 def _side_by_side(

@@ -52,6 +52,13 @@ class Waveform:
         return float(np.max(np.maximum(self.levels, self.ends) + self.amplitudes))
 
     @property
+    def jumps(self) -> Array:
+        """Jump of the torque at the beginning of each stretch, (n_steps,)."""
+        swung = np.where(self.swings, np.sin(2 * np.pi * self.durations_s / self.periods_s), 0.0)
+        before = self.ends + self.amplitudes * swung
+        return self.levels - np.append(0.0, before[:-1])
+
+    @property
     def in_shares(self) -> "Waveform":
         """The same waveform, scaled to a largest torque of 1."""
         parts = {name: getattr(self, name) / self.highest for name in _TORQUES}

@@ -50,12 +50,13 @@ def _without_worst(inputs: DesignInputs, plan: Plan) -> DesignInputs:
     worst = int(np.argmax(variances))
     targets = tuple(index for index in inputs.criterion.targets if index != worst)
     if not targets:
+        held = inputs.instrument.controlled.name
         names = ", ".join(inputs.model.names[index] for index in inputs.criterion.targets)
         raise BiogripError(
-            f"design: found no torque of {', '.join(inputs.shapes)} with which readings at "
+            f"design: found no {held} of {', '.join(inputs.shapes)} with which readings at "
             f"{inputs.fastest_Hz:g} Hz tell {names}, even to a factor of e to the {NO_BOUND:g}; "
-            "allowed are a faster camera (`fastest_Hz`), more torque or less noise, other `shapes` "
-            "or other `quantities`."
+            f"allowed are faster readings (`fastest_Hz`), more {held} or less noise, other "
+            "`shapes` or other `quantities`."
         )
     known = np.zeros_like(plan.information[0])
     known[worst, worst] = NO_BOUND**-2

@@ -6,6 +6,7 @@ from biogrip import __version__
 from biogrip.experiment.protocol import Phase
 from biogrip.own_design.designed import Designed
 from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.study.protocol_block import further_keys
 
 
 def as_config(designs: Iterable[Designed]) -> str:
@@ -23,25 +24,29 @@ def _case(found: Designed) -> Iterator[str]:
     yield f"  {found.case.name}:"
     yield "    protocol:"
     yield "      phases:"
+    base = found.case.instrument.controlled.column
     for phase in found.plan.phases:
-        keys = ", ".join(f"{key}: {_number(value)}" for key, value in _keys(phase))
+        keys = ", ".join(f"{key}: {_number(value)}" for key, value in _keys(phase, base))
         yield f"        - {{ {keys} }}"
     yield "    measurement:"
-    yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.inputs.noise_rad)} }}"
+    instrument = found.case.instrument
+    note = "" if instrument.has_jaws else f" # of the {instrument.read.column}"
+    yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.inputs.noise_rad)} }}{note}"
     yield "      bursts:"
     for burst in found.plan.bursts:
         start, rate = _number(burst.from_s), _number(burst.rate_Hz)
         yield f"        - {{ from_s: {start}, rate_Hz: {rate}, samples: {burst.samples} }}"
 
 
-def _keys(phase: Phase) -> Iterator[tuple[str, float]]:
+def _keys(phase: Phase, base: str) -> Iterator[tuple[str, float]]:
     """Yield keys and values of a phase; computed values are rounded to 12 digits."""
+    ramp, swing = further_keys(base)
     yield "duration_s", phase.duration_s
-    yield "torque_Nm", phase.left.value_Nm
+    yield base, phase.left.value_Nm
     if phase.left.slope_Nm_per_s:
-        yield "to_torque_Nm", float(f"{phase.left.at(phase.duration_s):.12g}")
+        yield ramp, float(f"{phase.left.at(phase.duration_s):.12g}")
     for harmonic in phase.left.harmonics:
-        yield "amplitude_Nm", harmonic.amplitude_Nm
+        yield swing, harmonic.amplitude_Nm
         yield "frequency_Hz", float(f"{harmonic.frequency_Hz:.12g}")
 
 

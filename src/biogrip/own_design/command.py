@@ -72,7 +72,7 @@ def design(
             )
 
             def tried(count: int, bound: float, title: str = case.title) -> None:
-                progress.doing(f"{title}: {count} torques tried, bound {percent(bound)}")
+                progress.doing(f"{title}: {count} candidates tried, bound {percent(bound)}")
 
             found.append(designed(case, study.study_seed, tried, earlier))
             progress.done()

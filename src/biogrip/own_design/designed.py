@@ -11,8 +11,9 @@ from biogrip.design.earlier_traces import Earlier
 from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
 from biogrip.design.schedule import Plan, forces
 from biogrip.design.within_reach import plan_within_reach
-from biogrip.experiment.protocol import Phase, torque_history
+from biogrip.experiment.protocol import Phase
 from biogrip.experiment.random_streams import stream
+from biogrip.instrument.instrument import Instrument
 from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.study import Case
 
@@ -29,11 +30,11 @@ class Designed:
     """The designed experiment."""
     before: Array
     """Relative bounds for the plausible samples with the config's protocol and sampling, at the
-    same noise and with inertia, (n, n_parameters)."""
+    same noise and of arms with inertia, (n, n_parameters)."""
     after: Array
     """The same with the plan."""
     force_time_s: Array
-    """Times of the jaw force, (n_times,)."""
+    """Times of the jaw force, (n_times,); none without jaws."""
     force_N: Array
     """Jaw force under the plan, (n, n_times)."""
 
@@ -61,11 +62,13 @@ def designed(
     inputs, plan = plan_within_reach(
         make_design_inputs(case, earlier), block.candidates, rng, progress
     )
-    history = torque_history(case.phases)
+    history = inputs.history(case.phases)
     sensitivity = inputs.sensitivities(history, case.sampling.over(history.end_s))
     before = inputs.bounds(compute_information(sensitivity) + inputs.before)
     network = inputs.model.network(inputs.parameters)
-    time_s, force_N = forces(inputs.gripper, network, plan.phases)
+    time_s, force_N = np.zeros(0), np.zeros((len(inputs.parameters), 0))
+    if inputs.instrument.has_jaws:
+        time_s, force_N = forces(inputs.gripper, network, plan.phases)
     after = inputs.bounds(plan.information)
     return Designed(case, inputs, plan, before, after, time_s, force_N)
 
@@ -81,27 +84,35 @@ def in_words(found: Designed) -> str:
         lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
     if found.inputs.out_of_reach:
         lines.append(f"  {left_out(found.inputs)}")
-    lines.append(
-        f"  no other sampling of this torque is better by more than {100 * plan.gap:.2g} %; the "
-        f"jaws press throughout, with at most {1e6 * found.force_N.max():.3g} µN"
-    )
-    return "\n".join(lines)
+    held = found.inputs.instrument.controlled.name
+    best = f"  no other sampling of this {held} is better by more than {100 * plan.gap:.2g} %"
+    return "\n".join([*lines, f"{best}{_pressed(found)}"])
+
+
+def _pressed(found: Designed) -> str:
+    if not found.inputs.instrument.has_jaws:
+        return ""
+    return f"; the jaws press throughout, with at most {1e6 * found.force_N.max():.3g} µN"
 
 
 def left_out(inputs: DesignInputs) -> str:
     """Return a sentence on parameters that no torque determines, and on remedies."""
     names = ", ".join(inputs.model.names[index] for index in sorted(inputs.out_of_reach))
+    held = inputs.instrument.controlled.name
     return (
-        "left out, as no torque that was tried determines it with readings at "
+        f"left out, as no {held} that was tried determines it with readings at "
         f"{inputs.fastest_Hz:g} Hz: {names}; the other bounds allow for a factor of e to the "
-        f"{NO_BOUND:g} in it. A faster camera (fastest_Hz), more torque or other shapes may help."
+        f"{NO_BOUND:g} in it. Faster readings (fastest_Hz), more {held} or other shapes may help."
     )
 
 
 def _setting(found: Designed) -> str:
     plan = found.plan
+    scale, unit = shown_unit(found.inputs.instrument)
+    largest = f"{scale * max(map(largest_Nm, plan.phases)):.4g}"
+    unit = unit or found.inputs.instrument.controlled.name
     return (
-        f"{in_numbers(plan.phases)} of up to {1e9 * max(map(largest_Nm, plan.phases)):.4g} nN m "
+        f"{in_numbers(plan.phases)} of up to {largest} {unit} "
         f"over {plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
     )
 
@@ -120,10 +131,15 @@ def kind(phase: Phase) -> str:
 
 
 def largest_Nm(phase: Phase) -> float:
-    """Return the largest torque of a phase."""
+    """Return the largest torque of a phase, or what else is held."""
     load = phase.left
     swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
     return max(load.value_Nm + swing, load.value_Nm + load.slope_Nm_per_s * phase.duration_s)
+
+
+def shown_unit(instrument: Instrument) -> tuple[float, str]:
+    """Return the factor and the unit with which what is held is shown."""
+    return (1e9, "nN m") if instrument.has_jaws else (1.0, instrument.controlled.unit)
 
 
 def percent(bound: float) -> str:

@@ -1,6 +1,7 @@
 """Figures of a designed experiment: torque, readings, sensitivities and jaw force."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -8,9 +9,8 @@ from matplotlib.figure import Figure
 
 from biogrip.digits import counted
 from biogrip.experiment.protocol import Phase
-from biogrip.own_design.designed import Designed, kind
+from biogrip.own_design.designed import Designed, kind, shown_unit
 from biogrip.products.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, PURPLE, SKY, figure
-from biogrip.response.ringing import ringing_responses
 
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
 _AFTER = 120
@@ -19,28 +19,38 @@ _MOST_DRAWN = 40
 
 
 def draw_experiment(found: Designed) -> Figure:
-    """Draw torque, readings and jaw force over the whole experiment."""
+    """Draw what is held, readings and any jaw force over the whole experiment."""
     plan = found.plan
     history, times = plan.torque, plan.time_s
-    drawn = figure(PAGE_IN, 4.6)
-    upper, middle, lower = drawn.subplots(3, 1, sharex=True, height_ratios=[1.3, 0.7, 1.3])
+    instrument = found.inputs.instrument
+    heights = [1.3, 0.7, 1.3] if instrument.has_jaws else [1.3, 0.7]
+    drawn = figure(PAGE_IN, 4.6 * sum(heights) / 3.3)
+    upper, middle, *lower = drawn.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     _draw_torque(upper, found)
-    upper.set_ylabel("torque (nN m)")
+    upper.set_ylabel(in_unit(instrument.controlled.name, shown_unit(instrument)[1]))
     counts, _ = np.histogram(times, np.linspace(0, history.end_s, 201))
     middle.stairs(counts, np.linspace(0, history.end_s, 201), fill=True, color=SKY)
     middle.set_ylabel("readings")
     middle.set_yscale("symlog", linthresh=1)
-    for row, force in enumerate(found.force_N):
-        lower.plot(found.force_time_s, 1e6 * force, lw=0.6, color=_COLOURS[row % len(_COLOURS)])
-    lower.axhline(0, color=BLACK, lw=0.6)
-    lower.set(ylabel="jaw force (µN)", xlabel="time (s)")
+    for axes in lower:
+        for row, force in enumerate(found.force_N):
+            axes.plot(found.force_time_s, 1e6 * force, lw=0.6, color=_COLOURS[row % len(_COLOURS)])
+        axes.axhline(0, color=BLACK, lw=0.6)
+        axes.set_ylabel("jaw force (µN)")
+    [middle, *lower][-1].set_xlabel("time (s)")
     drawn.align_ylabels()
     return drawn
 
 
+def in_unit(name: str, unit: str) -> str:
+    """Return a name with its unit, if it has one."""
+    return f"{name} ({unit})" if unit else name
+
+
 def _draw_torque(axes: Axes, found: Designed) -> None:
-    """Draw the torque as a line, or as a band where a sinusoid has too many periods."""
+    """Draw what is held as a line, or as a band where a sinusoid has too many periods."""
     history, phases = found.plan.torque, found.plan.phases
+    scale, _ = shown_unit(found.inputs.instrument)
     start_s, times, torques = 0.0, [0.0], [0.0]
     for start_s, phase in zip(history.time_s, phases, strict=True):
         load, instants = phase.left, np.array([0.0, phase.duration_s])
@@ -51,9 +61,9 @@ def _draw_torque(axes: Axes, found: Designed) -> None:
             else:
                 low, high = load.value_Nm + harmonic.amplitude_Nm * np.array([-1, 1])
                 span = [start_s, start_s + phase.duration_s]
-                axes.fill_between(span, 1e9 * low, 1e9 * high, color=SKY, lw=0.8)
+                axes.fill_between(span, scale * low, scale * high, color=SKY, lw=0.8)
         times += (start_s + instants).tolist()
-        torques += (1e9 * load.at(instants)).tolist()
+        torques += (scale * load.at(instants)).tolist()
     axes.plot([*times, times[-1]], [*torques, 0.0], lw=0.8)
 
 
@@ -62,8 +72,9 @@ def draw_sensitivities(found: Designed) -> Figure:
 
     For a sinusoid the last whole period is drawn, with all readings folded into it.
     """
-    plan, inputs = found.plan, found.inputs
-    history, times = plan.torque, plan.time_s
+    plan = found.plan
+    inputs = replace(found.inputs, parameters=found.inputs.parameters[:1])
+    history, times = inputs.history(plan.phases), plan.time_s
     step = history.time_s.searchsorted(times, side="left") - 1
     chosen = sorted(np.argsort(-np.bincount(step, minlength=len(history.time_s)))[:3].tolist())
     drawn = figure(PAGE_IN, 2.6)
@@ -80,16 +91,11 @@ def draw_sensitivities(found: Designed) -> Figure:
             after = (shown + phase.duration_s // period_s - 1) * period_s
             read = read % period_s / period_s
             axes.set_xlabel("part of the period")
-        rows = ringing_responses(
-            inputs.gripper,
-            inputs.model,
-            history,
-            start_s + after * (1 - 1e-12),
-            inputs.parameters[:1],
-        )[0]
+        rows = inputs.sensitivities(history, start_s + after * (1 - 1e-12))[0]
         for index, name in enumerate(inputs.model.names):
-            sensitivity = np.abs(rows[1 + index]) / inputs.noise_rad
-            axes.semilogy(shown, sensitivity, color=_COLOURS[index % len(_COLOURS)], label=name)
+            axes.semilogy(
+                shown, np.abs(rows[index]), color=_COLOURS[index % len(_COLOURS)], label=name
+            )
         lowest = axes.get_ylim()[0]
         axes.plot(read, np.full(len(read), lowest), "|", color=BLACK, ms=5)
         axes.set_title(f"{kind(phase)} {k + 1}: {counted(len(read), 'reading')}")
@@ -108,8 +114,10 @@ def _period_s(phase: Phase) -> float | None:
 
 def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
     """Yield all figures of a design with their titles."""
+    force = ", jaw force of each plausible sample" if found.inputs.instrument.has_jaws else ""
     yield (
-        "Torque, readings (a bar is 1/200 of the experiment), jaw force of each plausible sample",
+        f"{found.inputs.instrument.controlled.name.capitalize()}, readings (a bar is 1/200 of the "
+        f"experiment){force}",
         draw_experiment(found),
     )
     yield (

@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from biogrip.design.earlier_traces import Earlier, estimate_from_traces
+from biogrip.design.settings import noise_key
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
 from biogrip.groups.replicates import compute_common_noise, joint_problem
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem
+from biogrip.instrument.instrument import Instrument
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.study.design_inputs import plausible_ends
 from biogrip.study.study import Case
@@ -50,7 +52,8 @@ def estimate_from_recordings(
     read_as.check()
     if read_as.fit_start:
         raise BiogripError("--start: found fit, allowed with --after is a time.")
-    given = [_make_problem(each, read_as, block.noise_rad) for each in traces]
+    _check_reading(read_as, case.instrument)
+    given = [_make_problem(each, read_as, block.noise) for each in traces]
     problems, levels = [problem for problem, _ in given], [level for _, level in given]
     samples = [problem.residuals.samples for problem in problems]
     rng = stream(study_seed, case.name, 0, "after")
@@ -59,6 +62,7 @@ def estimate_from_recordings(
         return best_fit(problem, case.method("least_squares"), rng, silent)
 
     earlier, ends = None, plausible_ends(case)
+    unit = f" {case.instrument.read.unit}".rstrip()
     for count, recorded in enumerate(traces, 1):
         joint = joint_problem(problems[:count], levels[:count])
         noise_rad = compute_common_noise(samples[:count], levels[:count])
@@ -67,13 +71,25 @@ def estimate_from_recordings(
         )
         if earlier.misfit_rad > _UNLIKE * noise_rad:
             raise BiogripError(
-                f"--after: {recorded.file}: found {earlier.misfit_rad:.3g} rad that the best fit "
-                f"leaves, allowed is at most {_UNLIKE:g} times the noise of {noise_rad:.3g} rad "
-                "(--noise, --noise-share or --sd, else design.noise_rad): is it of this sample, "
+                f"--after: {recorded.file}: found {earlier.misfit_rad:.3g}{unit} that the best fit "
+                f"leaves, allowed is at most {_UNLIKE:g} times the noise of {noise_rad:.3g}{unit} "
+                f"(--noise, --noise-share or --sd, else design.{noise_key(case.instrument)}): "
+                "is it of this sample, "
                 "and was it recorded as the configs say?"
             )
     assert earlier is not None
     return earlier
+
+
+def _check_reading(read_as: ReadAs, instrument: Instrument) -> None:
+    """Refuse options of an instrument or a protocol other than those of the config."""
+    read = instrument.read.name
+    if read_as.reading and read_as.reading[0] != read:
+        raise BiogripError(
+            f"--reading: found '{read_as.reading[0]}', allowed is {read}, as in the config."
+        )
+    if read_as.hold is not None:
+        raise BiogripError("--hold: does not go with --after; allowed is a protocol in the config.")
 
 
 def _make_problem(recorded: Recorded, read_as: ReadAs, usual_rad: float) -> tuple[Problem, float]:

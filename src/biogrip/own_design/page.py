@@ -1,6 +1,6 @@
 """HTML page of designed experiments, self-contained."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,16 @@ from biogrip import __version__
 from biogrip.experiment.protocol import Harmonic, Phase
 from biogrip.files import write_text
 from biogrip.instrument.actuator import CombDrive, voltage
-from biogrip.own_design.designed import Designed, in_numbers, kind, left_out, percent
-from biogrip.own_design.drawings import drawings
+from biogrip.instrument.instrument import Instrument
+from biogrip.own_design.designed import (
+    Designed,
+    in_numbers,
+    kind,
+    left_out,
+    percent,
+    shown_unit,
+)
+from biogrip.own_design.drawings import drawings, in_unit
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import embedded
 from biogrip.products.figures.style import styled
@@ -23,7 +31,7 @@ _SHOWN = 12
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of generator settings: heading, formatter, and the kind of phase it is for."""
+    """A column of what to set: heading, formatter, and the kind of phase it is for."""
 
     head: str
     cell: Callable[[Phase, CombDrive], str]
@@ -45,28 +53,33 @@ def _swing(phase: Phase, of: Callable[[Harmonic], float]) -> str:
     return "".join(f"{of(harmonic):.6g}" for harmonic in phase.left.harmonics)
 
 
-_COLUMNS = (
-    _Column("for (s)", lambda phase, _: f"{phase.duration_s:.6g}"),
-    _Column("torque (nN m)", lambda phase, _: f"{1e9 * phase.left.value_Nm:.4g}"),
-    _Column(
-        "to (nN m)",
+def _columns(instrument: Instrument) -> Iterator[_Column]:
+    """Yield the columns of what an instrument holds."""
+    scale, unit = shown_unit(instrument)
+    yield _Column("for (s)", lambda phase, _: f"{phase.duration_s:.6g}")
+    yield _Column(
+        in_unit(instrument.controlled.name, unit),
+        lambda phase, _: f"{scale * phase.left.value_Nm:.4g}",
+    )
+    yield _Column(
+        in_unit("to", unit),
         lambda phase, _: (
-            f"{1e9 * float(phase.left.at(phase.duration_s)):.4g}" if kind(phase) == "ramp" else ""
+            f"{scale * float(phase.left.at(phase.duration_s)):.4g}" if kind(phase) == "ramp" else ""
         ),
         "ramp",
-    ),
-    _Column(
-        "amplitude (nN m)",
-        lambda phase, _: _swing(phase, lambda harmonic: 1e9 * harmonic.amplitude_Nm),
+    )
+    yield _Column(
+        in_unit("amplitude", unit),
+        lambda phase, _: _swing(phase, lambda harmonic: scale * harmonic.amplitude_Nm),
         "sinusoid",
-    ),
-    _Column(
+    )
+    yield _Column(
         "frequency (Hz)",
         lambda phase, _: _swing(phase, lambda harmonic: harmonic.frequency_Hz),
         "sinusoid",
-    ),
-    _Column("voltage (V)", _volts),
-)
+    )
+    if instrument.has_jaws:
+        yield _Column("voltage (V)", _volts)
 
 
 def write_page(designs: Iterable[Designed], page: Path) -> None:
@@ -81,11 +94,11 @@ def write_page(designs: Iterable[Designed], page: Path) -> None:
 
 
 def _describe(found: Designed) -> dict[str, Any]:
-    plan, inputs = found.plan, found.inputs
+    plan, inputs, instrument = found.plan, found.inputs, found.inputs.instrument
     with styled():
         figures = [(title, embedded(drawn)) for title, drawn in drawings(found)]
     kinds = {kind(phase) for phase in plan.phases}
-    shown = [column for column in _COLUMNS if column.only in (None, *kinds)]
+    shown = [column for column in _columns(instrument) if column.only in (None, *kinds)]
     return {
         "title": found.case.title,
         "names": inputs.model.names,
@@ -103,8 +116,14 @@ def _describe(found: Designed) -> dict[str, Any]:
         "left_out": left_out(inputs) if inputs.out_of_reach else "",
         "figures": figures,
         "gap": f"{100 * plan.gap:.2g}",
-        "force_uN": f"{1e6 * found.force_N.max():.3g}",
-        "noise_urad": f"{1e6 * inputs.noise_rad:.3g}",
+        "has_jaws": instrument.has_jaws,
+        "held": instrument.controlled.name,
+        "force_uN": f"{1e6 * found.force_N.max(initial=0.0):.3g}",
+        "noise": (
+            f"{1e6 * inputs.noise_rad:.3g} µrad"
+            if instrument.has_jaws
+            else f"{inputs.noise_rad:.3g} {instrument.read.unit}".rstrip()
+        ),
         "readings": len(plan.time_s),
         "end_s": f"{plan.torque.end_s:g}",
         "in_numbers": in_numbers(plan.phases),

@@ -15,16 +15,18 @@ WELL = 0.1
 _AT_ONCE = 20
 
 
-USED = "gripper searched parameters design.noise_rad experiment study.experiment"
+USED = "gripper searched parameters design.noise experiment study.experiment"
 """Settings that the bounds of a case in its own experiment and in that of the study depend on."""
 
 
 def designed_cases(study: Study) -> list[str]:
-    """Return names of simulated cases that have a `design` block and are sampled in bursts."""
+    """Return names of simulated cases of a gripper with a `design` block and sampled in bursts."""
     return [
         name
         for name in study.simulated
-        if study.cases[name].block.design and study.cases[name].block.measurement.bursts
+        if study.cases[name].block.design
+        and study.cases[name].block.measurement.bursts
+        and study.cases[name].instrument.has_jaws
     ]
 
 
@@ -37,5 +39,5 @@ def bounds(case: Case, experiment: Experiment, parameters: Array) -> Array:
     for some in parts(len(parameters), _AT_ONCE):
         rows = ringing_responses(case.gripper, case.searched, torque, times, parameters[some])
         information = compute_information(rows[:, 1:])
-        found.append(relative_bounds(information / case.design.noise_rad**2))
+        found.append(relative_bounds(information / case.design.noise**2))
     return np.concatenate(found)

@@ -279,7 +279,7 @@ class CaseBlock(Shared):
         ):
             if value != "linear":
                 yield ("models", key), f"found {value}, allowed with {self.instrument} is linear."
-        for key in ("contact", "assumed_gripper", "design"):
+        for key in ("contact", "assumed_gripper"):
             if getattr(self, key) is not None:
                 yield (key,), f"is of the gripper; leave it out with {self.instrument}."
         if self.sample.size_m is not None:
@@ -309,6 +309,8 @@ class CaseBlock(Shared):
     def _design_problems(self) -> Iterator[Problem]:
         if self.design is None:
             return
+        for where, text in self.design.instrument_problems(self.instrument_used):
+            yield ("design", *where), text
         searched = [p.name for p in self._searched]
         named: list[tuple[tuple[str, str | int], str]] = [
             (("quantities", i), name) for i, name in enumerate(self.design.quantities)

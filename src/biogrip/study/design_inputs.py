@@ -33,7 +33,7 @@ def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInpu
         gripper=case.gripper,
         model=model,
         parameters=earlier.parameters if earlier else plausible(case, block),
-        noise_rad=block.noise_rad,
+        noise_rad=block.noise,
         samples=block.readings,
         fastest_Hz=block.fastest_Hz,
         limits=Limits(
@@ -41,13 +41,14 @@ def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInpu
         ),
         shapes=block.shapes,
         largest_Nm=_largest(case, block),
-        stroke_rad=case.stroke_rad,
+        stroke_rad=case.stroke_rad if case.instrument.has_jaws else np.inf,
         criterion=Criterion(
             block.criterion,
             block.over,
             tuple(model.names.index(name) for name in block.quantities or model.names),
         ),
         before=earlier.information if earlier else np.zeros((1, *2 * (len(model.names),))),
+        instrument=case.instrument,
     )
 
 
@@ -95,6 +96,7 @@ def plausible_ends(case: Case) -> tuple[Array, Array]:
 
 
 def _largest(case: Case, block: DesignSettings) -> float:
-    if block.largest_torque_Nm is not None:
-        return block.largest_torque_Nm
+    largest = block.largest(case.instrument)
+    if largest is not None:
+        return largest
     return float(torque(case.actuator, block.largest_voltage_V or 0.0))

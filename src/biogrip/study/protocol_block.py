@@ -93,7 +93,7 @@ class PhaseBlock(Block):
             loads = left, _at(left, self.voltage_right_V)
             return Phase(self.duration_s, *(_squared(load, per_square_volt) for load in loads))
         (base,) = self.bases
-        keys = (base, *_further(base))
+        keys = (base, *further_keys(base))
         left = self._load(*(getattr(self, key) for key in keys))
         return Phase(self.duration_s, left, _at(left, self.torque_right_Nm))
 
@@ -110,7 +110,7 @@ class PhaseBlock(Block):
             yield (), f"found {found}, allowed is one of {allowed}{others}."
             return
         by = self.bases[0]
-        ramp, swing = _further(by)
+        ramp, swing = further_keys(by)
         right = by.replace("_", "_right_") if by in _PULLS else ""
         for key in given:
             if key not in ("duration_s", by, right, ramp, swing, "frequency_Hz"):
@@ -178,7 +178,7 @@ class ProtocolBlock(Block):
                     yield ("phases", index, base), f"{text}is one of them."
 
 
-def _further(base: str) -> tuple[str, str]:
+def further_keys(base: str) -> tuple[str, str]:
     """Return the keys of a ramp's end and of a sinusoid's amplitude."""
     return f"to_{base}", f"amplitude_{base.rpartition('_')[2]}"
 
