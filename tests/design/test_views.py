@@ -34,7 +34,7 @@ def phases_of(waveform: Waveform) -> tuple[Phase, ...]:
     frequencies = 1 / waveform.periods_s
     columns = (waveform.durations_s, waveform.levels, waveform.ends, waveform.amplitudes)
     rows = zip(*columns, frequencies, strict=True)
-    loads = [load(*most, amplitude or None, frequency) for *most, amplitude, frequency in rows]
+    loads = [load(d, level, end, a or None, f) for d, level, end, a, f in rows]
     pairs = zip(waveform.durations_s, loads, strict=True)
     return tuple(Phase(duration, one, one) for duration, one in pairs)
 

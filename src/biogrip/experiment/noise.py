@@ -38,7 +38,7 @@ class Noise(Block):
     reference: Annotated[str, OneOf(("peak", "signal"))]
     """Reference of `level`. `peak`: the largest rotation of the noise-free trace, the same noise
     everywhere; `signal`: the noise-free rotation at each instant."""
-    level_rad: Annotated[float | None, Field(ge=0, le=10)] = None
+    level_rad: Annotated[float | None, Field(ge=0, le=1e12)] = None
     """Standard deviation of the noise as an instrument has it, the same whatever the sample, e.g.
     3.0e-6. Where it is given, `level` does not count."""
     ar1: AR1 | None = None

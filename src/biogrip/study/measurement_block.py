@@ -91,7 +91,7 @@ class MeasurementBlock(Block):
     only. By default 0, before which there may be none."""
     fit_start: bool = False
     """If true, fit that time along; the limits allow for its uncertainty. By default false."""
-    noise_rad: Annotated[float | None, Field(ge=1e-15, le=10)] = None
+    noise_rad: Annotated[float | None, Field(ge=1e-15, le=1e12)] = None
     """Standard deviation of the recorded noise, if it is known; by default it is estimated from the
     residuals."""
     sd: Annotated[str | None, Field(min_length=1, max_length=4000)] = None

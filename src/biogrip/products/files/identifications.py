@@ -41,12 +41,11 @@ TRAILING = ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_r
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
     """Return the parameters that have columns in a file of identifications.
 
-    They are the paper's four if these cover the model, with 0 for missing elements, so that
-    files can be concatenated. Otherwise they are the model's own.
+    They are the paper's four, in its units, if these cover the model, with 0 for missing elements,
+    so that files can be concatenated. Otherwise they are the model's own.
     """
-    return (
-        SINGLE_BRANCH if set(model.names) <= {p.name for p in SINGLE_BRANCH} else model.parameters
-    )
+    covered = {p.column for p in model.parameters} <= {p.column for p in SINGLE_BRANCH}
+    return SINGLE_BRANCH if covered else model.parameters
 
 
 def columns(model: SampleModel) -> tuple[str, ...]:
