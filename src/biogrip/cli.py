@@ -246,13 +246,13 @@ def _groups_parser(stages: Any) -> None:
 
 
 def _design_parser(stages: Any) -> None:
-    text = "design torque and sampling times that determine every parameter"
+    text = "design what to hold, and when to read, so that every parameter is determined"
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design, noise_model=None)
     design.examples = _examples(
         "design my_design.yaml",
         "design my_design.yaml --after first.csv --output second.yaml",
-        cost="The search for the torque takes most, and grows with most_steps.",
+        cost="The search takes most, and grows with most_steps.",
     )
     design.add_argument(
         "configs",
