@@ -147,7 +147,7 @@ BAD = {
     "protocol: {phases: [{duration_s: 5, torque_Nm: 0}]}": r"phases: no phase has a torque",
     "measurement: {rate_Hz: 1e-6}": r"measurement.rate_Hz: found 1e-06, which gives 1.0004 samples",
     "measurement: {noise: {level_rad: -1e-6}}": r"my.yaml, line 1: measurement.noise.level_rad: "
-    r"found -1e-06, allowed is at least 0 and at most 1e+12 rad",
+    r"found -1e-06, allowed is at least 0 and at most 1e[+]12 rad",
     f"cases: {{x: {{contact: loose, {DROP}}}}}": r"x.contact: found 'loose'. Allowed: bilat",
     f"cases: {{x: {{contact: unilateral, models: {{target: nonlinear}}, {DROP}}}}}": (
         r"my.yaml, line 1: cases.x.contact: found unilateral and a nonlinear target, allowed is "

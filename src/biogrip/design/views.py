@@ -255,9 +255,9 @@ def _without_arms(
     A mode that hardly changes within the longest time gets a rate with which that is `_SLOWEST`, so
     that little is lost in rounding. Of creep its flow, weight times rate, remains.
     """
-    held = torque_history((hold_load(1.0, 1.0),), deforms=instrument.deforms)
+    protocol = torque_history((hold_load(1.0, 1.0),), deforms=instrument.deforms)
     rates, weights, rate_slopes, weight_slopes = compute_protocol_modes(
-        NO_ARMS, model, held, parameters
+        NO_ARMS, model, protocol, parameters
     )
     weights, weight_slopes = weights[:, 0], weight_slopes[:, :, 0]
     slowed = np.minimum(rates, -_SLOWEST / longest_s)

@@ -50,12 +50,12 @@ def _without_worst(inputs: DesignInputs, plan: Plan) -> DesignInputs:
     worst = int(np.argmax(variances))
     targets = tuple(index for index in inputs.criterion.targets if index != worst)
     if not targets:
-        held = inputs.instrument.controlled.name
+        controlled = inputs.instrument.controlled.name
         names = ", ".join(inputs.model.names[index] for index in inputs.criterion.targets)
         raise BiogripError(
-            f"design: found no {held} of {', '.join(inputs.shapes)} with which readings at "
+            f"design: found no {controlled} of {', '.join(inputs.shapes)} with which readings at "
             f"{inputs.fastest_Hz:g} Hz tell {names}, even to a factor of e to the {NO_BOUND:g}; "
-            f"allowed are faster readings (`fastest_Hz`), more {held} or less noise, other "
+            f"allowed are faster readings (`fastest_Hz`), more {controlled} or less noise, other "
             "`shapes` or other `quantities`."
         )
     known = np.zeros_like(plan.information[0])

@@ -84,8 +84,8 @@ def in_words(found: Designed) -> str:
         lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
     if found.inputs.out_of_reach:
         lines.append(f"  {left_out(found.inputs)}")
-    held = found.inputs.instrument.controlled.name
-    best = f"  no other sampling of this {held} is better by more than {100 * plan.gap:.2g} %"
+    controlled = found.inputs.instrument.controlled.name
+    best = f"  no other sampling of this {controlled} is better by more than {100 * plan.gap:.2g} %"
     return "\n".join([*lines, f"{best}{_pressed(found)}"])
 
 
@@ -98,11 +98,12 @@ def _pressed(found: Designed) -> str:
 def left_out(inputs: DesignInputs) -> str:
     """Return a sentence on parameters that no torque determines, and on remedies."""
     names = ", ".join(inputs.model.names[index] for index in sorted(inputs.out_of_reach))
-    held = inputs.instrument.controlled.name
+    controlled = inputs.instrument.controlled.name
     return (
-        f"left out, as no {held} that was tried determines it with readings at "
+        f"left out, as no {controlled} that was tried determines it with readings at "
         f"{inputs.fastest_Hz:g} Hz: {names}; the other bounds allow for a factor of e to the "
-        f"{NO_BOUND:g} in it. Faster readings (fastest_Hz), more {held} or other shapes may help."
+        f"{NO_BOUND:g} in it. Faster readings (fastest_Hz), more {controlled} or other shapes may "
+        "help."
     )
 
 

@@ -117,7 +117,7 @@ def _describe(found: Designed) -> dict[str, Any]:
         "figures": figures,
         "gap": f"{100 * plan.gap:.2g}",
         "has_jaws": instrument.has_jaws,
-        "held": instrument.controlled.name,
+        "controlled": instrument.controlled.name,
         "force_uN": f"{1e6 * found.force_N.max(initial=0.0):.3g}",
         "noise": (
             f"{1e6 * inputs.noise_rad:.3g} µrad"
