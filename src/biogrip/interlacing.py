@@ -18,13 +18,12 @@ References
 """
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 
 _MOST_SWEEPS = 60
 _ROUNDING, _SHORT = 4e-16, 1e-9
@@ -86,35 +85,37 @@ class _Sides:
     above: Array
     above_slope: Array
 
+    def reshaped(self, shape: tuple[int, ...]) -> "_Sides":
+        """Return the sums in another shape."""
+        return _Sides(*(of.reshape(shape) for of in vars(self).values()))
+
 
 def _real_zeros(weights: Array, poles: Array, level: Array) -> Zeros:
     pole, side, gap, start = _intervals(weights, poles, level)
-    found = np.empty_like(pole)
-    # State of the search: indices of unfinished functions; for each zero its pole, the side of it,
-    # the gap to the next one, bounds of the distance, the distance, and whether it has converged.
-    which = np.arange(len(level))
-    search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start])
-    converged = np.zeros(pole.shape, dtype=bool)
+    found = start.copy()
+    # State of the search for each unfinished zero: its pole, the side of it, the gap to the next
+    # one, bounds of the distance, and the distance.
+    search = np.array([pole, side, gap, np.zeros_like(pole), 0.5 * gap, start]).reshape(6, -1)
+    left = np.arange(pole.size)
     for _ in range(_MOST_SWEEPS):
+        zero, which = np.divmod(left, len(level))
         origin, sign, whole, low, high, at = search
-        sides = _sides(weights, poles, Zeros(origin, sign * at))
-        value = sides.below + sides.above - level
-        converged |= np.abs(value) <= _ROUNDING * (sides.below - sides.above + level)
+        sides = _sides(weights, poles, zero, which, Zeros(origin, sign * at))
+        value = sides.below + sides.above - level[which]
+        converged = np.abs(value) <= _ROUNDING * (sides.below - sides.above + level[which])
         np.copyto(low, at, where=sign * value > 0)
         np.copyto(high, at, where=sign * value < 0)
-        moved = _nearer(value, sides, sign, whole, at, level)
+        last = int(np.searchsorted(zero, len(poles) - 1))
+        moved = _nearer(value, sides, sign, whole, at, level[which], last)
         outside = ~((moved > low) & (moved < high))
         np.copyto(moved, 0.5 * (low + np.minimum(high, 4 * at)), where=outside)
         np.copyto(moved, at, where=converged)
         # Convergence is quadratic, so after a short step the error is below rounding.
         converged |= np.abs(moved - at) <= _SHORT * moved
-        at[:] = found[:, which] = moved
-        unfinished = ~np.all(converged, axis=0)
-        if not np.any(unfinished):
+        at[:] = found.flat[left] = moved
+        left, search = left[~converged], search[:, ~converged]
+        if not len(left):
             break
-        if not np.all(unfinished):
-            which, level, search = which[unfinished], level[unfinished], search[..., unfinished]
-            weights, poles, converged = (of[:, unfinished] for of in (weights, poles, converged))
     return Zeros(pole, side * found)
 
 
@@ -122,7 +123,9 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     """Return for each zero the nearest pole, the side of it, the gap to the next, and a start."""
     gaps = np.diff(poles, axis=0)
     # The sign at the middle of a gap tells which pole the zero is nearer to.
-    middle = _sides(weights, poles, Zeros(poles[:-1], 0.5 * gaps))
+    zero, which = np.divmod(np.arange(gaps.size), len(level))
+    halves = Zeros(poles[:-1].ravel(), 0.5 * gaps.ravel())
+    middle = _sides(weights, poles, zero, which, halves).reshaped(gaps.shape)
     value = middle.below + middle.above - level
     pole = np.concatenate((np.where(value > 0, poles[1:], poles[:-1]), poles[-1:]))
     side, gap, start = np.ones_like(pole), np.full_like(pole, np.inf), np.empty_like(pole)
@@ -134,58 +137,61 @@ def _intervals(weights: Array, poles: Array, level: Array) -> tuple[Array, Array
     return pole, side, gap, start
 
 
-def _sides(weights: Array, poles: Array, at: Zeros) -> _Sides:
-    """Return the sums in the order of the poles, vectorised if that fits into the cache."""
-    few = len(poles) * at.pole.size <= _FITS
-    return _sides_at_once(weights, poles, at) if few else _sides_in_turn(weights, poles, at)
+def _sides(weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros) -> _Sides:
+    """Return the sums in the order of the poles, vectorised if that fits into the cache.
+
+    Points are given in the order of `zero`, the poles up to which are below; `which` is their
+    function.
+    """
+    few = len(poles) * len(zero) <= _FITS
+    return (_sides_at_once if few else _sides_in_turn)(weights, poles, zero, which, at)
 
 
-def _sides_at_once(weights: Array, poles: Array, at: Zeros) -> _Sides:
-    # Shape (n_poles, n, n_zeros), with the longest axis last.
-    pole, beyond = np.ascontiguousarray(at.pole.T), np.ascontiguousarray(at.beyond.T)
-    slope = pole - poles[:, :, None]
-    slope += beyond
-    term = weights[:, :, None] / slope
+def _sides_at_once(
+    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
+) -> _Sides:
+    slope = at.pole - poles[:, which]
+    slope += at.beyond
+    term = weights[:, which] / slope
     np.divide(term, slope, out=slope)
-    is_below, is_above = _which_side(*at.pole.shape[:1], *poles.shape[:1])
+    is_below = np.arange(len(poles))[:, None] <= zero
+    every = np.zeros((len(poles), 4, len(zero)))
+    for place, of in enumerate((term, slope)):
+        np.copyto(every[:, place], of, where=is_below)
+        np.copyto(every[:, 2 + place], of, where=~is_below)
     # Reducing the first of several axes adds in sequence, so the result is reproducible.
-    below, above, below_slope, above_slope = (
-        np.add.reduce(of * which, axis=0).T
-        for of in (term, slope)
-        for which in (is_below, is_above)
-    )
+    below, below_slope, above, above_slope = np.add.reduce(every, axis=0)
     return _Sides(below, -below_slope, above, -above_slope)
 
 
-@cache
-def _which_side(zeros: int, poles: int) -> tuple[Array, Array]:
-    """Return ones where a pole is below a zero, and where it is above, (n_poles, 1, n_zeros)."""
-    is_below = np.tri(zeros, poles).T[:, None]
-    return is_below, 1 - is_below
-
-
-def _sides_in_turn(weights: Array, poles: Array, at: Zeros) -> _Sides:
-    below, below_slope, above, above_slope = np.zeros((4, *at.pole.shape))
-    term, slope = np.empty((2, *at.pole.shape))
-    for j, (weight, pole) in enumerate(zip(weights, poles, strict=True)):
-        np.subtract(at.pole, pole, out=slope)
+def _sides_in_turn(
+    weights: Array, poles: Array, zero: IntArray, which: IntArray, at: Zeros
+) -> _Sides:
+    below, below_slope, above, above_slope = np.zeros((4, len(zero)))
+    term, slope = np.empty((2, len(zero)))
+    firsts = np.searchsorted(zero, np.arange(len(poles))).tolist()
+    for first, weight, pole in zip(firsts, weights, poles, strict=True):
+        np.subtract(at.pole, pole[which], out=slope)
         slope += at.beyond
-        np.divide(weight, slope, out=term)
+        np.divide(weight[which], slope, out=term)
         np.divide(term, slope, out=slope)
-        below[j:] += term[j:]
-        below_slope[j:] -= slope[j:]
-        above[:j] += term[:j]
-        above_slope[:j] -= slope[:j]
+        below[first:] += term[first:]
+        below_slope[first:] -= slope[first:]
+        above[:first] += term[:first]
+        above_slope[:first] -= slope[:first]
     return _Sides(below, below_slope, above, above_slope)
 
 
-def _nearer(value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array) -> Array:
-    """Return improved distances of zeros from their poles."""
-    found = np.empty_like(value)
+def _nearer(
+    value: Array, sides: _Sides, side: Array, gap: Array, at: Array, level: Array, last: int
+) -> Array:
+    """Return improved distances of zeros from their poles; those from `last` on are beyond all."""
     inner = (value, sides.below_slope, sides.above_slope, side, gap, at)
-    found[:-1] = _between(*(of[:-1] for of in inner))
+    found = np.empty_like(value)
+    found[:last] = _between(*(of[:last] for of in inner))
     # Beyond all poles the reciprocal of the sum is concave and nearly linear: Newton's method.
-    found[-1] = at[-1] - sides.below[-1] * value[-1] / (level * sides.below_slope[-1])
+    slope = level[last:] * sides.below_slope[last:]
+    found[last:] = at[last:] - sides.below[last:] * value[last:] / slope
     return found
 
 
