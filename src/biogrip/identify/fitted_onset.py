@@ -23,6 +23,9 @@ _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 _FIRST_STEP, _LAST_STEP, _MOST_STEPS = 8.0, 0.5, 200
 # Intervals that are looked at around the onset of that search, and those of rounding errors.
 _NEAR, _ROUNDING = 3.0, 1e-6
+# Fits in each interval at first, and the share of their spread by which more may lower the misfit:
+# a search has by then come within a tenth of the interval of where the misfit is lowest.
+_FEW, _DROP = 6, 0.5
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,10 @@ class OnsetFit:
     """Sample parameters, (n_parameters,)."""
     misfit_rad: float
     """RMS misfit."""
+
+
+def _misfit_rad(fit: OnsetFit) -> float:
+    return fit.misfit_rad
 
 
 class OnsetFits:
@@ -75,7 +82,7 @@ class OnsetFits:
             if step_s < _LAST_STEP * self.interval_s:
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
-            lower = min(sides, key=lambda fit: fit.misfit_rad)
+            lower = min(sides, key=_misfit_rad)
             if lower.misfit_rad < best.misfit_rad:
                 best = lower
             else:
@@ -83,15 +90,33 @@ class OnsetFits:
         return best
 
     def _between_readings(self, best: OnsetFit) -> OnsetFit:
-        """Minimise the misfit in each neighbouring interval in which it is smooth."""
-        for low, high in self._smooth_intervals(best.onset_s):
-            found = minimize_scalar(
-                lambda onset_s, x=best.log_parameters: self.at(onset_s, x).misfit_rad,
-                bounds=(low, high),
-                method="bounded",
-            )
-            best = min(best, self.at(found.x, best.log_parameters), key=lambda fit: fit.misfit_rad)
+        """Minimise the misfit in each neighbouring interval in which it is smooth.
+
+        Those are left early in which the first fits are all far above the best one.
+        """
+        intervals = list(self._smooth_intervals(best.onset_s))
+        tried = [self._lowered([best], ends, _FEW) for ends in intervals]
+        first = min((fit for fits in tried for fit in fits), key=_misfit_rad)
+        for fits, ends in zip(tried, intervals, strict=True):
+            misfits_rad = [fit.misfit_rad for fit in fits[1:]]
+            if min(misfits_rad) - _DROP * np.ptp(misfits_rad) <= first.misfit_rad:
+                best = min(best, *self._lowered(fits, ends, _MOST_STEPS), key=_misfit_rad)
         return best
+
+    def _lowered(
+        self, fits: list[OnsetFit], bounds: tuple[float, float], most: int
+    ) -> list[OnsetFit]:
+        """Return fits, and those that a search for the lowest misfit adds within bounds."""
+        known = {fit.onset_s: fit for fit in fits}
+
+        def misfit_rad(onset_s: float) -> float:
+            if onset_s not in known:
+                nearest = min(known, key=lambda known_s: abs(known_s - onset_s))
+                known[onset_s] = self.at(onset_s, known[nearest].log_parameters)
+            return known[onset_s].misfit_rad
+
+        minimize_scalar(misfit_rad, bounds=bounds, method="bounded", options={"maxiter": most})
+        return list(known.values())
 
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
         """Yield intervals of onsets within which no reading passes a change of torque."""
