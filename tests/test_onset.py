@@ -64,11 +64,12 @@ def identified(folder: Path, times: Array, values: Array, *options: str) -> dict
 
 @pytest.fixture(scope="module")
 def started(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], str]]:
-    """What is written and said of one trace with its onset given and fitted."""
+    """What is written and said of one trace with its onset given, and fitted before a posterior."""
     answers = {}
-    for start in (f"{ONSET_S}", "fit"):
+    for start, *further in ((f"{ONSET_S}",), ("fit", "--posterior")):
         with redirect_stdout(StringIO()) as said:
-            found = identified(tmp_path_factory.mktemp("late"), *late(2), "--start", start)
+            options = ("--start", start, *further)
+            found = identified(tmp_path_factory.mktemp("late"), *late(2), *options)
         answers[start] = found, said.getvalue()
     return answers
 
@@ -219,17 +220,16 @@ def test_a_fitted_onset_widens_limits(started: dict[str, tuple[dict[str, Any], s
 
 
 def test_a_posterior_that_takes_the_onset_as_exact_says_so(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    started: dict[str, tuple[dict[str, Any], str]],
 ) -> None:
     """Limits of profiles are those of all onsets; the posterior's interval of c_p is narrower."""
-    times, values = late(2)
-    found = identified(tmp_path, times, values, "--start", "fit", "--posterior")
+    found, said = started["fit"]
     told = {each["quantity"]: each for each in found["posterior"]["quantities"]}
     assert (
         "takes the fitted onset as exact, so its intervals are too narrow"
         in (found["posterior"]["in_words"])
     )
-    assert found["posterior"]["in_words"] in capsys.readouterr().out
+    assert found["posterior"]["in_words"] in said
     for each in told.values():
         if each["against_profile"] == "differs":
             assert "uncertainty of the fitted onset" in each["why"]
