@@ -8,7 +8,7 @@ from mkdocs.structure.files import File, Files
 
 ROOT = Path(__file__).parents[1]
 SHOWN = (
-    *("*.md", "CITATION.cff", "LICENSE", "config/*", "data/*", "docs/**/*", "profiles/**/*"),
+    *("*.md", "CITATION.cff", "LICENSE", "config/*", "data/**/*", "docs/**/*", "profiles/**/*"),
     *("results/published/**/*", "benchmarks/**/results/*", "tests/*/test_*.py"),
 )
 _LEFT_OUT = {".lock", ".pyc"}
