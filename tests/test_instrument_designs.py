@@ -16,8 +16,11 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, hold, load
+from biogrip.experiment.sample import MODELS
+from biogrip.experiment.sample_model import in_pascals
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, identify_sample, judge, set_up, simulate
+from biogrip.products.files.identifications import columns
 from tests.helpers.default import study_of
 from tests.test_instruments import OF_A_GRIPPER
 
@@ -242,3 +245,10 @@ def test_what_is_not_of_the_instrument_is_refused(design: dict[str, Any], said: 
     config = ASKS["strain"].config("strain", **design)
     with pytest.raises(BiogripError, match=said):
         study_of(yaml.safe_dump(config))
+
+
+def test_estimates_of_stressed_samples_are_written_in_pascals() -> None:
+    """The paper's four columns are in N/m, and a study's figures look for their own."""
+    stressed = in_pascals(MODELS["zener_maxwell"])
+    assert {p.column for p in stressed.parameters} <= set(columns(stressed))
+    assert {"k_N_per_m", "c_p_Ns_per_m"} <= set(columns(MODELS["zener_maxwell"]))
