@@ -104,7 +104,7 @@ class Task:
         phases: tuple[Phase, ...] = given.phases
         if self.load_s:
             phases = (hold(self.load_s[1] - self.load_s[0], 1.0),)
-        told = CaseProblem(
+        problem = CaseProblem(
             given.gripper,
             phases,
             given.ranges,
@@ -112,7 +112,8 @@ class Task:
             self.fixed,
             given.instrument,
         ).weighted(self.deviations(measure))
-        return replace(told, ranges={**given.ranges, **ranges_of(told, self.time_s, self.data)})
+        own = ranges_of(problem, self.time_s, self.data)
+        return replace(problem, ranges={**given.ranges, **own})
 
     def curve(self, parameters: Mapping[str, float]) -> Array:
         """Return the exact response of a sample, (n_samples,)."""
@@ -380,20 +381,21 @@ COLUMNS: dict[str, Callable[[Row], str]] = {
 }
 
 TEXT = f"""\
-The traces of `data/measured` with the models that were published for them, with Maxwell branches,
-and, of a step of strain, with a damper beside, which no reading tells anything of
-(`benchmarks/field/measured.py`; the other programs: `measured_peers.py`). *Leaves*: sum of squares
-over the least that any program with the model leaves in the same weights, evaluated exactly from
-the printed parameters, and by the curve that the program draws. *Weights*: readings are divided by
-their known standard deviations, by themselves (relative), or equal. What a program cannot change of
-its weights is no fault of its search, so each is compared in its own; biogrip is fitted in all, and
-shown in those of `config/measured.yaml`. A dash: it lacks the model, or its optimum is not one of
-it. mcreep's branches have a damper in series more.
+The traces of `data/measured`, each with the model that was published for it. Maxwell branches are
+fitted too, and to a step of strain a parallel damper, which acts at the step only, where nothing is
+read (`benchmarks/field/measured.py`; the other programs: `measured_peers.py`).
 
-RheoJAX takes no standard deviations; it and mcreep take steps only, so HL60's recovery is for
-biogrip and for lmfit, whose user writes the curve: here it is biogrip's. lmfit's limits are of
-`conf_interval`, or, where that fails or takes {TIME_LIMIT_S:g} s, 1.96 of its standard errors.
-pyRheo cannot be installed from PyPI; its rows are what its demonstrations of 2026-02 print, with
-the approximation `Pade54` of Mittag-Leffler functions, and its hydrogel is a mean of ten others.
-Parameters are named as the program names them. Times are medians of {ROUNDS} rounds after a
+*Leaves, of the best*: the sum of squares that the printed parameters leave, evaluated exactly, over
+the least that any program with the model leaves. Beside it stands that of the curve that the
+program draws. *Weights*: readings are divided by their known standard deviations, by themselves
+(relative), or by nothing (equal). Every program is compared in its own weights, and biogrip is
+fitted in all of them; its rows have those of `config/measured.yaml`. A dash: the printed parameters
+are not those of springs, dampers and springpots of the model. mcreep's has a damper in series more.
+
+RheoJAX takes no standard deviations. It and mcreep take steps only, not HL60's recovery. lmfit has
+no models, and is given biogrip's curve. Its limits are those of `conf_interval`; where that fails,
+or takes {TIME_LIMIT_S:g} s, they are 1.96 of its standard errors, and without those there are none.
+pyRheo cannot be installed from PyPI. Its rows are what its demonstrations print, fitted with the
+Padé approximation `Pade54` of Mittag-Leffler functions; that of the hydrogel is of other readings.
+Parameters have the names that each program prints. Times are medians of {ROUNDS} rounds after a
 warm-up."""
