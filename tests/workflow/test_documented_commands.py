@@ -35,6 +35,8 @@ LEFT = {
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
         *("maxwell.json", "uncertain.json", "posterior.json", "posterior.parquet"),
     ],
+    "howto/creep.md": ["mucus.json", "hl60.json"],
+    "howto/relaxation.md": ["fish.json", "dwell.json"],
     "howto/noise.md": [
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
