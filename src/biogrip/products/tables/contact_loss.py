@@ -40,7 +40,7 @@ def _linear(study: Study) -> list[str]:
     """Return the simulated cases whose target and identification are linear."""
     return [
         name
-        for name in study.simulated
+        for name in study.gripped
         if not (study.cases[name].nonlinear_target or study.cases[name].problem.nonlinear)
     ]
 
