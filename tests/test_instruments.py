@@ -77,8 +77,9 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     instrument, held = INSTRUMENTS[reading], CONTROLLED[reading]
     column = instrument.read.column
     trace = written(tmp_path / "trace.csv", column, noisy(response(reading, held)))
-    page = tmp_path / "page.html"
+    page, table = tmp_path / "page.html", tmp_path / "table.csv"
     options = ["--model", SOLID.name, "--hold", str(held), "--report", str(page)]
+    options += ["--csv", str(table)]
     found = identified(trace, "--reading", f"{reading}={column}", *options)
     assert found["fit"] == "ok"
     for name, item in by_name(found).items():
@@ -94,7 +95,8 @@ def test_every_reading_is_identified_in_its_own_units_and_words(
     text = re.sub(
         r"<style.*?</style>|<script.*?</script>|data:[^\"]*", "", page.read_text(), flags=re.S
     )
-    for said in (capsys.readouterr().out, json.dumps(found), text):
+    assert f"noise{instrument.read.suffix},misfit{instrument.read.suffix}," in table.read_text()
+    for said in (capsys.readouterr().out, json.dumps(found), text, table.read_text()):
         assert not OF_A_GRIPPER.search(said), OF_A_GRIPPER.search(said)
 
 

@@ -57,7 +57,7 @@ class Progress:
 
     def within(self, evaluations: int, misfit_rad: float) -> None:
         """Print the progress of an identification within a piece."""
-        self._say(f", {evaluations} responses, misfit {misfit_rad:.4g} rad")
+        self._say(f", {evaluations} responses, misfit {misfit_rad:.4g}")
 
     def _say(self, more: str) -> None:
         now = time.monotonic()

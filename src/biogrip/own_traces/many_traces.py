@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
+from biogrip.instrument.gripper import ROTATION
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
-from biogrip.own_traces.outputs import WRITTEN_BY
+from biogrip.own_traces.outputs import WRITTEN_BY, name_in_units
 from biogrip.products.files.rows import write_rows
 from biogrip.terminal import visible
 
@@ -67,7 +69,11 @@ def identify_traces(
 def write_table(outcome: Outcome, table: Path) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and no sentences."""
     units = {q["quantity"]: q["unit"] for each in outcome.found for q in each["quantities"]}
-    columns = ["trace", "fit", "model", "preferred_model", "samples", "noise_rad", "misfit_rad"]
+    # All traces are read by the same options and config.
+    names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
+    read = INSTRUMENTS[names.pop()].read
+    columns = ["trace", "fit", "model", "preferred_model", "samples"]
+    columns += [name_in_units(name, read) for name in ("noise_rad", "misfit_rad")]
     fixed = any("fixed" in each for each in outcome.found)
     columns += ["fixed"] if fixed else []
     columns += [

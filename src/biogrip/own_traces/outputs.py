@@ -88,4 +88,9 @@ def in_own_units(data: Any, read: Quantity) -> Any:
         return [in_own_units(each, read) for each in data]
     if not isinstance(data, dict):
         return data
-    return {_RADIANS.sub(read.suffix, key): in_own_units(each, read) for key, each in data.items()}
+    return {name_in_units(key, read): in_own_units(each, read) for key, each in data.items()}
+
+
+def name_in_units(name: str, read: Quantity) -> str:
+    """Return a name of a key or column that ends with the unit of what is read."""
+    return _RADIANS.sub(read.suffix, name)
