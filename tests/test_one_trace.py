@@ -422,8 +422,9 @@ def test_a_table_of_many_quantities_is_known_as_ours(tmp_path: Path) -> None:
     found = {"trace": "a.csv", "model": "m", "samples": 1, "noise_rad": 1.0, "misfit_rad": 1.0}
     quantity = {"verdict": "determined", "unit": "N/m", "value": 1.0, "low": 0.5, "high": 2.0}
     quantities = [{"quantity": f"k_{number} + c_{number}", **quantity} for number in range(20)]
-    rest = {"quantities": quantities, "models": [], "fit": "ok", WRITTEN_BY: "1"}
-    rest |= {"reads": {"quantity": "rotation", "unit": "rad"}}
+    reads = {"quantity": "rotation", "unit": "rad"}
+    rest: dict[str, Any] = {"quantities": quantities, "models": [], "fit": "ok", "reads": reads}
+    rest[WRITTEN_BY] = "1"
     write_table(Outcome([{**found, **rest}], {}), table)
     check_output(table, force=False)
     table.write_text(table.read_text().replace(WRITTEN_BY, "rotation"))
