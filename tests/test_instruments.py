@@ -13,7 +13,7 @@ import yaml
 from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import hold
+from biogrip.experiment.protocol import Harmonic, Load, Phase, hold
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, identify_sample, judge, set_up, simulate
 from biogrip.products.catalogue import products
@@ -251,6 +251,25 @@ def test_dishes_of_strained_cells_are_compared(
     ratios = {each["quantity"]: each["ratio"] for each in found["differences"]}
     assert ratios["k"] == pytest.approx(2.0, rel=0.1)
     assert "noise" in found["cells"][0]["traces"][0]
+
+
+@pytest.mark.parametrize("reading", ["stress", "modulus"])
+def test_oscillations_about_zero_are_identified(tmp_path: Path, reading: str) -> None:
+    """Nothing is held at the ends of the phase: the amplitude is what is."""
+    amplitude = 0.02
+    swing = Load(0.0, harmonics=(Harmonic(amplitude, np.pi, -np.pi / 2),))
+    experiment = set_up(INSTRUMENTS["stress"], (Phase(20.0, swing, swing),), SOLID)
+    times: Array = 0.02 * np.arange(1.0, 1000.0)
+    values = noisy(simulate(experiment, TRUTH, times)) / (1 if reading == "stress" else amplitude)
+    trace = written(tmp_path / "t.csv", INSTRUMENTS[reading].read.column, values, times)
+    config = (
+        "instrument: relaxation\nprotocol:\n  phases:\n"
+        "    - {duration_s: 20, strain: 0, amplitude_strain: 0.02, frequency_Hz: 0.5}\n"
+    )
+    column = INSTRUMENTS[reading].read.column
+    options = ["--reading", f"{reading}={column}", "--model", SOLID.name]
+    for name, item in by_name(identified(trace, *options, config=config + FEW)).items():
+        assert abs(item["value"] - TRUTH[name]) < item["high"] - item["low"]
 
 
 def test_the_library_takes_any_instrument() -> None:

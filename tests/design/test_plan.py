@@ -14,7 +14,7 @@ from biogrip.design.search import Torque, TorqueSearch, best_torques
 from biogrip.design.shapes import SHAPES
 from biogrip.design.waveform import Limits, hold
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import largest_torque
+from biogrip.experiment.protocol import largest_load
 from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import silent
 from biogrip.instrument.gripper import Arm, Gripper
@@ -60,7 +60,7 @@ def test_a_plan_can_be_set(shape: str) -> None:
     assert np.all(np.diff(times) > 0.999e-5)
     assert times[0] > 0
     assert times[-1] <= plan.torque.end_s == pytest.approx(400.0)
-    assert 0.98 * 8e-9 < largest_torque(plan.torque) <= 8e-9 * (1 + 1e-12)
+    assert 0.98 * 8e-9 < largest_load(plan.phases) <= 8e-9 * (1 + 1e-12)
     assert len(plan.phases) <= 8
     assert plan.gap < 0.01
     has_ramps = any(phase.left.slope_Nm_per_s for phase in plan.phases)

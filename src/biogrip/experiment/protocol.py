@@ -6,9 +6,9 @@ voltage, as voltage.
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -257,13 +257,18 @@ def torque_at(history: TorqueHistory, time_s: ArrayLike, arm: str = "left") -> A
     return torque
 
 
-def largest_torque(history: TorqueHistory) -> float:
-    """Return the largest torque of either arm in N m, over a thousand instants of every phase."""
-    starts = np.append(history.time_s, history.end_s)
-    inside = np.concatenate(
-        [np.linspace(start, np.nextafter(end, 0), 1000) for start, end in pairwise(starts)]
-    )
-    return max(float(torque_at(history, inside, arm).max()) for arm in ("left", "right"))
+def largest_load(phases: Iterable[Phase]) -> float:
+    """Return the torque of either arm, or what else phases hold, of the largest magnitude.
+
+    Within a phase nothing but a sinusoid turns round, which counts with its whole amplitude.
+    """
+    found: list[float] = []
+    for phase in phases:
+        for own in (phase.left, phase.right):
+            swing = sum(abs(harmonic.amplitude_Nm) for harmonic in own.harmonics)
+            ends = replace(own, harmonics=()).at([0.0, phase.duration_s])
+            found += [*(ends + swing).tolist(), *(ends - swing).tolist()]
+    return max(found, key=abs)
 
 
 def sample_times(duration_s: float, rate_Hz: float) -> Array:

@@ -11,7 +11,7 @@ from biogrip.design.earlier_traces import Earlier
 from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
 from biogrip.design.schedule import Plan, forces
 from biogrip.design.within_reach import plan_within_reach
-from biogrip.experiment.protocol import Phase
+from biogrip.experiment.protocol import Phase, largest_load
 from biogrip.experiment.random_streams import stream
 from biogrip.instrument.instrument import Instrument
 from biogrip.study.design_inputs import make_design_inputs
@@ -110,7 +110,7 @@ def left_out(inputs: DesignInputs) -> str:
 def _setting(found: Designed) -> str:
     plan = found.plan
     scale, unit = shown_unit(found.inputs.instrument)
-    largest = f"{scale * max(map(largest_Nm, plan.phases)):.4g}"
+    largest = f"{scale * largest_load(plan.phases):.4g}"
     unit = unit or found.inputs.instrument.controlled.name
     return (
         f"{in_numbers(plan.phases)} of up to {largest} {unit} "
@@ -129,13 +129,6 @@ def kind(phase: Phase) -> str:
     if phase.left.harmonics:
         return "sinusoid"
     return "ramp" if phase.left.slope_Nm_per_s else "step"
-
-
-def largest_Nm(phase: Phase) -> float:
-    """Return the largest torque of a phase, or what else is held."""
-    load = phase.left
-    swing = sum(harmonic.amplitude_Nm for harmonic in load.harmonics)
-    return max(load.value_Nm + swing, load.value_Nm + load.slope_Nm_per_s * phase.duration_s)
 
 
 def shown_unit(instrument: Instrument) -> tuple[float, str]:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from biogrip.arrays import Array
+from biogrip.experiment.protocol import largest_load
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.products.files.traces import Measurements
@@ -59,12 +60,7 @@ def ranges_of(
     turn_rad = float(np.max(np.abs(turned)))
     ratios = np.linalg.norm([turned / noise_rad, turn_rad / noise_rad], axis=1)
     softer, stiffer = _MARGIN * np.clip(ratios, 1.0, _CLEAREST)
-    ends = [
-        load.at([0.0, phase.duration_s])
-        for phase in case_problem.phases
-        for load in (phase.left, phase.right)
-    ]
-    torque_Nm = float(np.max(np.abs(ends)))
+    torque_Nm = abs(largest_load(case_problem.phases))
     stiffness = torque_Nm / (case_problem.gripper.lever_m**2 * turn_rad)
     if case_problem.instrument.deforms:
         stiffness = turn_rad / torque_Nm

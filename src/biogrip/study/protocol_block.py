@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from biogrip.experiment.protocol import Harmonic, Load, Phase, load
+from biogrip.experiment.protocol import Harmonic, Load, Phase, largest_load, load
 from biogrip.instrument.actuator import CombDrive, capacitance_slope
 from biogrip.instrument.instrument import Instrument
 from biogrip.instrument.instruments import CONTROLLED
@@ -150,8 +150,7 @@ class ProtocolBlock(Block):
         phases = tuple(phase.phase(per_square_volt) for phase in self.phases)
         if not instrument.relative:
             return phases
-        ends = [phase.left.at([0.0, phase.duration_s]) for phase in phases]
-        largest = max((end for each in ends for end in each.tolist()), key=abs)
+        largest = largest_load(phases)
         return tuple(_divided(phase, largest) for phase in phases)
 
     def problems(self) -> Iterator[Problem]:

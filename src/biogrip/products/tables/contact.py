@@ -5,7 +5,7 @@ from operator import attrgetter
 import numpy as np
 
 from biogrip.errors import BiogripError
-from biogrip.experiment.protocol import largest_torque, torque_history
+from biogrip.experiment.protocol import largest_load
 from biogrip.instrument import actuator
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
 from biogrip.products.tables.declared import table
@@ -26,7 +26,7 @@ _COLUMNS = (
 
 def contacts(study: Study) -> Table:
     """Return the state of the gripper closed onto samples from the smallest to the largest."""
-    grip_Nm = largest_torque(torque_history(study.phases))
+    grip_Nm = largest_load(study.phases)
     rows: list[tuple[Cell, ...]] = []
     for size_um in np.arange(1e6 * SMALLEST_M, 1e6 * LARGEST_M + 1, 15.0):
         try:

@@ -2,7 +2,7 @@
 
 from operator import attrgetter
 
-from biogrip.experiment.protocol import largest_torque, torque_history
+from biogrip.experiment.protocol import largest_load
 from biogrip.instrument.contact import LARGEST_M
 from biogrip.instrument.left_out import (
     drag_of_arm,
@@ -41,7 +41,7 @@ def left_out(study: Study) -> Table:
     dampings = [damping for case in study.cases.values() if (damping := _damping(case)) > 0]
     least = min(dampings, default=None)
     b, arm = gripper.lever_m, gripper.left
-    turn = largest_torque(torque_history(study.phases)) / arm.stiffness_Nm_per_rad
+    turn = largest_load(study.phases) / arm.stiffness_Nm_per_rad
     rows: list[tuple[Cell, ...]] = []
     if least is not None:
         drag = drag_of_sample(LARGEST_M)
