@@ -183,7 +183,7 @@ def _misfit(likelihood: Likelihood, times: float, residual: Array) -> Note:
     return Note(
         REJECTION,
         f"The misfit is {times:.2g} times the noise of the trace: "
-        f"{likelihood.problem.residuals.instrument.all_that_may_be_wrong} is not the right one.",
+        f"{likelihood.problem.residuals.instrument.suspects(unit=True)} is not the right one.",
     )
 
 

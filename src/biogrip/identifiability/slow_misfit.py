@@ -32,10 +32,11 @@ def find_slow_misfit(
     misfit = share > _MOST and time_s > _SLOW * duration_s
     if not misfit and not (share > _NOTICEABLE and time_s > _LONG * duration_s):
         return None
+    suspects = instrument.suspects(unit=True).capitalize()
     meaning = (
-        f"that is misfit, not noise. T{instrument.all_that_may_be_wrong[1:]} is not the right one."
+        f"that is misfit, not noise. {suspects} is not the right one."
         if misfit
-        else f"that may be misfit, of a {instrument.model_or_set_up} that is not the right one."
+        else f"that may be misfit, of a {instrument.suspects('')} that is not the right one."
     )
     return Note(
         REJECTION if misfit else DOUBT,

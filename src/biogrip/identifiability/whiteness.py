@@ -36,9 +36,8 @@ def doubts_about_noise(
     rounding_rad
         Step of the readings.
     """
-    read, wrong = instrument.read.name, instrument.model_or_set_up
+    read, wrong = instrument.read.name, instrument.suspects()
     many = f"{read}s" if instrument.has_jaws else "readings"
-    wrong = ", the ".join(wrong.split(", ")).replace(" or ", " or the ")
     if np.ptp(growth):
         low, high = np.quantile(growth, (0.05, 0.95))
         yield (
@@ -52,13 +51,13 @@ def doubts_about_noise(
     if abs(correlation) > _CORRELATED / np.sqrt(len(residual)):
         yield (
             f"Neighbouring residuals are correlated ({correlation:.2f}; white noise would give "
-            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or the {wrong} "
+            f"0 ± {1 / np.sqrt(len(residual)):.2f}): the intervals are too narrow, or {wrong} "
             "is not the right one."
         )
     elif chance < FALSE_ALARM:
         yield (
             "The residual has more of some frequencies than of others, as white noise has only "
-            f"{one_in(chance)} traces: the intervals are wrong, or the {wrong} is."
+            f"{one_in(chance)} traces: the intervals are wrong, or {wrong} is."
         )
     chance = wandering(residual)
     if chance < FALSE_ALARM:

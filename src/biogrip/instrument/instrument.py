@@ -54,16 +54,10 @@ class Instrument:
         """True if a deformation is held and a load is read."""
         return self.kind == "relaxation"
 
-    @property
-    def model_or_set_up(self) -> str:
-        """Words for what may be wrong if a model does not fit."""
-        return "model, protocol or gripper" if self.has_jaws else "model or protocol"
-
-    @property
-    def all_that_may_be_wrong(self) -> str:
-        """The same with the unit, each with its article."""
-        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), "unit"]
-        *first, last = (f"the {part}" for part in parts)
+    def suspects(self, article: str = "the ", *, unit: bool = False) -> str:
+        """Return what may be wrong if a model does not fit, and with `unit` the file's unit too."""
+        parts = ["model", "protocol", *(["gripper"] if self.has_jaws else []), *["unit"][:unit]]
+        *first, last = (f"{article}{part}" for part in parts)
         return f"{', '.join(first)} or {last}"
 
     @property

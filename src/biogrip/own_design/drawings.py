@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from biogrip.digits import counted
+from biogrip.digits import counted, with_unit
 from biogrip.experiment.protocol import Phase
 from biogrip.own_design.designed import Designed, kind, shown_unit
 from biogrip.products.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, PURPLE, SKY, figure
@@ -27,7 +27,7 @@ def draw_experiment(found: Designed) -> Figure:
     drawn = figure(PAGE_IN, 4.6 * sum(heights) / 3.3)
     upper, middle, *lower = drawn.subplots(len(heights), 1, sharex=True, height_ratios=heights)
     _draw_torque(upper, found)
-    upper.set_ylabel(in_unit(instrument.controlled.name, shown_unit(instrument)[1]))
+    upper.set_ylabel(with_unit(instrument.controlled.name, shown_unit(instrument)[1]))
     counts, _ = np.histogram(times, np.linspace(0, history.end_s, 201))
     middle.stairs(counts, np.linspace(0, history.end_s, 201), fill=True, color=SKY)
     middle.set_ylabel("readings")
@@ -40,11 +40,6 @@ def draw_experiment(found: Designed) -> Figure:
     [middle, *lower][-1].set_xlabel("time (s)")
     drawn.align_ylabels()
     return drawn
-
-
-def in_unit(name: str, unit: str) -> str:
-    """Return a name with its unit, if it has one."""
-    return f"{name} ({unit})" if unit else name
 
 
 def _draw_torque(axes: Axes, found: Designed) -> None:

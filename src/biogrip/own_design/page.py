@@ -9,6 +9,7 @@ import jinja2
 import numpy as np
 
 from biogrip import __version__
+from biogrip.digits import with_unit
 from biogrip.experiment.protocol import Harmonic, Phase
 from biogrip.files import write_text
 from biogrip.instrument.actuator import CombDrive, voltage
@@ -21,7 +22,7 @@ from biogrip.own_design.designed import (
     percent,
     shown_unit,
 )
-from biogrip.own_design.drawings import drawings, in_unit
+from biogrip.own_design.drawings import drawings
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.page import embedded
 from biogrip.products.figures.style import styled
@@ -58,18 +59,18 @@ def _columns(instrument: Instrument) -> Iterator[_Column]:
     scale, unit = shown_unit(instrument)
     yield _Column("for (s)", lambda phase, _: f"{phase.duration_s:.6g}")
     yield _Column(
-        in_unit(instrument.controlled.name, unit),
+        with_unit(instrument.controlled.name, unit),
         lambda phase, _: f"{scale * phase.left.value_Nm:.4g}",
     )
     yield _Column(
-        in_unit("to", unit),
+        with_unit("to", unit),
         lambda phase, _: (
             f"{scale * float(phase.left.at(phase.duration_s)):.4g}" if kind(phase) == "ramp" else ""
         ),
         "ramp",
     )
     yield _Column(
-        in_unit("amplitude", unit),
+        with_unit("amplitude", unit),
         lambda phase, _: _swing(phase, lambda harmonic: scale * harmonic.amplitude_Nm),
         "sinusoid",
     )

@@ -161,7 +161,7 @@ def _are_units(
     named: bool,
     in_step: bool,
 ) -> bool:
-    """Return whether the cells below names are units."""
+    """Return True if the cells below names are units."""
     if not any(cells) or len(cells) > len(names):
         return False
     if in_step:
@@ -188,7 +188,7 @@ def _end(lines: Lines, header: Header, following: Header) -> int:
 
 
 def _in_preamble(line: str, header: Header) -> bool:
-    """Return whether a line is no row, even a damaged one: it is short, or begins ``Test:``."""
+    """Return True if a line is no row, even a damaged one: it is short, or begins ``Test:``."""
     cells = cells_or_none(line, header.separator)
     filled = [i for i, cell in enumerate(cells) if cell]
     if not filled:

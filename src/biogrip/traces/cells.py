@@ -34,7 +34,7 @@ def count_numbers(cells: list[str]) -> int:
 
 
 def is_number(cell: str) -> bool:
-    """Return whether a cell is a finite number, with a decimal point or comma."""
+    """Return True if a cell is a finite number, with a decimal point or comma."""
     return bool(np.isfinite(number_or_inf(cell.replace(",", "."))))
 
 

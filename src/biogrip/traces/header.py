@@ -38,7 +38,7 @@ def split_header(path: Path, at: int, line: str, needed: Sequence[str]) -> tuple
 
 
 def has_columns(names: Sequence[str], columns: Columns) -> bool:
-    """Return whether names of a header include all columns to read."""
+    """Return True if names of a header include all columns to read."""
     return {*map(plain_name, columns.named.values())} <= {*map(plain_name, names)}
 
 

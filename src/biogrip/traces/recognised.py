@@ -46,7 +46,7 @@ class Recognised:
     """First and last time."""
 
     def is_usual(self, columns: Columns) -> bool:
-        """Return whether the file is a table as biogrip itself would write it."""
+        """Return True if the file is a table as biogrip itself would write it."""
         return (
             (self.encoding, self.separator, self.decimal_comma) == (UTF_8, ",", False)
             and self.units_line is self.block is columns.block is None

@@ -271,7 +271,7 @@ def _recognise(
 
 
 def _has_decimal_comma(lines: Lines, layout: Layout) -> bool:
-    """Return whether numbers in columns to read have a decimal comma."""
+    """Return True if numbers in columns to read have a decimal comma."""
     if layout.separator == ",":
         return False
     rows = (cells_or_none(line, layout.separator) for _, line in lines if "," in line)

@@ -112,7 +112,7 @@ def bare_unit(cell: str) -> str:
 
 
 def in_brackets(cell: str) -> bool:
-    """Return whether a cell has nothing but brackets and what they hold."""
+    """Return True if a cell has nothing but brackets and what they hold."""
     return _IN_BRACKETS.fullmatch(cell.strip()) is not None
 
 
