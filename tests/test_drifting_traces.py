@@ -15,7 +15,8 @@ from biogrip.identifiability.whiteness import wandering
 from biogrip.identify.answer import silent
 from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace, study_of
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.second_opinion import second_opinion
+from biogrip.own_traces.second_opinion import second_opinions
+from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.traces import Measurements
 from tests.helpers.problems import clean, run
 
@@ -49,7 +50,9 @@ def suspected(
     problem = case.problem.of(TIMES, rotation)
     told = diagnose(problem, case.problem.searched, run("least_squares", problem), confidence=0.95)
     recorded = Measurements(TIMES, None, {0: rotation})
-    return told, second_opinion(study, case, recorded, told, silent)
+    read = TraceCase(case, recorded, case.problem, names_models=False)
+    (notes,) = second_opinions([read], [told], silent)
+    return told, notes
 
 
 def test_white_noise_wanders_as_often_as_it_should() -> None:

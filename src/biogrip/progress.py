@@ -18,13 +18,14 @@ class Progress:
     """Counter of the completed pieces of a job.
 
     If it is live, it shows every phase on the terminal in a line that is cleared at the end: not
-    for jobs that share a terminal.
+    for jobs that share a terminal. If it is quiet, it prints notes only.
     """
 
-    def __init__(self, what: str, total: int, *, live: bool = False) -> None:
+    def __init__(self, what: str, total: int, *, live: bool = False, quiet: bool = False) -> None:
         self._what = visible(what)
         self._total = total
         self._live = live and sys.stderr.isatty()
+        self._quiet = quiet or QUIET in os.environ
         self._done = 0
         self._phase = ""
         self._said = time.monotonic()
@@ -64,7 +65,7 @@ class Progress:
         said = f"{self._what}: {self._done} of {self._total} done{self._phase}{more}"
         if self._live:
             print(f"{_CLEARED}{said}", end="", file=sys.stderr, flush=True)
-        elif now - self._said >= _EVERY_S and QUIET not in os.environ:
+        elif now - self._said >= _EVERY_S and not self._quiet:
             self._said = now
             # To standard output, so that it does not fill the job's log.
             print(said, flush=True)

@@ -1,7 +1,7 @@
 """Diagnosis of one trace: best fit, a verdict on every quantity, and doubts about the result."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -59,43 +59,76 @@ def diagnose(
     confidence: float,
     noise_rad: float | None = None,
 ) -> Diagnosis:
-    """Judge the identification of one trace by profile likelihoods.
+    """Judge the identification of one trace by profile likelihoods, as `diagnose_all` does."""
+    (diagnosis,) = diagnose_all(
+        [problem], model, [found], confidence=confidence, noise_rad=[noise_rad]
+    )
+    return diagnosis
 
-    If a profile comes below the optimum, the optimum was not the global one, and all
-    is judged again from the lower one.
+
+def diagnose_all(
+    problems: Sequence[Problem],
+    model: SampleModel,
+    found: Sequence[Identification],
+    *,
+    confidence: float,
+    noise_rad: Sequence[float | None],
+) -> list[Diagnosis]:
+    """Judge the identification of each of several traces by profile likelihoods.
+
+    If a profile comes below the optimum, the optimum was not the global one, and the trace
+    is judged again from the lower one. No diagnosis depends on the other traces.
 
     Parameters
     ----------
-    problem, model
-        The trace, and the model whose parameters were searched.
+    problems, model
+        The traces, and the model whose parameters were searched.
     found
-        Its global optimum, as far as is known.
+        Global optimum of each, as far as is known.
     confidence
         Of the limits, e.g. 0.95.
     noise_rad
-        Standard deviation of the noise, if it is known; else that of the residual.
+        Standard deviation of the noise of each, if it is known; else that of the residual.
     """
-    while True:
-        likelihood = make_likelihood(
-            problem,
-            np.log(found.parameters),
-            found.misfit_rad,
-            confidence=confidence,
-            noise_rad=noise_rad,
-        )
-        findings = compute_findings(likelihood, parameters_and_sum(model))
-        trades = find_trade_offs(likelihood, model, findings)
-        profiled = [*findings, *(trade.finding for trade in trades)]
-        lowest = min(
-            (finding.profile for finding in profiled), key=lambda p: float(p.increases.min())
-        )
-        if lowest.increases.min() > -MISSED:
-            break
-        missed = found.at(fit_from([problem], lowest.lowest))
-        if likelihood.increase(missed.misfit_rad) > -MISSED:
-            break
-        found = missed
-    grip = problem.residuals.grip(likelihood.best)
+    best, done = list(found), dict[int, Diagnosis]()
+    while left := [trace for trace in range(len(problems)) if trace not in done]:
+        likelihoods = [
+            make_likelihood(
+                problems[trace],
+                np.log(best[trace].parameters),
+                best[trace].misfit_rad,
+                confidence=confidence,
+                noise_rad=noise_rad[trace],
+            )
+            for trace in left
+        ]
+        findings = compute_findings(likelihoods, parameters_and_sum(model))
+        trades = find_trade_offs(likelihoods, model, findings)
+        for place, trace in enumerate(left):
+            judged = Diagnosis(likelihoods[place], findings[place], trades[place], None, [])
+            lower = _lower_optimum(judged, best[trace])
+            if lower is None:
+                done[trace] = _with_notes(judged, model, converged=best[trace].converged)
+            else:
+                best[trace] = lower
+    return [done[trace] for trace in range(len(problems))]
+
+
+def _lower_optimum(judged: Diagnosis, found: Identification) -> Identification | None:
+    """Return the optimum that is fitted from the lowest point of the profiles, if it is lower."""
+    profiled = [*judged.findings, *(trade.finding for trade in judged.trades)]
+    lowest = min((finding.profile for finding in profiled), key=lambda p: float(p.increases.min()))
+    if lowest.increases.min() > -MISSED:
+        return None
+    missed = found.at(fit_from([judged.likelihood.problem], lowest.lowest))
+    return None if judged.likelihood.increase(missed.misfit_rad) > -MISSED else missed
+
+
+def _with_notes(judged: Diagnosis, model: SampleModel, *, converged: bool) -> Diagnosis:
+    """Return a diagnosis with the force of the jaws and with notes."""
+    likelihood, findings = judged.likelihood, judged.findings
+    residuals = likelihood.problem.residuals
+    grip = residuals.grip(likelihood.best)
     notes = [
         Note(
             HARMLESS,
@@ -106,8 +139,8 @@ def diagnose(
         if finding.gaps
     ]
     notes += [*note_range_ends(likelihood, model), *_noise(likelihood)]
-    notes += _pulling(grip, problem.residuals.duration_s)
-    if not found.converged:
+    notes += _pulling(grip, residuals.duration_s)
+    if not converged:
         notes.append(
             Note(
                 DOUBT,
@@ -115,7 +148,7 @@ def diagnose(
                 "chi-squared. Rely on its verdicts, not on its digits.",
             )
         )
-    return Diagnosis(likelihood, findings, trades, grip, notes)
+    return replace(judged, grip=grip, notes=notes)
 
 
 def _pulling(grip: Grip | None, last_s: float) -> Iterator[Note]:

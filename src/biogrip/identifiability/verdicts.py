@@ -139,38 +139,87 @@ class Trade:
         )
 
 
-def compute_findings(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[Finding]:
-    """Profile quantities and reach a verdict on each."""
-    (profiles,) = compute_profiles([likelihood], quantities)
+def compute_findings(
+    likelihoods: Sequence[Likelihood], quantities: Sequence[Quantity]
+) -> list[list[Finding]]:
+    """Profile quantities in each of several traces, and reach a verdict on each of them."""
     return [
-        Finding(quantity, profile, likelihood.deviation(quantity))
-        for quantity, profile in zip(quantities, profiles, strict=True)
+        [
+            Finding(quantity, profile, likelihood.deviation(quantity))
+            for quantity, profile in zip(quantities, profiles, strict=True)
+        ]
+        for likelihood, profiles in zip(
+            likelihoods, compute_profiles(likelihoods, quantities), strict=True
+        )
     ]
 
 
 def find_trade_offs(
-    likelihood: Likelihood, model: SampleModel, findings: list[Finding]
-) -> list[Trade]:
-    """Find determined combinations of parameters that are not determined themselves."""
+    likelihoods: Sequence[Likelihood], model: SampleModel, findings: Sequence[list[Finding]]
+) -> list[list[Trade]]:
+    """Find determined combinations of parameters that are not determined themselves.
+
+    Parameters
+    ----------
+    likelihoods
+        One per trace.
+    model
+        Their model.
+    findings
+        Findings of each trace.
+
+    Returns
+    -------
+    list of list of Trade
+        By trace.
+    """
+    pairs = zip(likelihoods, findings, strict=True)
+    candidates = [_pairs_that_may_trade(*pair, model) for pair in pairs]
+    # Traces with the same combination are profiled together.
+    traces: dict[Quantity, list[int]] = {}
+    for trace, (_, of_pairs) in enumerate(candidates):
+        for quantity in of_pairs.values():
+            traces.setdefault(quantity, []).append(trace)
+    profiled = {
+        (trace, quantity): finding
+        for quantity, own in traces.items()
+        for trace, (finding,) in zip(
+            own, compute_findings([likelihoods[t] for t in own], [quantity]), strict=True
+        )
+    }
+    names = [parameter.name for parameter in model.parameters]
+    return [
+        [
+            Trade(tuple(names[index] for index in members), finding)
+            for members, finding in (
+                *known.items(),
+                *((pair, profiled[trace, quantity]) for pair, quantity in of_pairs.items()),
+            )
+            if finding.verdict == DETERMINED
+        ]
+        for trace, (known, of_pairs) in enumerate(candidates)
+    ]
+
+
+def _pairs_that_may_trade(
+    likelihood: Likelihood, findings: Sequence[Finding], model: SampleModel
+) -> tuple[dict[tuple[int, ...], Finding], dict[tuple[int, ...], Quantity]]:
+    """Return combinations of undetermined parameters: those profiled, and others worth a look."""
     open_ones = [
         finding.quantity.members[0]
         for finding in findings
         if len(finding.quantity.members) == 1 and finding.verdict != DETERMINED
     ]
-    found: list[tuple[list[int], Finding]] = []
+    known: dict[tuple[int, ...], Finding] = {}
     for finding in findings:
-        members = [index for index in finding.quantity.members if index in open_ones]
+        members = tuple(index for index in finding.quantity.members if index in open_ones)
         if len(members) > 1:
-            found.append((members, finding))
+            known[members] = finding
             open_ones = [index for index in open_ones if index not in members]
+    others: dict[tuple[int, ...], Quantity] = {}
     for pair in combinations(open_ones, 2):
         candidates = find_combinations(model, list(pair))
         deviations = [likelihood.deviation(quantity) for quantity in candidates]
         if min(deviations, default=np.inf) < _WORTH_A_LOOK:
-            best = candidates[int(np.argmin(deviations))]
-            found += [(list(pair), finding) for finding in compute_findings(likelihood, [best])]
-    return [
-        Trade(tuple(model.parameters[index].name for index in members), finding)
-        for members, finding in found
-        if finding.verdict == DETERMINED
-    ]
+            others[pair] = candidates[int(np.argmin(deviations))]
+    return known, others

@@ -1,6 +1,6 @@
 """Assumptions of the identification that all traces of a case share."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -22,6 +22,9 @@ from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.nuisance import nuisance_basis, with_uncertain
 from biogrip.response.whitening import WEIGHTED, NoiseModel, Whitening
+
+SharedRows = dict[Hashable, Condensed]
+"""Condensed rows by all that they depend on."""
 
 
 @dataclass(frozen=True)
@@ -59,9 +62,7 @@ class CaseProblem:
     ``gripper`` itself; and ``share`` of the ``torque``."""
     fit_start: bool = False
     """True if the time at which the protocol started is fitted along, see `fitted_onset`."""
-    _condensed: dict[tuple[bytes, bool], Condensed] = field(
-        default_factory=dict, init=False, compare=False
-    )
+    _condensed: "SharedRows" = field(default_factory=dict, init=False, compare=False)
     _changes: dict[bytes, float] = field(default_factory=dict, init=False, compare=False)
 
     @cached_property
@@ -129,19 +130,22 @@ class CaseProblem:
         model: SampleModel | None = None,
         noise_rad: float | None = None,
         condensed: Condensed | None = None,
+        shared: SharedRows | None = None,
     ) -> Problem:
         """Set up the problem of a trace.
 
-        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case.
+        `model`, `noise_rad`, and `condensed` from `in_noise` replace those of the case; `shared`,
+        rows of several cases, which are added to, those that the traces of this case share.
         """
         noise_rad = noise_rad or self.noise_rad
         if condensed is None:
             # Shared by all traces of a case: condensing takes as long as some fifty responses.
             shown = self.shows_inertia(time_s, rotation_rad, noise_rad)
-            sampled = time_s.tobytes(), shown
-            if sampled not in self._condensed:
-                self._condensed[sampled] = self._condense_weighted(time_s, shown)
-            condensed = self._condensed[sampled]
+            rows = self._condensed if shared is None else shared
+            sampled = (*self._sets_rows, time_s.tobytes(), shown)
+            if sampled not in rows:
+                rows[sampled] = self._condense_weighted(time_s, shown)
+            condensed = rows[sampled]
         return make_problem(
             self.gripper,
             model or self.searched,
@@ -152,6 +156,20 @@ class CaseProblem:
             condensed,
             noise_rad=noise_rad,
             instrument=self.instrument,
+        )
+
+    @property
+    def _sets_rows(self) -> tuple[Hashable, ...]:
+        """All that condensed rows depend on but the sampling times and inertia."""
+        sd = None if self.sd_rad is None else self.sd_rad.tobytes()
+        return (
+            self.gripper,
+            self.phases,
+            self.instrument,
+            self.nonlinear,
+            self.offset,
+            self.drift,
+            sd,
         )
 
     def _condense_weighted(self, time_s: Array, inertia: bool) -> Condensed:

@@ -5,7 +5,7 @@ the autocorrelation of its residuals and the effect of the gripper's uncertainty
 computed in turn, until none of them changes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ from biogrip.arrays import Array, BoolArray
 from biogrip.digits import counted, rounded
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import Identification
-from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.case_problem import CaseProblem, SharedRows
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood
@@ -84,6 +84,40 @@ class TraceFit:
             samples = counted(left_out, "sample")
             said.append(f"Left out as outliers: {samples} of {len(self.outliers)}.")
         return said
+
+
+def fit_traces(
+    case_problems: Sequence[CaseProblem],
+    traces: Sequence[tuple[Array, Array]],
+    find: Callable[[Sequence[Problem], Sequence[int]], list[Identification]],
+) -> list[TraceFit]:
+    """Fit each of several traces as `trace_fit` does, and those with plain noise together.
+
+    Parameters
+    ----------
+    case_problems
+        Assumptions of the identification of each trace.
+    traces
+        Times and rotations of each.
+    find
+        Function that finds the global optima of problems of given traces.
+    """
+    plain = [trace for trace, case_problem in enumerate(case_problems) if case_problem.plain]
+    shared: SharedRows = {}
+    problems = [case_problems[trace].of(*traces[trace], shared=shared) for trace in plain]
+    optima = find(problems, plain) if plain else []
+    found = {
+        trace: TraceFit(problem, optimum, None, np.zeros(len(traces[trace][0]), dtype=bool))
+        for trace, problem, optimum in zip(plain, problems, optima, strict=True)
+    }
+
+    def find_alone(trace: int) -> Find:
+        return lambda problem: find([problem], [trace])[0]
+
+    for trace, case_problem in enumerate(case_problems):
+        if trace not in found:
+            found[trace] = trace_fit(case_problem, *traces[trace], find_alone(trace))
+    return [found[trace] for trace in range(len(traces))]
 
 
 def trace_fit(

@@ -1,6 +1,6 @@
 """Model selection for one trace: fits of other sample models, ranked by AIC and BIC."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,7 +24,7 @@ from biogrip.identify.model_choice import (
 )
 from biogrip.identify.nested_fits import fit_models, is_within
 from biogrip.identify.trace_fit import TraceFit
-from biogrip.study.study import Case, Study
+from biogrip.own_traces.trace_case import TraceCase
 
 _MOST_SAMPLES = 50_000
 # Each of the others would take half a second to five; they are tried where the config names them.
@@ -119,73 +119,92 @@ def vanished(candidate: str, answer: Identification) -> list[str]:
 
 
 def models_tried(
-    study: Study,
-    case: Case,
-    fit: TraceFit,
-    diagnosis: Diagnosis,
-    done: Callable[[], None],
-    *,
-    named: bool,
-) -> FittedModels:
-    """Fit several sample models to a trace with the same noise model.
+    traces: Sequence[TraceCase], fits: Sequence[TraceFit], diagnoses: Sequence[Diagnosis]
+) -> list[FittedModels]:
+    """Fit several sample models to each trace with the noise model of its fit.
 
     None are fitted with fixed parameters, with the nonlinear model, which takes minutes, or if
     there is only one model.
 
     Parameters
     ----------
-    study, case
-        The models to fit, and the budget of each fit.
-    fit
-        Fit of the trace with the chosen model.
-    diagnosis
+    traces
+        Traces of the same chosen model and budget.
+    fits
+        Fit of each with the chosen model.
+    diagnoses
         Diagnosis of that fit; its best fit is one of the starts.
-    done
-        Function to call after every model.
-    named
-        True if the config names the models; if not, power laws are tried as well.
     """
-    case_problem, chosen = case.problem, case.sample.candidate
-    if case_problem.nonlinear or case_problem.fixed:
-        return FittedModels(chosen)
+    candidates = [_candidates(*pair) for pair in zip(traces, fits, strict=True)]
+    found: dict[int, FittedModels] = {}
+    for names in dict.fromkeys(candidates):
+        same = [index for index, own in enumerate(candidates) if own == names]
+        found.update(zip(same, _tried(names, traces, fits, diagnoses, same), strict=True))
+    return [found[index] for index in range(len(traces))]
+
+
+def _candidates(trace: TraceCase, fit: TraceFit) -> tuple[str, ...]:
+    """Return the names of the models to fit to a trace, none if nothing is compared."""
+    if trace.problem.nonlinear or trace.problem.fixed:
+        return ()
     # With very many samples the dozens of modes of a springpot would take gigabytes.
     few = fit.problem.residuals.samples <= _MOST_SAMPLES
-    power_laws = _power_laws(case_problem.torque.end_s) if few and not named else []
-    candidates = tuple(dict.fromkeys((*case.models, *power_laws)))
-    if len(candidates) < 2:
-        return FittedModels(chosen)
+    power_laws = few and not trace.names_models
+    others = _power_laws(trace.problem.torque.end_s) if power_laws else []
+    names = tuple(dict.fromkeys((*trace.case.models, *others)))
+    return names if len(names) > 1 else ()
+
+
+def _tried(
+    names: Sequence[str],
+    traces: Sequence[TraceCase],
+    fits: Sequence[TraceFit],
+    diagnoses: Sequence[Diagnosis],
+    which: Sequence[int],
+) -> Iterator[FittedModels]:
+    """Yield fits of the same models to some of the traces."""
+    case = traces[0].case
+    chosen = case.sample.candidate
+    if not names:
+        yield from [FittedModels(chosen)] * len(which)
+        return
     found = fit_models(
         {
-            name: [case_problem.for_model(fit.problem, CANDIDATES[name].model)]
-            for name in candidates
+            name: [
+                traces[index].problem.for_model(fits[index].problem, CANDIDATES[name].model)
+                for index in which
+            ]
+            for name in names
         },
         case.least_squares,
-        {name: [stream(study.study_seed, case.name, 0, f"model {name}")] for name in candidates},
-        done,
-        near={chosen: diagnosis.likelihood.best[None]},
+        {
+            name: [
+                stream(own.study.study_seed, own.name, 0, f"model {name}")
+                for own in (traces[index].case for index in which)
+            ]
+            for name in names
+        },
+        lambda: None,
+        near={chosen: np.array([diagnoses[index].likelihood.best for index in which])},
     )
-    answers = [found[name][0] for name in candidates]
-    misfits = [answer.misfit_rad for answer in answers]
-    return FittedModels(chosen, ranked(candidates, misfits, fit.problem.residuals.samples), answers)
+    for place, index in enumerate(which):
+        answers = [found[name][place] for name in names]
+        misfits = [answer.misfit_rad for answer in answers]
+        samples = fits[index].problem.residuals.samples
+        yield FittedModels(chosen, ranked(names, misfits, samples), answers)
 
 
 def judge_again(
-    fit: TraceFit,
-    diagnosis: Diagnosis,
-    models: FittedModels,
-    confidence: float,
-    noise_rad: float | None,
+    trace: TraceCase, fit: TraceFit, diagnosis: Diagnosis, models: FittedModels
 ) -> tuple[Diagnosis, list[Note]]:
     """Diagnose a trace again if fits of other models found a lower chi^2 within the search range.
 
     Parameters
     ----------
-    fit, diagnosis
-        Fit and diagnosis so far.
+    trace, fit, diagnosis
+        Trace, and its fit and diagnosis so far.
     models
         Fits of all models.
-    confidence, noise_rad
-        Arguments of `diagnose`.
 
     Returns
     -------
@@ -198,8 +217,14 @@ def judge_again(
     if own is None or (increase := diagnosis.likelihood.increase(own.misfit_rad)) > -MISSED:
         return diagnosis, []
     if is_within(own.parameters, fit.problem):
-        model = fit.problem.residuals.model
-        return diagnose(fit.problem, model, own, confidence=confidence, noise_rad=noise_rad), []
+        again = diagnose(
+            fit.problem,
+            fit.problem.residuals.model,
+            own,
+            confidence=trace.case.confidence,
+            noise_rad=trace.problem.noise_rad,
+        )
+        return again, []
     gone = vanished(models.chosen, own)
     where = f", without {' and '.join(gone)}" if gone else ""
     text = (

@@ -1,6 +1,7 @@
 """The command ``biogrip identify``: the files it writes and the text it prints."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from biogrip.errors import BiogripError
@@ -79,19 +80,17 @@ def identify(
     refuse_inputs(written, [*traces, *filter(None, [config])])
     for path in written:
         check_output(path, force=force)
-    page = None
-    if report is not None:
-        from biogrip.own_traces.page import Page
-
-        page = Page()
-    outcome = identify_traces(options, outputs, page)
+    every = [replace(options, trace=trace) for trace in outputs]
+    outcome = identify_traces(every, list(outputs.values()), page=report is not None)
     outcome.refused.update(absent)
     if len(traces) == 1 and outcome.refused:
         raise BiogripError(next(iter(outcome.refused.values())))
     if table is not None:
         write_table(outcome, table)
-    if page is not None and report is not None:
-        page.write(outcome.refused, report)
+    if report is not None:
+        from biogrip.own_traces.page import write_page
+
+        write_page(outcome.on_page, outcome.refused, report)
     print(in_words(outcome.found[0]) if len(traces) == 1 else _of_many(outcome))
     said = [outputs[Path(each["trace"])] for each in outcome.found]
     said += [path.with_suffix(SAMPLES) for path in said if samples]

@@ -1,23 +1,34 @@
-"""Identification of several recorded traces, each by itself."""
+"""Identification of several recorded traces in batches, each trace as if it were alone."""
 
+import os
 import sys
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instruments import INSTRUMENTS
-from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
+from biogrip.own_traces.one_trace import (
+    Identified,
+    IdentifyOptions,
+    case_of,
+    identify_alike,
+    identify_trace,
+    read,
+)
 from biogrip.own_traces.outputs import WRITTEN_BY, name_in_units
+from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.rows import write_rows
+from biogrip.progress import Progress
 from biogrip.terminal import visible
+from biogrip.worker_processes import worker_processes
 
-if TYPE_CHECKING:
-    from biogrip.own_traces.page import Page
-
+# Most traces of a batch, and most readings of traces that are fitted together.
+_MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _OF_QUANTITY = ("verdict", "value", "low", "high")
 
 
@@ -31,39 +42,134 @@ class Outcome:
         Result of each usable trace, as data of `identify_trace`.
     refused
         Error message of each other trace, by file.
+    on_page
+        What a page shows of each usable trace, if there is to be one.
     """
 
     found: list[dict[str, Any]]
     refused: dict[str, str]
+    on_page: list[dict[str, Any]] = field(default_factory=list)
 
 
 def identify_traces(
-    options: IdentifyOptions, outputs: Mapping[Path, Path], page: "Page | None"
+    options: Sequence[IdentifyOptions], outputs: Sequence[Path], *, page: bool
 ) -> Outcome:
-    """Identify traces one after the other, and collect the errors of those that cannot be used.
+    """Identify traces in batches, and collect the errors of those that cannot be used.
+
+    The result of a trace is the same, to the last bit, in any batch and alone.
 
     Parameters
     ----------
     options
-        Options for all traces; its own trace is ignored.
+        Options of each trace.
     outputs
-        JSON file to write for each CSV file.
+        JSON file to write for each.
     page
-        Page that every identified trace is added to, if any.
+        True to draw what a page shows of each.
     """
-    found, refused = [], {}
-    for number, (trace, output) in enumerate(outputs.items(), start=1):
+    if len(options) == 1:
+        return identify_batch(options, outputs, page=page)
+    processors = len(os.sched_getaffinity(0))
+    size = min(_MOST_IN_BATCH, -(-len(options) // processors))
+    batches = [slice(start, start + size) for start in range(0, len(options), size)]
+    found: dict[int, Outcome] = {}
+    with worker_processes(min(processors, len(batches))) as processes:
+        jobs = {
+            processes.submit(identify_batch, options[own], outputs[own], page=page): place
+            for place, own in enumerate(batches)
+        }
+        done = 0
+        for job in as_completed(jobs):
+            place = jobs[job]
+            found[place] = job.result()
+            for own in options[batches[place]]:
+                done += 1
+                print(f"{done} of {len(options)}: {visible(own.trace)}", file=sys.stderr)
+    return _joined(found[place] for place in range(len(batches)))
+
+
+def _joined(outcomes: Iterable[Outcome]) -> Outcome:
+    every = Outcome([], {})
+    for outcome in outcomes:
+        every.found.extend(outcome.found)
+        every.refused.update(outcome.refused)
+        every.on_page.extend(outcome.on_page)
+    return every
+
+
+def identify_batch(
+    options: Sequence[IdentifyOptions], outputs: Sequence[Path], *, page: bool
+) -> Outcome:
+    """Identify the traces of one batch; arguments and result as of `identify_traces`."""
+    results: dict[int, Identified | BiogripError] = {}
+    if len(options) == 1:
         try:
-            identified: Identified = identify_trace(replace(options, trace=trace), output)
+            results[0] = identify_trace(options[0], outputs[0])
         except BiogripError as error:
-            refused[str(trace)] = str(error)
+            results[0] = error
+    else:
+        results = _results(options, outputs)
+    outcome = Outcome([], {})
+    for index, own in enumerate(options):
+        result = results[index]
+        if isinstance(result, BiogripError):
+            outcome.refused[str(own.trace)] = str(result)
         else:
-            found.append(identified.data)
-            if page is not None:
-                page.add(identified)
-        if len(outputs) > 1:
-            print(f"{number} of {len(outputs)}: {visible(trace)}", file=sys.stderr, flush=True)
-    return Outcome(found, refused)
+            outcome.found.append(result.data)
+            if page:
+                # Imported here: loading Matplotlib takes long.
+                from biogrip.own_traces.page import for_page
+
+                outcome.on_page.append(for_page(result))
+    return outcome
+
+
+def _results(
+    options: Sequence[IdentifyOptions], outputs: Sequence[Path]
+) -> dict[int, Identified | BiogripError]:
+    """Return results or errors of traces by their index, those alike fitted together."""
+    results: dict[int, Identified | BiogripError] = {}
+    traces: dict[int, TraceCase] = {}
+    progress = Progress("", 0, quiet=True)
+    for index, own in enumerate(options):
+        try:
+            traces[index] = read(own, case_of(own), progress)
+        except BiogripError as error:
+            results[index] = error
+
+    def identify(group: Sequence[int]) -> None:
+        try:
+            found = identify_alike(
+                [options[index] for index in group],
+                [traces[index] for index in group],
+                [outputs[index] for index in group],
+                progress,
+            )
+            results.update(zip(group, found, strict=True))
+        except BiogripError as error:
+            if len(group) == 1:
+                results[group[0]] = error
+            # The error is of one of them.
+            for index in group if len(group) > 1 else []:
+                identify([index])
+
+    for group in _alike(traces):
+        identify(group)
+    return results
+
+
+def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
+    """Group the indices of traces that can be fitted together, none with too many readings."""
+    groups: list[list[int]] = []
+    for index, trace in traces.items():
+        for group in groups:
+            readings = sum(len(traces[other].readings[0]) for other in (*group, index))
+            if readings <= _MOST_READINGS and trace.is_like(traces[group[0]]):
+                group.append(index)
+                break
+        else:
+            groups.append([index])
+    return groups
 
 
 def write_table(outcome: Outcome, table: Path) -> None:

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -12,14 +12,15 @@ import numpy as np
 
 from biogrip import __version__
 from biogrip.arrays import Array
-from biogrip.digits import rounded_numbers
+from biogrip.digits import counted, rounded_numbers
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.files import write_text
-from biogrip.identifiability.diagnosis import diagnose
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose_all
 from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
 from biogrip.identifiability.onset_profiles import profile_over_onset
 from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.trace_fit import TraceFit
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.own_traces.assumed import (
     assumed,
@@ -28,19 +29,17 @@ from biogrip.own_traces.assumed import (
     names_models,
     versions,
 )
-from biogrip.own_traces.fitted_models import judge_again, models_tried
+from biogrip.own_traces.fitted_models import FittedModels, judge_again, models_tried
 from biogrip.own_traces.instrument_of_trace import with_instrument
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
-from biogrip.own_traces.second_opinion import second_opinion
+from biogrip.own_traces.second_opinion import second_opinions
+from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.posterior import limits_in, write_samples
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages import posterior, recording
-from biogrip.products.stages.judgement import (
-    fit_judged,
-    notes_on_fit,
-)
+from biogrip.products.stages.judgement import fits_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
@@ -123,82 +122,169 @@ def identify_trace(options: IdentifyOptions, output: Path) -> Identified:
     BiogripError
         With file, line and column or key, if trace or config cannot be used.
     """
-    study = study_of(options)
-    (case,) = study.cases.values()
-    pieces = 5 + (case.posterior is not None)
-    with Progress(str(options.trace), pieces, live=True) as progress:
-        recorded, case = read_trace(options.trace, case, options.config, progress.note)
+    case = case_of(options)
+    with Progress(str(options.trace), 5 + (case.posterior is not None), live=True) as progress:
+        trace = read(options, case, progress)
         progress.done()
-        progress.doing(f"fitting {len(recorded.time_s)} samples")
-        case_problem = case.problem.weighted(recorded.sd_rad)
-        fit = fit_judged(
-            case, case_problem, recorded.time_s, recorded.rotation_rad[0], 0, progress.within
+        (identified,) = identify_alike([options], [trace], [output], progress)
+    return identified
+
+
+def case_of(options: IdentifyOptions) -> Case:
+    """Return the case that the trace of some options is, before its file is read.
+
+    Raises
+    ------
+    BiogripError
+        With option, or file, line and key, if options or config cannot be used for any trace.
+    """
+    (case,) = study_of(options).cases.values()
+    return case
+
+
+def read(options: IdentifyOptions, case: Case, progress: Progress) -> TraceCase:
+    """Read the trace of some options as a case.
+
+    Raises
+    ------
+    BiogripError
+        With file, line and column, if the trace cannot be used.
+    """
+    recorded, case = read_trace(options.trace, case, options.config, progress.note)
+    problem = case.problem.weighted(recorded.sd_rad)
+    return TraceCase(case, recorded, problem, names_models(options.config))
+
+
+def identify_alike(
+    options: Sequence[IdentifyOptions],
+    traces: Sequence[TraceCase],
+    outputs: Sequence[Path],
+    progress: Progress,
+) -> list[Identified]:
+    """Identify several traces, each as if it were alone, and write the result of each.
+
+    Parameters
+    ----------
+    options
+        Options of each trace.
+    traces
+        The traces: of the same model, budget of fits and confidence.
+    outputs
+        JSON file of each.
+    progress
+        Counter of the five steps, or six with a posterior.
+
+    Raises
+    ------
+    BiogripError
+        If one of the traces cannot be fitted; nothing is then written.
+    """
+    first = traces[0]
+    progress.doing(f"fitting {counted(sum(len(own.readings[0]) for own in traces), 'sample')}")
+    cases, problems = [own.case for own in traces], [own.problem for own in traces]
+    fits = fits_judged(cases, problems, [own.readings for own in traces], 0, progress.within)
+    progress.done()
+    progress.doing("finding confidence limits")
+    diagnoses = diagnose_all(
+        [fit.problem for fit in fits],
+        first.problem.searched,
+        [fit.found for fit in fits],
+        confidence=first.case.confidence,
+        noise_rad=[problem.noise_rad for problem in problems],
+    )
+    progress.done()
+    progress.doing("trying other sample models")
+    models = models_tried(traces, fits, diagnoses)
+    again = [judge_again(*each) for each in zip(traces, fits, diagnoses, models, strict=True)]
+    diagnoses = [
+        profile_over_onset(diagnosis, own.recorded.time_s) if own.problem.fit_start else diagnosis
+        for own, (diagnosis, _) in zip(traces, again, strict=True)
+    ]
+    progress.done()
+    progress.doing("trying an offset and a drift")
+    opinions = second_opinions(traces, diagnoses, progress.within)
+    judged = [
+        Judged(fit, diagnosis, own_models, [*doubts, *opinion])
+        for fit, diagnosis, own_models, (_, doubts), opinion in zip(
+            fits, diagnoses, models, again, opinions, strict=True
         )
-        progress.done()
-        progress.doing("finding confidence limits")
-        confidence = case.confidence
-        diagnosis = diagnose(
-            fit.problem,
-            case_problem.searched,
-            fit.found,
-            confidence=confidence,
-            noise_rad=case_problem.noise_rad,
-        )
-        progress.done()
-        progress.doing("trying other sample models")
-        named = names_models(options.config)
-        models = models_tried(study, case, fit, diagnosis, lambda: None, named=named)
-        diagnosis, doubts = judge_again(fit, diagnosis, models, confidence, case_problem.noise_rad)
-        if case_problem.fit_start:
-            diagnosis = profile_over_onset(diagnosis, recorded.time_s)
-        progress.done()
-        progress.doing("trying an offset and a drift")
-        doubts += second_opinion(study, case, recorded, diagnosis, progress.within)
-        if case.may_start_late:
-            near = diagnosis.likelihood.best
-            doubts += note_late_onset(case_problem, recorded.time_s, recorded.rotation_rad[0], near)
-        read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
-        assumptions = [Note(HARMLESS, _NOT_COMPARED)] if case_problem.fixed else []
-        instrument = case_problem.instrument
-        said = exact_data(diagnosis, [*assumptions, *notes_on_fit(fit), *doubts], read)
-        # Evidence is compared of fewer models than are tried where the config names none.
-        unnamed = case.compared_models and not named
-        tried = None if unnamed else models.names or list(case.models)
-        data = {
-            WRITTEN_BY: __version__,
-            "trace": str(options.trace),
-            "model": case_problem.model.name,
-            "model_title": case_problem.model.title,
-            "confidence": confidence,
-            "instrument": instrument.kind,
-            "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
-            **_read_as(case, recorded),
-            **fixed_data(case_problem),
-            "limits": gripper_in_limits(case_problem),
-            **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
-            **said,
-            "noise_model": fit.noise_data(),
-            **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
-            "assumed": assumed(case, tried),
-            "by_default": by_default(options.config) if instrument.has_jaws else [],
-            "versions": versions(),
-        }
-        samples = None
-        if case.posterior is not None:
-            progress.done()
-            progress.doing("sampling the posterior")
-            data["posterior"], drawn = posterior.posterior_of_trace(
-                case,
-                case_problem,
-                partial(case_problem.for_model, fit.problem),
-                limits_in(said),
-                progress.within,
-            )
+    ]
+    data = [_data(*each) for each in zip(options, traces, judged, strict=True)]
+    drawn = [
+        _posterior(own, fit, of_trace, progress) if own.case.posterior is not None else None
+        for own, fit, of_trace in zip(traces, fits, data, strict=True)
+    ]
+    for own, of_trace, samples, output in zip(traces, data, drawn, outputs, strict=True):
+        if samples is not None:
             words = {WRITTEN_BY: __version__}
-            write_samples(output.with_suffix(SAMPLES), case_problem.searched, drawn, words)
-            samples = np.exp(drawn)
-    write_text(output, json.dumps(_written(data), indent=1) + "\n")
-    return Identified(data, case_problem, recorded, samples)
+            path = output.with_suffix(SAMPLES)
+            write_samples(path, own.problem.searched, samples, words)
+        write_text(output, json.dumps(_written(of_trace), indent=1) + "\n")
+    return [
+        Identified(
+            of_trace, own.problem, own.recorded, None if samples is None else np.exp(samples)
+        )
+        for own, of_trace, samples in zip(traces, data, drawn, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """The fit of a trace, its diagnosis, fits of other models, and notes that follow from these."""
+
+    fit: TraceFit
+    diagnosis: Diagnosis
+    models: FittedModels
+    notes: list[Note]
+
+
+def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[str, Any]:
+    """Return all that is said of a trace but its posterior, as plain data."""
+    case, case_problem, recorded = trace.case, trace.problem, trace.recorded
+    diagnosis, models, doubts = judged.diagnosis, judged.models, judged.notes
+    if case.may_start_late:
+        near = diagnosis.likelihood.best
+        doubts = [*doubts, *note_late_onset(case_problem, *trace.readings, near)]
+    read = [Note(HARMLESS, text) for text in recording.notes_on_recording(recorded)]
+    assumptions = [Note(HARMLESS, _NOT_COMPARED)] if case_problem.fixed else []
+    instrument = case_problem.instrument
+    said = exact_data(diagnosis, [*assumptions, *notes_on_fit(judged.fit), *doubts], read)
+    # Evidence is compared of fewer models than are tried where the config names none.
+    unnamed = case.compared_models and not trace.names_models
+    tried = None if unnamed else models.names or list(case.models)
+    return {
+        WRITTEN_BY: __version__,
+        "trace": str(options.trace),
+        "model": case_problem.model.name,
+        "model_title": case_problem.model.title,
+        "confidence": case.confidence,
+        "instrument": instrument.kind,
+        "reads": {"quantity": instrument.read.name, "unit": instrument.read.unit},
+        **_read_as(case, recorded),
+        **fixed_data(case_problem),
+        "limits": gripper_in_limits(case_problem),
+        **_instrument(case_problem, recorded, np.exp(diagnosis.likelihood.best)),
+        **said,
+        "noise_model": judged.fit.noise_data(),
+        **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
+        "assumed": assumed(case, tried),
+        "by_default": by_default(options.config) if instrument.has_jaws else [],
+        "versions": versions(),
+    }
+
+
+def _posterior(trace: TraceCase, fit: TraceFit, data: dict[str, Any], progress: Progress) -> Array:
+    """Sample the posterior of a trace; add it to the data, and return log-parameters."""
+    progress.done()
+    progress.doing("sampling the posterior")
+    data["posterior"], drawn = posterior.posterior_of_trace(
+        trace.case,
+        trace.problem,
+        partial(trace.problem.for_model, fit.problem),
+        limits_in(data),
+        progress.within,
+    )
+    return drawn
 
 
 def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:

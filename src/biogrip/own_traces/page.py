@@ -1,7 +1,7 @@
 """An HTML page of identified traces, self-contained."""
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,47 +36,50 @@ from biogrip.products.pages.png_address import png_address
 from biogrip.terminal import visible, visible_lines
 
 
-class Page:
-    """A page that traces are added to one by one."""
+def for_page(identified: Identified) -> dict[str, Any]:
+    """Return the numbers, sentences and figures of a trace on a page, as plain data."""
+    data = identified.data
+    compared = data["posterior"]["evidence"] if "posterior" in data else []
+    with styled():
+        figures = [(title, embedded(drawn)) for title, drawn in _figures(identified).items()]
+    return {
+        **data,
+        "trace": visible(data["trace"]),
+        "figures": figures,
+        "noise_in_words": noise_in_words(data),
+        "further_notes": further_notes(data),
+        "for_a_paper": for_a_paper(data),
+        "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
+        "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
+        "evidence_in_words": evidence_in_words(compared),
+        "one_sided": " ".join(one_sided_in_words([data])),
+        "granted": taken_for_granted(data) if data["by_default"] else None,
+    }
 
-    def __init__(self) -> None:
-        self._traces: list[dict[str, Any]] = []
 
-    def add(self, identified: Identified) -> None:
-        """Add the figures and numbers of a trace."""
-        data = identified.data
-        compared = data["posterior"]["evidence"] if "posterior" in data else []
-        with styled():
-            figures = [(title, embedded(drawn)) for title, drawn in _figures(identified).items()]
-        self._traces.append(
-            {
-                **data,
-                "trace": visible(data["trace"]),
-                "figures": figures,
-                "noise_in_words": noise_in_words(data),
-                "further_notes": further_notes(data),
-                "for_a_paper": for_a_paper(data),
-                "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
-                "setup": yaml.safe_dump(data["assumed"], sort_keys=False, allow_unicode=True),
-                "evidence_in_words": evidence_in_words(compared),
-                "one_sided": " ".join(one_sided_in_words([data])),
-                "granted": taken_for_granted(data) if data["by_default"] else None,
-            }
-        )
+def write_page(traces: Sequence[Mapping[str, Any]], refused: Mapping[str, str], page: Path) -> None:
+    """Write a page as HTML.
 
-    def write(self, refused: Mapping[str, str], page: Path) -> None:
-        """Write the page as HTML, with the error messages of refused traces."""
-        template = Path(__file__).with_name("traces.html.j2").read_text(encoding="utf-8")
-        environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-        text = environment.from_string(template).render(
-            traces=self._traces,
-            refused={visible(trace): visible_lines(reason) for trace, reason in refused.items()},
-            written_by=f"{WRITTEN_BY} {__version__}",
-            labels=labels_of(self._traces),
-            in_unit=in_unit,
-            not_shown=POSTERIOR_OF_REJECTED,
-        )
-        write_text(page, text)
+    Parameters
+    ----------
+    traces
+        Results of `for_page`.
+    refused
+        Error messages of other traces, by file.
+    page
+        File to write.
+    """
+    template = Path(__file__).with_name("traces.html.j2").read_text(encoding="utf-8")
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    text = environment.from_string(template).render(
+        traces=traces,
+        refused={visible(trace): visible_lines(reason) for trace, reason in refused.items()},
+        written_by=f"{WRITTEN_BY} {__version__}",
+        labels=labels_of(traces),
+        in_unit=in_unit,
+        not_shown=POSTERIOR_OF_REJECTED,
+    )
+    write_text(page, text)
 
 
 def _figures(identified: Identified) -> dict[str, Figure]:

@@ -1,29 +1,30 @@
 """Test for an offset or drift of the instrument that the user did not declare."""
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from biogrip.experiment.random_streams import stream
-from biogrip.identifiability.diagnosis import Diagnosis, diagnose
+from biogrip.identifiability.diagnosis import Diagnosis, diagnose_all
 from biogrip.identifiability.fit_status import DOUBT, HARMLESS, REJECTED, REJECTION, Note
 from biogrip.identifiability.likelihood import compute_fall
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identifiability.whiteness import FALSE_ALARM, one_in
 from biogrip.identify.answer import Identification, Progress
-from biogrip.identify.identifier import best_fit
+from biogrip.identify.case_problem import CaseProblem
+from biogrip.identify.identifier import identifier
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem
-from biogrip.identify.trace_fit import trace_fit
-from biogrip.products.files.traces import Measurements
+from biogrip.identify.trace_fit import TraceFit, fit_traces
+from biogrip.own_traces.trace_case import TraceCase
 from biogrip.response.flow import drift_is_flow
-from biogrip.study.study import Case, Study
 
 
-def second_opinion(
-    study: Study, case: Case, recorded: Measurements, diagnosis: Diagnosis, progress: Progress
-) -> list[Note]:
+def second_opinions(
+    traces: Sequence[TraceCase], diagnoses: Sequence[Diagnosis], progress: Progress
+) -> list[list[Note]]:
     """Fit an offset and a drift along, and return a warning if they lower chi^2 significantly.
 
     The test is a likelihood ratio: if neither is in the trace, the decrease of chi^2 follows a
@@ -32,50 +33,102 @@ def second_opinion(
 
     Parameters
     ----------
-    study, case, recorded
-        The trace and the case it is identified as.
-    diagnosis
-        Diagnosis without the added terms.
+    traces
+        Traces of the same model, budget and confidence.
+    diagnoses
+        Diagnosis of each without the added terms.
     progress
         Callback for progress.
 
     Returns
     -------
-    list of Note
-        At most one; with a rejected fit, only if that with both terms is not. Empty if both are
-        declared already, if the model is nonlinear, or if the noise model is coloured, which fits
-        both unless they are refused.
+    list of list of Note
+        By trace, at most one; with a rejected fit, only if that with both terms is not. None if
+        both are declared already, if the model is nonlinear, or if the noise model is coloured,
+        which fits both unless they are refused.
     """
-    case_problem = case.problem.weighted(recorded.sd_rad)
-    added = 2 - case_problem.offset - case_problem.drift
-    if not added or case_problem.nonlinear or case_problem.coloured:
-        return []
-    also = replace(case_problem, offset=True, drift=True)
+    notes: list[list[Note]] = [[] for _ in traces]
+    tried = [index for index, trace in enumerate(traces) if _may_have_more(trace.problem)]
+    if not tried:
+        return notes
+    some = [traces[index] for index in tried]
+    also = [replace(trace.problem, offset=True, drift=True) for trace in some]
+    fits = _fitted(some, also, [diagnoses[index] for index in tried], progress)
+    better = [
+        (index, fit, decrease)
+        for index, fit in zip(tried, fits, strict=True)
+        if (decrease := _decrease(traces[index], diagnoses[index], fit)).chance < FALSE_ALARM
+    ]
+    others = diagnose_all(
+        [fit.problem for _, fit, _ in better],
+        also[0].searched,
+        [fit.found for _, fit, _ in better],
+        confidence=traces[0].case.confidence,
+        noise_rad=[traces[index].problem.noise_rad for index, *_ in better],
+    )
+    for (index, _, decrease), other in zip(better, others, strict=True):
+        rejected = diagnoses[index].status == REJECTED
+        if not (rejected and other.status == REJECTED):
+            notes[index].append(_note(traces[index], diagnoses[index], other, decrease))
+    return notes
 
-    def find(problem: Problem) -> Identification:
-        rng = stream(study.study_seed, case.name, 0, "instrument")
-        return best_fit(problem, case.method("least_squares"), rng, progress)
 
-    fit = trace_fit(also, recorded.time_s, recorded.rotation_rad[0], find)
-    problem, found, likelihood = fit.problem, fit.found, diagnosis.likelihood
+@dataclass(frozen=True)
+class _Decrease:
+    """Decrease of chi^2 by an offset and a drift, and the probability of as much by chance."""
+
+    chi2: float
+    chance: float
+
+
+def _may_have_more(case_problem: CaseProblem) -> bool:
+    both = case_problem.offset and case_problem.drift
+    return not (both or case_problem.nonlinear or case_problem.coloured)
+
+
+def _fitted(
+    traces: Sequence[TraceCase],
+    also: Sequence[CaseProblem],
+    diagnoses: Sequence[Diagnosis],
+    progress: Progress,
+) -> list[TraceFit]:
+    """Fit traces with offset and drift, from random points and from the fits without these."""
+    least_squares = identifier("least_squares", traces[0].case.method("least_squares"))
+
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        cases = [traces[index].case for index in which]
+        rngs = [stream(case.study.study_seed, case.name, 0, "instrument") for case in cases]
+        return least_squares(problems, rngs, progress)
+
+    fits = fit_traces(also, [trace.readings for trace in traces], find)
     # The fit without offset and drift is a start as well: with them, chi^2 cannot be higher.
-    from_there = found.at(fit_from([problem], likelihood.best))
-    found = min(found, from_there, key=lambda each: np.float32(each.misfit_rad))
+    starts = np.array([diagnosis.likelihood.best for diagnosis in diagnoses])
+    again = fit_from([fit.problem for fit in fits], starts)
+    return [
+        replace(fit, found=min(fit.found, fit.found.at(again, own), key=_single_precision))
+        for own, fit in enumerate(fits)
+    ]
+
+
+def _single_precision(found: Identification) -> np.float32:
+    return np.float32(found.misfit_rad)
+
+
+def _decrease(trace: TraceCase, diagnosis: Diagnosis, fit: TraceFit) -> _Decrease:
+    likelihood, case_problem = diagnosis.likelihood, trace.problem
     fall = compute_fall(
-        problem.residuals.samples,
+        fit.problem.residuals.samples,
         likelihood.misfit_rad,
-        found.misfit_rad,
+        fit.found.misfit_rad,
         likelihood.noise_rad if case_problem.noise_rad is not None else None,
     )
-    chance = float(chdtrc(added, max(fall, 0.0)))
-    if chance >= FALSE_ALARM:
-        return []
-    other = diagnose(
-        problem, also.searched, found, confidence=case.confidence, noise_rad=case_problem.noise_rad
-    )
-    rejected = diagnosis.status == REJECTED
-    if rejected and other.status == REJECTED:
-        return []
+    added = 2 - case_problem.offset - case_problem.drift
+    return _Decrease(fall, float(chdtrc(added, max(fall, 0.0))))
+
+
+def _note(trace: TraceCase, diagnosis: Diagnosis, other: Diagnosis, decrease: _Decrease) -> Note:
+    """Return the warning, with the verdicts that an offset and a drift would change."""
+    case_problem, rejected = trace.problem, diagnosis.status == REJECTED
     changed = [
         f"{after.quantity.label} would be {after.words().removeprefix('determined: ')}"
         for before, after in zip(diagnosis.findings, other.findings, strict=True)
@@ -84,7 +137,7 @@ def second_opinion(
     changes = "with them it is not rejected" if rejected else "; ".join(changed)
     better = (
         "explain the trace far better "
-        f"(χ² falls by {fall:.3g}; by chance it would {one_in(chance)} traces)"
+        f"(χ² falls by {decrease.chi2:.3g}; by chance it would {one_in(decrease.chance)} traces)"
     )
     controlled = case_problem.instrument.controlled.name
     or_flows = (
@@ -93,7 +146,7 @@ def second_opinion(
     )
     if case_problem.instrument.deforms:
         or_flows = ""
-    if not case_problem.drift and drift_is_flow(case_problem.torque, recorded.time_s):
+    if not case_problem.drift and drift_is_flow(case_problem.torque, trace.recorded.time_s):
         text = (
             f"A constant and a line in time, fitted along, {better}: the instrument drifts, or the "
             f"sample flows. Under this {controlled} both give the same line, and the trace cannot "
@@ -106,7 +159,7 @@ def second_opinion(
             f"with --offset --drift.{or_flows}"
         )
     weight = DOUBT if changed else HARMLESS
-    return [Note(REJECTION if rejected else weight, text)]
+    return Note(REJECTION if rejected else weight, text)
 
 
 def _differ(before: Finding, after: Finding) -> bool:

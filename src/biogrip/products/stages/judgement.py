@@ -1,6 +1,7 @@
 """Stage 4: confidence limits of one trace of a case, and expected ones without noise."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +17,11 @@ from biogrip.identifiability.slow_misfit import find_slow_misfit
 from biogrip.identifiability.valley import compute_valley
 from biogrip.identify.answer import Identification, Progress, silent
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.identifier import best_fit
+from biogrip.identify.identifier import identifier
 from biogrip.identify.methods import METHODS
 from biogrip.identify.multi_start import fit_from, identify_from
 from biogrip.identify.problem import Problem
-from biogrip.identify.trace_fit import TraceFit, trace_fit
+from biogrip.identify.trace_fit import TraceFit, fit_traces
 from biogrip.products.files.traces import MEASUREMENTS, TARGETS, read_measurements, read_target
 from biogrip.products.files.verdicts import EXPECTED, PATH, diagnosis_data
 from biogrip.products.product import JUDGEMENT, Product, Reads, the, wildcards_of
@@ -50,12 +51,28 @@ def fit_judged(
     progress: Progress = silent,
 ) -> TraceFit:
     """Return the least-squares fit of a trace that its judgement is based on."""
+    (fit,) = fits_judged([case], [case_problem], [(time_s, rotation_rad)], seed, progress)
+    return fit
 
-    def find(problem: Problem) -> Identification:
-        rng = stream(case.study.study_seed, case.name, seed, "identifiability")
-        return best_fit(problem, case.least_squares, rng, progress)
 
-    return trace_fit(case_problem, time_s, rotation_rad, find)
+def fits_judged(
+    cases: Sequence[Case],
+    case_problems: Sequence[CaseProblem],
+    traces: Sequence[tuple[Array, Array]],
+    seed: int,
+    progress: Progress = silent,
+) -> list[TraceFit]:
+    """Return these fits of several traces, times and rotations, of cases with the same budget."""
+    least_squares = identifier("least_squares", cases[0].least_squares)
+
+    def find(problems: Sequence[Problem], which: Sequence[int]) -> list[Identification]:
+        chosen = [cases[index] for index in which]
+        rngs = [
+            stream(case.study.study_seed, case.name, seed, "identifiability") for case in chosen
+        ]
+        return least_squares(problems, rngs, progress)
+
+    return fit_traces(case_problems, traces, find)
 
 
 def judge(case: Case, measurements: Path, calibrated: list[Path], verdicts: Path) -> None:
