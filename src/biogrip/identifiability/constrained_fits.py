@@ -89,7 +89,8 @@ class ConstrainedFits:
             Fitted log-parameters, on the constraint up to rounding.
         """
         trace, which = np.divmod(profile, len(self.quantities))
-        low, high, last_s = self._fits.low, self._fits.high, self._residuals.duration_s
+        low, high = self._fits.low[trace], self._fits.high[trace]
+        last_s = self._residuals.duration_s
         constraint = QuantityConstraint(self.quantities, which, targets, low, high, last_s)
         found = self._fits.fitted(near, trace, tolerance, constraint=constraint)
         return self._increases(found, trace) + constraint.price(found.x) * self._ratio[
@@ -124,7 +125,7 @@ class ConstrainedFits:
             True for parameters fixed at their start, within the search range or not.
         """
         trace = np.zeros(len(x), dtype=np.int64)
-        low, high = np.where(fixed, x, self._fits.low), np.where(fixed, x, self._fits.high)
+        low, high = (np.where(fixed, x, end[0]) for end in (self._fits.low, self._fits.high))
         found = self._fits.fitted(x, trace, tolerance, low=low, high=high)
         return self._increases(found, trace), found.x
 
@@ -139,8 +140,10 @@ class ConstrainedFits:
 
     def ranges(self) -> Array:
         """Return the lowest and highest logarithm of each profile's quantity, (2, n_profiles)."""
-        ends = [quantity.range(self._fits.low, self._fits.high) for quantity in self.quantities]
-        return np.array(ends * len(self._optima)).T
+        bounds = zip(self._fits.low, self._fits.high, strict=True)
+        return np.array(
+            [quantity.range(*ends) for ends in bounds for quantity in self.quantities]
+        ).T
 
     def deviations(self) -> Array:
         """Return the logarithms' first-order standard deviations, at most 1, (n_profiles,)."""

@@ -40,8 +40,8 @@ class QuantityConstraint:
         Index of the quantity that each fit holds.
     targets : (n,)
         Logarithm of its value, within the quantity's range.
-    low, high : (n_parameters,)
-        Bounds of the log-parameters.
+    low, high : (n, n_parameters)
+        Bounds of the log-parameters of each fit.
     longest_s
         Time within which branches must relax for quantities that require it.
     """
@@ -57,14 +57,15 @@ class QuantityConstraint:
     ) -> None:
         self._which, self._targets = which, targets
         self._low, self._high = low, high
-        self._powers = np.zeros((len(quantities), len(low)))
+        parameters = low.shape[1]
+        self._powers = np.zeros((len(quantities), parameters))
         most = max(len(quantity.penalties) for quantity in quantities)
-        self._forms = np.zeros((len(quantities), most, len(low)))
+        self._forms = np.zeros((len(quantities), most, parameters))
         self._allowed, self._stiffness = np.zeros((2, len(quantities), most))
         for index, quantity in enumerate(quantities):
             self._powers[index, list(quantity.members)] = quantity.sign
             for row, penalty in enumerate(quantity.penalties):
-                self._forms[index, row] = penalty.form(len(low))
+                self._forms[index, row] = penalty.form(parameters)
                 self._allowed[index, row] = penalty.allowed(longest_s)
                 self._stiffness[index, row] = penalty.stiffness
         self._senses = np.array([float(quantity.sense) for quantity in quantities])
@@ -78,7 +79,7 @@ class QuantityConstraint:
         first = np.cumsum(np.abs(powers), axis=1) * np.abs(powers) == 1
         moved = x + by * np.where(sense == 0, powers * first, powers)
         moved = np.clip(moved, self._low, self._high)
-        eliminated = self._dominant(moved, self._slopes(moved, everyone))
+        eliminated = self._dominant(moved, everyone, self._slopes(moved, everyone))
         restored = self.restored(moved, everyone, eliminated)
         if np.any(np.isnan(restored)):
             raise ValueError("a quantity is to be held outside its range")
@@ -103,7 +104,7 @@ class QuantityConstraint:
     def eliminated(self, normal: Normal, x: Array, fit: IntArray) -> tuple[Normal, BoolArray]:
         """Eliminate one parameter; return reduced equations and its mask, (n, n_parameters)."""
         slopes = self._slopes(x, fit)
-        basic = self._dominant(x, slopes)
+        basic = self._dominant(x, fit, slopes)
         # Minus the derivative of the eliminated parameter by each other one; 1 by itself.
         ratio = slopes / np.sum(slopes * basic, axis=1, keepdims=True)
         pull = np.sum(normal.gradient * basic, axis=1, keepdims=True)
@@ -123,22 +124,25 @@ class QuantityConstraint:
         left = np.arange(len(x))
         for _ in range(self._most_members):
             value = self._followed(x[left], fit[left], basic)
-            inside = np.clip(value, self._low, self._high)
+            inside = np.clip(value, self._low[fit[left]], self._high[fit[left]])
             x[left] = np.where(basic, inside, x[left])
             reached = np.any(basic & (np.abs(value - inside) <= _ROUNDING), axis=1)
             left = left[~reached]
             if not len(left):
                 return x
             # The eliminated member stays at its bound, and the next one is eliminated.
-            basic = self._dominant(x[left], self._slopes(x[left], fit[left]), tried[left])
+            slopes = self._slopes(x[left], fit[left])
+            basic = self._dominant(x[left], fit[left], slopes, tried[left])
             tried[left] |= basic
         x[left] = np.nan
         return x
 
-    def _dominant(self, x: Array, slopes: Array, tried: BoolArray | None = None) -> BoolArray:
+    def _dominant(
+        self, x: Array, fit: IntArray, slopes: Array, tried: BoolArray | None = None
+    ) -> BoolArray:
         """Mark the member to eliminate, none if all have been tried."""
         weight = np.abs(slopes)
-        free = (x > self._low + _FREE) & (x < self._high - _FREE)
+        free = (x > self._low[fit] + _FREE) & (x < self._high[fit] - _FREE)
         weight = np.where(free, weight, _UNWILLING * weight)
         if tried is not None:
             weight = np.where(tried, 0.0, weight)

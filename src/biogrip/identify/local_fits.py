@@ -51,12 +51,7 @@ def alike(problems: Sequence[Problem]) -> list[IntArray]:
     groups: list[list[int]] = []
     for index, problem in enumerate(problems):
         for group in groups:
-            first = problems[group[0]]
-            if (
-                problem.residuals.shares_responses(first.residuals)
-                and np.array_equal(problem.low, first.low)
-                and np.array_equal(problem.high, first.high)
-            ):
+            if problem.residuals.shares_responses(problems[group[0]].residuals):
                 group.append(index)
                 break
         else:
@@ -71,11 +66,17 @@ class LocalFits:
     ----------
     problems
         One a trace; all have to be `alike`.
+
+    Attributes
+    ----------
+    low, high : (n_traces, n_parameters)
+        Logarithms of the ends of the search range of each trace.
     """
 
     def __init__(self, problems: Sequence[Problem]) -> None:
         self.problems = problems
-        self.low, self.high = problems[0].low, problems[0].high
+        self.low = np.stack([problem.low for problem in problems])
+        self.high = np.stack([problem.high for problem in problems])
         self._residuals = problems[0].residuals
         self._traces = np.stack([problem.residuals.condensed_trace for problem in problems])
         self._noise_rad = np.array([problem.residuals.noise_scale_rad for problem in problems])
@@ -126,7 +127,7 @@ class LocalFits:
         traces = [self.problems[own].residuals for own in trace.tolist()]
         gradients, misfit_rad = self._residuals.gradients(x, traces)
         noise_rad = self._noise_rad[trace]
-        away = (x - self._middle) / PRIOR_WIDTH
+        away = (x - self._middle[trace]) / PRIOR_WIDTH
         square_sum = self._residuals.samples * (misfit_rad / noise_rad) ** 2
         return Normal(
             np.where(np.isnan(misfit_rad), np.inf, square_sum + np.sum(away**2, axis=1)),
@@ -156,7 +157,7 @@ class LocalFits:
         products = rows @ rows.swapaxes(1, 2)
         misfit_rad = np.sqrt(products[:, 0, 0] / self._residuals.samples)
         products /= (self._noise_rad[trace] ** 2)[:, None, None]
-        away = (x - self._middle) / PRIOR_WIDTH
+        away = (x - self._middle[trace]) / PRIOR_WIDTH
         diagonal = np.arange(1, 1 + x.shape[1])
         products[:, diagonal, diagonal] += 1 / PRIOR_WIDTH**2
         square_sum = products[:, 0, 0] + np.sum(away**2, axis=1)
@@ -192,8 +193,8 @@ class LocalFits:
         low, high : (n, n_parameters) or (n_parameters,)
             Bounds instead of the search range; equal bounds fix a parameter.
         """
-        low = np.broadcast_to(self.low if low is None else low, starts.shape)
-        high = np.broadcast_to(self.high if high is None else high, starts.shape)
+        low = np.broadcast_to(self.low[trace] if low is None else low, starts.shape)
+        high = np.broadcast_to(self.high[trace] if high is None else high, starts.shape)
         starts = np.clip(starts, low, high)
         if constraint is not None:
             starts = constraint.started(starts)

@@ -59,11 +59,11 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         evaluations of the refinement; branches sorted by relaxation time. An optimum has
         converged if its next step would not change chi^2 noticeably.
     """
-    low, high = (np.broadcast_to(bound, found.x.shape) for bound in (fits.low, fits.high))
 
     def convex(x: Array, fit: IntArray) -> Normal:
         return _convex(fits, x, trace[fit])
 
+    low, high = fits.low[trace], fits.high[trace]
     closer = minimize(convex, found.x, low, high, _CLOSE, None, _DAMPING, _MOST_STEPS)
     evaluations = closer.evaluations * (1 + 2 * found.x.shape[1])
     here, moving = fits.on_all_samples(found.x, trace), np.arange(len(found.x))
@@ -77,17 +77,18 @@ def refine_optima(fits: LocalFits, found: Minima, trace: IntArray) -> Minima:
         x = state.x[moving]
         normal = _convex(fits, x, trace[moving])
         normal.gradient = state.here.gradient[moving]
-        plain = _newton_step(fits, normal, x, np.zeros(len(x)))
+        bounds = low[moving], high[moving]
+        plain = _newton_step(*bounds, normal, x, np.zeros(len(x)))
         gain = -np.sum(plain * normal.gradient, axis=1)
         converged[moving] = gain <= np.maximum(_NOTHING, rounding[moving])
-        step = _newton_step(fits, normal, x, damping[moving])
+        step = _newton_step(*bounds, normal, x, damping[moving])
         step = np.where(damping[moving, None] > 0, np.log1p(np.maximum(step, -0.9)), step)
         on = np.max(np.abs(plain), axis=1) >= _STILL
         moving, step = moving[on], step[on]
         if not len(moving):
             break
         evaluations[moving] += 2 + 2 * x.shape[1]
-        ahead = np.clip(_on_grid(state.x[moving] + step, step), fits.low, fits.high)
+        ahead = np.clip(_on_grid(state.x[moving] + step, step), low[moving], high[moving])
         kept = state.move(moving, ahead)
         more, less = _MORE * damping[moving], damping[moving] / _MORE
         less[less < _LITTLE] = 0.0
@@ -136,9 +137,9 @@ def _rounding(fits: LocalFits, misfit_rad: Array, trace: IntArray) -> Array:
     return found
 
 
-def _newton_step(fits: LocalFits, normal: Normal, x: Array, damping: Array) -> Array:
-    below = np.maximum(fits.low - x, -_LONGEST_STEP)
-    above = np.minimum(fits.high - x, _LONGEST_STEP)
+def _newton_step(low: Array, high: Array, normal: Normal, x: Array, damping: Array) -> Array:
+    below = np.maximum(low - x, -_LONGEST_STEP)
+    above = np.minimum(high - x, _LONGEST_STEP)
     return bounded_step(normal, damping, below, above)
 
 
@@ -146,7 +147,8 @@ def _convex(fits: LocalFits, x: Array, trace: IntArray) -> Normal:
     """Return normal equations with the moduli of the Hessian's eigenvalues."""
     normal = fits.curved(x, trace)
     # A parameter pushed against a bound does not move, whatever the curvature there.
-    fixed = (x <= fits.low) & (normal.gradient > 0) | (x >= fits.high) & (normal.gradient < 0)
+    at_low, at_high = x <= fits.low[trace], x >= fits.high[trace]
+    fixed = at_low & (normal.gradient > 0) | at_high & (normal.gradient < 0)
     free = (~fixed[:, :, None]) & (~fixed[:, None, :])
     second = np.where(free, normal.information, np.eye(x.shape[1]))
     scale = np.sqrt(np.abs(np.diagonal(second, axis1=1, axis2=2))) + _SMALLEST
