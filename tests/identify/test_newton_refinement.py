@@ -132,7 +132,7 @@ def test_steps_that_lead_away_are_taken_back(name: str, monkeypatch: pytest.Monk
         closer.append(found.x)
         return found
 
-    def leap(_: LocalFits, __: Any, x: Array, *___: Array) -> Array:
+    def leap(_: Array, __: Array, ___: Any, x: Array, ____: Array) -> Array:
         return np.full(x.shape, 0.5)
 
     model = MODELS_SETTLED[name]
