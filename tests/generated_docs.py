@@ -23,7 +23,7 @@ from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
 from biogrip.products.files.rows import RowFile, read_table
 from biogrip.products.report.answers import compared_rows, say_what_traces_tell
-from tests.helpers.key_reference import file_schema, reference
+from tests.helpers.key_reference import file_schema, reference, row_schema
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
 
@@ -430,8 +430,10 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
 """Parts of documents that are written, by what."""
 
 SCHEMA = ROOT / "config" / "schema.json"
+SHEET_SCHEMA = SCHEMA.with_name("sheet_schema.json")
 GENERATED = (
     SCHEMA,
+    SHEET_SCHEMA,
     ROOT / "config" / "README.md",
     ROOT / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
@@ -442,6 +444,8 @@ def renewed(path: Path) -> str:
     """Return a document with its generated parts, and its numbers, as they should be."""
     if path == SCHEMA:
         return file_schema()
+    if path == SHEET_SCHEMA:
+        return row_schema()
     text = path.read_text(encoding="utf-8")
     for name, content in PARTS.get(path, {}).items():
         match = re.search(

@@ -134,20 +134,85 @@ def test_bad_traces_are_left_out_and_told(
     shutil.copy(tmp_path / "d" / rows[0][0], tmp_path / "d" / "copy.csv")
     extra = [
         ["bad.csv", "control 0", "control"],
-        ["treated_0_O.csv", "lost", "treated"],
         ["copy.csv", "new", "treated"],
     ]
     write_table(tmp_path / "d" / "groups.csv", [header, *rows[:2], *extra])
     assert groups(tmp_path / "d" / "groups.csv") == 1
     said = capsys.readouterr().out
     assert "bad.csv, line 3, column 'rotation_rad': found 'high'" in said
-    assert "treated_0_O.csv', allowed is a file that exists. Did you mean" in said
     found = json.loads((tmp_path / "d" / "groups.compared.json").read_text())
     assert [cell["cell"] for cell in found["cells"]] == ["control 0"]
     assert "copy.csv: found the same readings as in " in said
     left_out = [Path(each["trace"]).name for each in found["skipped"]]
-    assert left_out == ["bad.csv", "treated_0_O.csv", "copy.csv"]
+    assert left_out == ["bad.csv", "copy.csv"]
     assert found["differences"] == []
+
+
+def test_a_trace_that_is_not_there_is_told_before_any_is_fitted(
+    dishes: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(dishes, tmp_path / "d")
+    header, *rows = table_of(dishes)
+    write_table(tmp_path / "d" / "groups.csv", [header, *rows, ["treated_0_O.csv", "l", "treated"]])
+    assert groups(tmp_path / "d" / "groups.csv") == 1
+    said = capsys.readouterr().err
+    assert f"groups.csv, line {len(rows) + 2}, column 'file': found" in said
+    assert "treated_0_O.csv', allowed is a file that exists. Did you mean" in said
+    assert not (tmp_path / "d" / "groups.compared.json").exists()
+
+
+def test_rows_have_settings_and_groups_are_of_any_factor(
+    dishes: Path, compared: tuple[dict[str, Any], str], tmp_path: Path
+) -> None:
+    shutil.copytree(dishes, tmp_path / "d")
+    _, *rows = table_of(dishes)
+    write_table(
+        tmp_path / "d" / "groups.csv",
+        [
+            ["file", "cell", "dish", "day", "gripper.arm_length_m"],
+            *(
+                [file, cell, group, "1", "" if cell[-1] == "1" else "3e-3"]
+                for file, cell, group in rows
+            ),
+        ],
+    )
+    assert groups(tmp_path / "d" / "groups.csv", "--by", "dish") == 0
+    found = json.loads((tmp_path / "d" / "groups.compared.json").read_text())
+    assert found["by"] == "dish"
+    assert "the grippers, which differ from trace to trace" in found["limits"]
+    for cell, before in zip(found["cells"], compared[0]["cells"], strict=True):
+        now, was = (quantity(it["quantities"], "k_p")[0]["value"] for it in (cell, before))
+        # The torque over the square of the arm's length is the scale of stiffness.
+        assert now == pytest.approx(was if cell["cell"][-1] == "1" else was / 4, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("column", "first", "second", "said"),
+    [
+        ("sample.model", "kelvin_voigt", "maxwell", "found the model maxwell, but the model kelv"),
+        ("fix.c_p", "", "300", "found c_p known, but nothing known of "),
+        ("measurement.noise_rad", "1e-5", "-1", "column 'measurement.noise_rad': found -1"),
+        ("gripper", "", "old", "allowed are names of blocks under blocks.gripper"),
+    ],
+)
+def test_rows_that_cannot_be_compared_are_refused(
+    dishes: Path,
+    capsys: pytest.CaptureFixture[str],
+    column: str,
+    first: str,
+    second: str,
+    said: str,
+) -> None:
+    _, *rows = table_of(dishes)
+    write_table(
+        dishes / "bad.csv",
+        [["file", "cell", "group", column], [*rows[0], first], [*rows[2], second]],
+    )
+    assert groups(dishes / "bad.csv") == 1
+    error = capsys.readouterr().err
+    assert "bad.csv, line 3" in error
+    assert said in error
+    assert error.count("\n") == 1
 
 
 def test_nothing_to_compare_is_said(

@@ -196,13 +196,18 @@ def _identify_parser(stages: Any) -> None:
     identify = stages.add_parser("identify", help=text, description=text)
     identify.set_defaults(command=_identify)
     identify.examples = _examples(
-        "identify cell.csv --config my_gripper.yaml",
-        "identify dish/*.csv --config my_gripper.yaml --model liquid_drop --report page.html",
+        "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
+        "identify cells.tsv --config my_gripper.yaml --csv found.csv",
         cost="A trace takes seconds, most of them for comparing the sample models; --posterior "
         "takes some more.",
     )
     identify.add_argument(
-        "traces", type=Path, nargs="+", metavar="TRACE", help="CSV file with a header"
+        "traces",
+        type=Path,
+        nargs="+",
+        metavar="TRACE",
+        help="CSV file with a header, or a sheet: a table whose header has the column file, with a "
+        "row for each trace, its cell, factors and keys of the config",
     )
     _trace_options(identify)
     identify.add_argument(
@@ -226,15 +231,19 @@ def _groups_parser(stages: Any) -> None:
     groups.set_defaults(command=_groups)
     groups.examples = _examples(
         "groups dishes.csv --config my_gripper.yaml",
-        "groups dishes.csv --config my_gripper.yaml --noise-model coloured --exclude c07",
+        "groups dishes.csv --config my_gripper.yaml --by treatment --exclude c07",
         cost="A cell takes some seconds.",
     )
     groups.add_argument(
         "table",
         type=Path,
-        help="CSV file with the columns file, cell and group, one line per trace",
+        help="sheet: CSV or TSV file with the columns file, cell and group, one line per trace; "
+        "other columns are factors, or keys of the config",
     )
     _trace_options(groups)
+    groups.add_argument(
+        "--by", metavar="FACTOR", help="column that makes the groups [group, or the only factor]"
+    )
     groups.add_argument(
         "--exclude",
         action="append",
@@ -442,6 +451,7 @@ def _groups(options: argparse.Namespace) -> None:
         options.model,
         _read_as(options),
         options.config,
+        by=options.by,
         exclude=options.exclude,
         fixed=_fixed(options.fix),
         output=options.output,

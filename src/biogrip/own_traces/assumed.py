@@ -1,6 +1,6 @@
 """Record of all that an identification assumes, so that it can be repeated."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -52,12 +52,11 @@ def gripper_in_limits(case_problem: CaseProblem) -> str:
     return f"Limits include uncertainties of the gripper: {keys}."
 
 
-def by_default(config: Path | None) -> list[str]:
-    """Return which of ``gripper`` and ``protocol`` the config omits, so that defaults hold.
+def by_default(given: Mapping[str, Any]) -> list[str]:
+    """Return which of ``gripper`` and ``protocol`` the user's blocks omit, so that defaults hold.
 
     Uncertainties alone are no gripper.
     """
-    given = read_configs([config]) if config else {}
     blocks = ("gripper", "protocol")
     return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]
 

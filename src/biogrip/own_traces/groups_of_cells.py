@@ -17,7 +17,6 @@ from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
-from biogrip.groups.cell_table import Cell, read_cells
 from biogrip.groups.group_findings import (
     USUAL_POWER,
     GroupDifference,
@@ -37,12 +36,15 @@ from biogrip.own_traces.assumed import gripper_in_limits
 from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output, in_own_units
 from biogrip.own_traces.read_as import ReadAs, read_trace
+from biogrip.own_traces.rows_of_sheets import cases_of, refuse_mixed_models, with_row
 from biogrip.own_traces.words import fixed_in_words, in_unit
 from biogrip.products.files.traces import Measurements
 from biogrip.products.files.verdicts import exact_data
 from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
 from biogrip.progress import Progress
 from biogrip.response.noise_estimate import estimate_noise
+from biogrip.study.named_blocks import read_named_blocks
+from biogrip.study.sheet import Cell, Row, cells_of, read_sheet
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
@@ -51,6 +53,10 @@ from biogrip.traces.late_onset import note_late_onset
 _LIMITS = (
     "Limits are statistical only: all cells share the gripper, whose uncertainty changes their "
     "values alike, and ratios hardly."
+)
+_LIMITS_OF_SEVERAL = (
+    "Limits are statistical only: the grippers, which differ from trace to trace, are taken as "
+    "exact."
 )
 
 
@@ -80,19 +86,22 @@ def groups(
     read_as: ReadAs,
     config: Path | None,
     *,
+    by: str | None,
     exclude: Sequence[str],
     fixed: Mapping[str, float],
     output: Path | None,
     force: bool,
 ) -> int:
-    """Compare the groups of cells that a table lists, write the results, and print them.
+    """Compare the groups of cells that a sheet lists, write the results, and print them.
 
     Parameters
     ----------
     table
-        CSV file, see `read_cells`.
+        The sheet, see `read_sheet`.
     model, read_as, config
         Fields of `IdentifyOptions`.
+    by
+        Name of the factor that makes groups, see `cells_of`.
     exclude
         Names of cells to leave out.
     fixed
@@ -114,19 +123,25 @@ def groups(
     """
     if problem := trace_file_problem(table):
         raise BiogripError(f"TABLE: {problem}")
-    cells = _without(read_cells(table), exclude)
+    blocks = read_named_blocks(config)
+    sheet = read_sheet(table, blocks)
+    blocks.refuse_unused(sheet.named)
+    factor, cells = cells_of(sheet, by)
+    cells = _without(cells, exclude)
     written = output or table.with_suffix(".compared.json")
-    traces = [trace for cell in cells for trace in cell.traces]
+    traces = [row.file for row in sheet.rows]
     refuse_inputs([written], [table, *traces, *filter(None, [config])])
     check_output(written, force=force)
     options = IdentifyOptions(table, model, read_as, config, fixed=fixed)
-    found = compare_groups(options, cells, written)
+    found = compare_groups(options, cells, factor, written)
     print(visible_lines(in_words(found)))
     print(f"Written to {visible(written)}.")
     return 1 if found["skipped"] else 0
 
 
-def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path) -> dict[str, Any]:
+def compare_groups(
+    options: IdentifyOptions, cells: Sequence[Cell], factor: str, output: Path
+) -> dict[str, Any]:
     """Identify every cell from all its traces, and compare the groups of cells.
 
     Traces that cannot be used are left out and listed under ``skipped``.
@@ -134,9 +149,11 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
     Parameters
     ----------
     options
-        Options for all traces; its own trace is the table of cells.
+        Options for all traces; its own trace is the sheet.
     cells
-        Rows of the table.
+        Cells with their rows of the sheet.
+    factor
+        Name of the factor that makes the groups.
     output
         JSON file to write; it holds the returned value with rounded numbers.
 
@@ -146,9 +163,12 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         If an option or the config cannot be used, or no trace can.
     """
     # Errors of options and config concern all traces: raise them once, here.
-    study = study_of(options)
-    (case,) = study.cases.values()
-    case_problem, confidence = case.problem, case.confidence
+    rows = [with_row(options, row) for cell in cells for row in cell.rows]
+    cases = cases_of(rows)
+    refuse_mixed_models(rows, cases)
+    case_problem, confidence = cases[0].problem, cases[0].confidence
+    fixed = [fixed_data(case.problem) for case in cases]
+    one_gripper = all(case.block.gripper == cases[0].block.gripper for case in cases)
     progress = Progress(str(options.trace), len(cells))
     judged: list[JudgedCell] = []
     data: list[dict[str, Any]] = []
@@ -159,7 +179,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
         if usable:
             fit = fitted_jointly(
                 [each.problem for each in usable],
-                case_problem.searched,
+                usable[0].case_problem.searched,
                 _identify(usable[0], progress.within),
                 confidence=confidence,
                 noise_rad=_known_noise(usable),
@@ -176,6 +196,7 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
                         for each, noise in zip(usable, _noise_of(fit, usable), strict=True)
                     ],
                     "agreement_p": fit.agreement,
+                    **(fixed_data(usable[0].case_problem) if fixed[1:] != fixed[:-1] else {}),
                     **exact_data(fit.diagnosis),
                 }
             )
@@ -201,12 +222,13 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
     found = {
         WRITTEN_BY: __version__,
         "table": str(options.trace),
+        "by": factor,
         "model": case_problem.model.name,
         "model_title": case_problem.model.title,
         "confidence": confidence,
-        **fixed_data(case_problem),
+        **(fixed[0] if fixed[1:] == fixed[:-1] else {}),
         "reads": {"quantity": read.name, "unit": read.unit},
-        "limits": _LIMITS if case_problem.instrument.has_jaws else gripper_in_limits(case_problem),
+        "limits": _limits(case_problem, one_gripper=one_gripper),
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
@@ -220,6 +242,12 @@ def compare_groups(options: IdentifyOptions, cells: Sequence[Cell], output: Path
     written = in_own_units(rounded_numbers(found), read)
     write_text(output, json.dumps(written, indent=1) + "\n")
     return found
+
+
+def _limits(case_problem: CaseProblem, *, one_gripper: bool) -> str:
+    if not case_problem.instrument.has_jaws:
+        return gripper_in_limits(case_problem)
+    return _LIMITS if one_gripper else _LIMITS_OF_SEVERAL
 
 
 def in_words(found: dict[str, Any]) -> str:
@@ -279,20 +307,19 @@ class _Traces:
     def of(self, cell: Cell) -> list[_TraceProblem]:
         """Return the fit problems of the usable traces of a cell."""
         case_problem = []
-        for trace in cell.traces:
+        for row in cell.rows:
             try:
-                case_problem.append(self._trace_problem(trace))
+                case_problem.append(self._trace_problem(row))
             except BiogripError as error:
-                reason = (
-                    str(error) if visible(trace) in str(error) else f"{visible(trace)}: {error}"
-                )
-                self.skipped.append({"trace": str(trace), "cell": cell.name, "reason": reason})
+                name = visible(row.file)
+                reason = str(error) if name in str(error) else f"{name}: {error}"
+                self.skipped.append({"trace": str(row.file), "cell": cell.name, "reason": reason})
         return _in_common_ranges(case_problem)
 
-    def _trace_problem(self, trace: Path) -> _TraceProblem:
-        study = study_of(replace(self._options, trace=trace))
-        (case,) = study.cases.values()
-        recorded, case = read_trace(trace, case, self._options.config)
+    def _trace_problem(self, row: Row) -> _TraceProblem:
+        options, trace = with_row(self._options, row), row.file
+        (case,) = study_of(options).cases.values()
+        recorded, case = read_trace(trace, case, options.given)
         rotation_rad = recorded.rotation_rad[0]
         # Noise never repeats: equal rotations are a copied file, and would feign agreement.
         same = sha256(rotation_rad.tobytes()).digest()
@@ -422,6 +449,7 @@ def _cell_in_words(cell: dict[str, Any], found: dict[str, Any]) -> str:
         for trace in cell["traces"]
     ]
     lines += [f"  {item['quantity']:<{width}}  {item['in_words']}" for item in cell["quantities"]]
+    lines += [f"  {words}" for words in fixed_in_words(cell)]
     lines += [f"  {note['weight'].capitalize()}: {note['text']}" for note in cell["notes"]]
     return "\n".join(lines)
 

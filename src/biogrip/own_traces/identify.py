@@ -8,10 +8,14 @@ from biogrip.errors import BiogripError
 from biogrip.files import refuse_inputs
 from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.many_traces import Outcome, identify_traces, write_table
-from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file, study_of
+from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file
 from biogrip.own_traces.outputs import SAMPLES, check_output
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.rows_of_sheets import cases_of, with_row
 from biogrip.own_traces.words import in_words, side_by_side
+from biogrip.study.named_blocks import read_named_blocks
+from biogrip.study.sheet import read_sheet
+from biogrip.study.sheet_text import is_sheet
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible
 
@@ -35,11 +39,11 @@ def identify(
     Parameters
     ----------
     traces
-        CSV files.
+        CSV files of traces, and sheets that list some.
     model, read_as, config
         Fields of `IdentifyOptions`.
     output
-        JSON file for a single trace. By default each trace has one beside it.
+        JSON file of a single trace. By default each trace has one beside it.
     report, table
         HTML and CSV file to write, if any.
     posterior, fixed
@@ -59,45 +63,68 @@ def identify(
     BiogripError
         If an option or the config cannot be used, or the only trace cannot.
     """
-    if output is not None and len(traces) > 1:
-        raise BiogripError("--output: only for one trace; each of several gets its own file.")
     if len(traces) == 1:
         check_trace_file(traces[0])
     problems = {trace: trace_file_problem(trace) for trace in traces}
     absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
-    there = [trace for trace in traces if str(trace) not in absent]
+    there = [trace for trace in dict.fromkeys(traces) if str(trace) not in absent]
     options = IdentifyOptions((there or traces)[0], model, read_as, config, posterior, fixed)
+    sheets = [trace for trace in there if is_sheet(trace)]
+    every = _with_rows(options, there, sheets)
+    alone = len(every) + len(absent) == 1
+    if output is not None and not alone:
+        raise BiogripError("--output: only for one trace; each of several gets its own file.")
     samples = posterior
-    if there and (len(traces) > 1 or config is not None):
+    if every and (sheets or not alone or config is not None):
         # Errors of options and config concern all traces: raise them once, here.
-        (case,) = study_of(options).cases.values()
-        samples = case.posterior is not None
-    outputs = {trace: output or trace.with_suffix(".identified.json") for trace in there}
-    drawn = [path.with_suffix(SAMPLES) for path in outputs.values()] if samples else []
-    written = [*outputs.values(), *drawn, *filter(None, (report, table))]
+        samples = cases_of(every)[0].posterior is not None
+    outputs = [output or each.trace.with_suffix(".identified.json") for each in every]
+    drawn = [path.with_suffix(SAMPLES) for path in outputs] if samples else []
+    written = [*outputs, *drawn, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
-    refuse_inputs(written, [*traces, *filter(None, [config])])
+    read = [*traces, *(each.trace for each in every), *filter(None, [config])]
+    refuse_inputs(written, read)
     for path in written:
         check_output(path, force=force)
-    every = [replace(options, trace=trace) for trace in outputs]
-    outcome = identify_traces(every, list(outputs.values()), page=report is not None)
+    outcome = identify_traces(every, outputs, page=report is not None)
     outcome.refused.update(absent)
-    if len(traces) == 1 and outcome.refused:
+    if alone and outcome.refused:
         raise BiogripError(next(iter(outcome.refused.values())))
     if table is not None:
-        write_table(outcome, table)
+        write_table(outcome, table, {str(each.trace): each.row for each in every if each.row})
     if report is not None:
         from biogrip.own_traces.page import write_page
 
         write_page(outcome.on_page, outcome.refused, report)
-    print(in_words(outcome.found[0]) if len(traces) == 1 else _of_many(outcome))
-    said = [outputs[Path(each["trace"])] for each in outcome.found]
+    print(in_words(outcome.found[0]) if alone else _of_many(outcome))
+    by_trace = {str(each.trace): path for each, path in zip(every, outputs, strict=True)}
+    said = [by_trace[each["trace"]] for each in outcome.found]
     said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     print(f"Written to {', '.join(map(visible, said))}.")
     rejected = strict and any(each["fit"] == REJECTED for each in outcome.found)
     return 1 if outcome.refused or rejected else 0
+
+
+def _with_rows(
+    options: IdentifyOptions, traces: Sequence[Path], sheets: Sequence[Path]
+) -> list[IdentifyOptions]:
+    """Return the options of every trace, those of a sheet in its place."""
+    if not sheets:
+        return [replace(options, trace=trace) for trace in traces]
+    blocks = read_named_blocks(options.config)
+    read = {path: read_sheet(path, blocks) for path in sheets}
+    blocks.refuse_unused(name for each in read.values() for name in each.named)
+    return [
+        each
+        for trace in traces
+        for each in (
+            [with_row(options, row) for row in read[trace].rows]
+            if trace in read
+            else [replace(options, trace=trace)]
+        )
+    ]
 
 
 def _of_many(outcome: Outcome) -> str:

@@ -24,6 +24,7 @@ from biogrip.own_traces.outputs import WRITTEN_BY, name_in_units
 from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.rows import write_rows
 from biogrip.progress import Progress
+from biogrip.study.sheet import Row
 from biogrip.terminal import visible
 from biogrip.worker_processes import worker_processes
 
@@ -172,10 +173,13 @@ def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
     return groups
 
 
-def write_table(outcome: Outcome, table: Path) -> None:
-    """Write one row per trace as CSV: numbers, their units in the header, and no sentences."""
+def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None = None) -> None:
+    """Write one row per trace as CSV: numbers, their units in the header, and no sentences.
+
+    Traces that sheets list, by file, have columns for cell and factors.
+    """
     units = {q["quantity"]: q["unit"] for each in outcome.found for q in each["quantities"]}
-    # All traces are read by the same options and config.
+    # The same is read in all traces.
     names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
     read = INSTRUMENTS[names.pop()].read
     columns = ["trace", "fit", "model", "preferred_model", "samples"]
@@ -187,9 +191,20 @@ def write_table(outcome: Outcome, table: Path) -> None:
         for quantity, unit in units.items()
         for what in _OF_QUANTITY
     ]
+    rows_of = rows_of or {}
+    factors = list(dict.fromkeys(name for row in rows_of.values() for name in row.factors))
+    header = [*columns, WRITTEN_BY]
+    of_row = ["cell", *(f"factor {name}" if name in header else name for name in factors)]
+    header[1:1] = of_row if rows_of else []
     rows = [
         (
-            *(each["trace"], each["fit"], each["model"], _preferred(each)),
+            *(
+                each["trace"],
+                *_of_row(rows_of, each["trace"], factors),
+                each["fit"],
+                each["model"],
+                _preferred(each),
+            ),
             *(each["samples"], each["noise_rad"], each["misfit_rad"]),
             *(["; ".join(each["fixed"])] if fixed else []),
             *_of_quantities(each, units),
@@ -197,8 +212,20 @@ def write_table(outcome: Outcome, table: Path) -> None:
         )
         for each in map(rounded_numbers, outcome.found)
     ]
-    rows += [(trace, "none", *[""] * (len(columns) - 1)) for trace in outcome.refused]
-    write_rows(table, (*columns, WRITTEN_BY), rows)
+    rows += [
+        (trace, *_of_row(rows_of, trace, factors), "none", *[""] * (len(columns) - 1))
+        for trace in outcome.refused
+    ]
+    write_rows(table, header, rows)
+
+
+def _of_row(rows_of: Mapping[str, Row], trace: str, factors: Sequence[str]) -> list[str]:
+    """Return cell and factors of a trace; nothing if no trace is of a sheet."""
+    if not rows_of:
+        return []
+    row = rows_of.get(trace)
+    cell, values = (row.cell, row.factors) if row else ("", {})
+    return [cell, *(values.get(name, "") for name in factors)]
 
 
 def _preferred(found: Mapping[str, Any]) -> str:

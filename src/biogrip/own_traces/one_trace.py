@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from biogrip import __version__
 from biogrip.arrays import Array
 from biogrip.digits import counted, rounded_numbers
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.sample import CANDIDATES
+from biogrip.experiment.sample import CANDIDATES, Sample
 from biogrip.files import write_text
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose_all
 from biogrip.identifiability.fit_status import HARMLESS, REJECTED, Note
@@ -32,7 +32,7 @@ from biogrip.own_traces.assumed import (
 from biogrip.own_traces.fitted_models import FittedModels, judge_again, models_tried
 from biogrip.own_traces.instrument_of_trace import with_instrument
 from biogrip.own_traces.outputs import SAMPLES, WRITTEN_BY, in_own_units
-from biogrip.own_traces.read_as import ReadAs, read_trace
+from biogrip.own_traces.read_as import ReadAs, laid_over, read_trace
 from biogrip.own_traces.second_opinion import second_opinions
 from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.posterior import limits_in, write_samples
@@ -46,7 +46,8 @@ from biogrip.response.simulation import simulated_rotation
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.sample_block import fixed_problems
-from biogrip.study.source import dotted
+from biogrip.study.sheet import Row
+from biogrip.study.source import dotted, overlaid
 from biogrip.study.study import Case, Study
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.late_onset import note_late_onset
@@ -75,6 +76,9 @@ class IdentifyOptions:
         If true, sample the posterior even if the config does not say so.
     fixed
         Known parameters by name, SI units, beside those of the config.
+    row
+        Row of the sheet that lists the trace, if one does. What it says goes before options and
+        config.
     """
 
     trace: Path
@@ -83,6 +87,19 @@ class IdentifyOptions:
     config: Path | None
     posterior: bool = False
     fixed: Mapping[str, float] = field(default_factory=dict)
+    row: Row | None = None
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Blocks of a config with what a sheet's row says of the trace."""
+        return self.row.settings if self.row else {}
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Blocks of the user's: those of the config, and over them those of a sheet's row."""
+        config = read_configs([self.config]) if self.config else {}
+        found: dict[str, Any] = overlaid(config, dict(self.settings))
+        return found
 
 
 @dataclass(frozen=True)
@@ -150,7 +167,7 @@ def read(options: IdentifyOptions, case: Case, progress: Progress) -> TraceCase:
     BiogripError
         With file, line and column, if the trace cannot be used.
     """
-    recorded, case = read_trace(options.trace, case, options.config, progress.note)
+    recorded, case = read_trace(options.trace, case, options.given, progress.note)
     problem = case.problem.weighted(recorded.sd_rad)
     return TraceCase(case, recorded, problem, names_models(options.config))
 
@@ -255,6 +272,7 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
     return {
         WRITTEN_BY: __version__,
         "trace": str(options.trace),
+        **_of_row(options.row),
         "model": case_problem.model.name,
         "model_title": case_problem.model.title,
         "confidence": case.confidence,
@@ -268,7 +286,7 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
         "noise_model": judged.fit.noise_data(),
         **models.data(None if said["fit"] == REJECTED else diagnosis.findings),
         "assumed": assumed(case, tried),
-        "by_default": by_default(options.config) if instrument.has_jaws else [],
+        "by_default": by_default(options.given) if instrument.has_jaws else [],
         "versions": versions(),
     }
 
@@ -285,6 +303,11 @@ def _posterior(trace: TraceCase, fit: TraceFit, data: dict[str, Any], progress: 
         progress.within,
     )
     return drawn
+
+
+def _of_row(row: Row | None) -> dict[str, Any]:
+    """Return what a sheet says of its trace, or nothing."""
+    return {"cell": row.cell, "factors": dict(row.factors)} if row else {}
 
 
 def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
@@ -332,21 +355,36 @@ def study_of(options: IdentifyOptions) -> Study:
     merged = read_configs(files)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
+    read_as, settings = options.read_as, dict(options.settings)
+    of_sample = settings.pop("sample", {})
+    own = settings.pop("measurement", {})
+    merged = overlaid(merged, settings)
+    if "protocol" in settings:
+        read_as = replace(read_as, hold=None)
     if isinstance(measured := merged.get("measurement"), dict):
-        merged["measurement"] = options.read_as.over(measured) | {"file": str(options.trace)}
-        given = read_configs([options.config]) if options.config else {}
-        merged = with_instrument(merged, given, options.read_as, options.trace)
-    # Cases of the config are meant for the workflow.
+        measured = laid_over(read_as.over(measured), own)
+        merged["measurement"] = measured | {"file": str(options.trace)}
+        merged = with_instrument(merged, options.given, read_as, options.trace)
+    # Cases of the config are meant for the workflow, and named blocks are in the settings.
     merged.pop("only", None)
+    merged.pop("blocks", None)
     if options.posterior:
         merged.setdefault("posterior", {})
     merged["cases"] = {
         case: {
-            "sample": {"model": sample.name, "branches": sample.branches},
-            "fixed": dict(options.fixed),
+            "sample": _sample(sample, of_sample),
+            "fixed": {**options.fixed, **settings.get("fixed", {})},
         }
     }
-    return load_study(merged, files, command_line=["cases"], for_workflow=False)
+    over = [options.row.lines(case)] if options.row else []
+    return load_study(merged, files, command_line=["cases"], for_workflow=False, over=over)
+
+
+def _sample(by_option: Sample, own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the block of a sample: a row that names another model says its branches, too."""
+    if "model" in own:
+        return dict(own)
+    return {"model": by_option.name, "branches": by_option.branches, **own}
 
 
 def fixed_data(case_problem: CaseProblem) -> dict[str, Any]:

@@ -96,11 +96,7 @@ class ReadAs:
 
         An onset that is given replaces one that is fitted, and the reverse; so does a reading.
         """
-        replaced: set[str] = set()
-        for one_of in ({"start_s", "fit_start"}, {*READINGS}):
-            replaced |= one_of if one_of & self.given.keys() else set()
-        kept = {key: value for key, value in measurement.items() if key not in replaced}
-        return {"time": _USUAL_TIME} | kept | self.given
+        return laid_over({"time": _USUAL_TIME, **measurement}, self.given)
 
     def with_config(self, measurement: Mapping[str, Any]) -> "ReadAs":
         """Return the options with those keys of a ``measurement`` block that are valid."""
@@ -182,8 +178,22 @@ class ReadAs:
             raise BiogripError("--scale: found 0, allowed is another number.")
 
 
+def laid_over(measurement: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a ``measurement`` block with keys of another laid over it.
+
+    An onset that is given replaces one that is fitted, and the reverse; so does a reading.
+    """
+    replaced: set[str] = set()
+    for one_of in ({"start_s", "fit_start"}, {*READINGS}):
+        replaced |= one_of if one_of & given.keys() else set()
+    return {key: value for key, value in measurement.items() if key not in replaced} | {**given}
+
+
 def read_trace(
-    file: Path, case: Case, config: Path | None, show: Callable[[str], None] = lambda _: None
+    file: Path,
+    case: Case,
+    given: Mapping[str, Any],
+    show: Callable[[str], None] = lambda _: None,
 ) -> tuple[Measurements, Case]:
     """Read a trace by the options and the config that a case holds, and find its search ranges.
 
@@ -193,8 +203,8 @@ def read_trace(
         CSV file.
     case
         The case of the trace.
-    config
-        The user's config file, if there is one.
+    given
+        Blocks of the user's, see `IdentifyOptions.given`.
     show
         Function that is given a table of what was recognised in an unusual file.
 
@@ -217,5 +227,5 @@ def read_trace(
             show(form.in_words(file))
 
     trace = recording.read_checked(file, case.gripper, case.problem, columns, show_unusual)
-    case = with_own_ranges(case, trace, config)
+    case = with_own_ranges(case, trace, given)
     return recording.with_fitted_onset(trace, case.problem), case

@@ -1,7 +1,8 @@
 """Search ranges that follow from a recorded trace."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genome import GeneRange
 from biogrip.products.files.traces import Measurements
 from biogrip.response.noise_estimate import estimate_noise
-from biogrip.study.load import read_configs
 from biogrip.study.study import Case
 
 # Largest ratio of trace to noise that widens a range, and a margin, for scales are rough.
@@ -19,12 +19,12 @@ _CLEAREST, _MARGIN = 1e5, 10.0
 _LEAST, _MOST = -16, 18
 
 
-def with_own_ranges(case: Case, recorded: Measurements, config: Path | None) -> Case:
+def with_own_ranges(case: Case, recorded: Measurements, given: Mapping[str, Any]) -> Case:
     """Return a case whose search ranges follow from its trace, where the user gives none."""
-    given = (read_configs([config]) if config else {}).get("search_range", {})
     case_problem = case.problem.weighted(recorded.sd_rad)
     found = ranges_of(case_problem, recorded.time_s, recorded.rotation_rad[0])
-    chosen = {name: genes for name, genes in found.items() if name not in given}
+    own = given.get("search_range", {})
+    chosen = {name: genes for name, genes in found.items() if name not in own}
     search_range = replace(case.block.search_range, **chosen)
     return replace(case, block=case.block.model_copy(update={"search_range": search_range}))
 

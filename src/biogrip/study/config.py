@@ -12,7 +12,7 @@ from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Block, Distinct, OneOf, Problem
-from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
 
@@ -126,6 +126,17 @@ class StudyConfig(Shared):
             "this case alone.",
         ),
     ]
+    blocks: Annotated[
+        Mapping[
+            Annotated[str, OneOf(NAMABLE)],
+            Annotated[Mapping[_Name, dict[str, Any]], Field(max_length=1000)],
+        ],
+        Field(
+            description="Blocks by name, as `protocol: {short: {phases: ...}}`, that rows of a "
+            "sheet name in a column `protocol`; they are laid over the config's own. For `biogrip "
+            "identify` and `biogrip groups` alone."
+        ),
+    ] = {}
     only: Annotated[
         tuple[str, ...],
         Field(
@@ -161,6 +172,8 @@ class StudyConfig(Shared):
             if seeds > _MOST_BATCHES * self.batch_size:
                 text = f"found {self.batch_size}, which makes {seeds} seeds more than "
                 yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
+        if self.blocks:
+            yield ("blocks",), "is for rows of a sheet, which this study has none of; leave it out."
         yield from self._band_problems()
         for name, case in self.cases.items():
             for path, text in case.comb_problems(self.actuator):

@@ -1,13 +1,14 @@
 """Loading of config files into a checked study."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
 from biogrip.study.schema import schema_of
-from biogrip.study.source import overlaid, read_config, read_places
+from biogrip.study.source import KeyPath, overlaid, read_config, read_places
 from biogrip.study.study import Study
 from biogrip.study.validation import checked_study
 
@@ -32,10 +33,12 @@ def load_study(
     command_line: Iterable[Hashable] = (),
     *,
     for_workflow: bool = True,
+    over: Sequence[tuple[str, Mapping[KeyPath, int]]] = (),
 ) -> Study:
     """Check and type a merged config; the files it came from give the line numbers in messages.
 
-    Some top-level keys may be of the command line. For a workflow, paths of traces are refused that
+    Some top-level keys may be of the command line, and some keys of a sheet's row: `over` has its
+    sheet, and its line by key. For a workflow, paths of traces are refused that
     Snakemake would read as wildcards.
 
     Raises
@@ -43,7 +46,7 @@ def load_study(
     BiogripError
         If anything in the config cannot be used.
     """
-    places = read_places(files, command_line)
+    places = replace(read_places(files, command_line), over=tuple(over))
     complete = _fill_in(schema_of(StudyConfig).with_numbers(config))
     return Study(checked_study(complete, places, for_workflow=for_workflow))
 

@@ -17,6 +17,7 @@ from biogrip.traces.units import TIME_UNITS, nearest_unit
 
 T = TypeVar("T")
 MOST_EXPLAINED = 1000
+MISSING = "is missing and has no default."
 
 # Keys of earlier versions of the config, by their last two names.
 _RETIRED: dict[tuple[Hashable, ...], str] = {
@@ -113,7 +114,7 @@ def _text(path: tuple[int | str, ...], leaf: Schema, above: Schema, error: Error
         case "extra_forbidden" | "unexpected_keyword_argument":
             return unknown(path, [*above.keys])
         case "missing":
-            return "is missing and has no default."
+            return MISSING
         case "literal_error":
             choices = leaf.get("enum")
             hint = (nearest_unit if choices in _UNITS else nearest)(found, choices)

@@ -1,6 +1,6 @@
 """Keys of config files with their line numbers, for error messages."""
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,20 +24,31 @@ class ConfigFiles:
     """Line (from 1) of every key and list item, by file."""
     command_line: frozenset[Hashable] = frozenset()
     """Top-level keys set on the command line, which override all files."""
+    over: tuple[tuple[str, Mapping[KeyPath, int]], ...] = ()
+    """Lines of the keys of a sheet's row, by the sheet, which override even these."""
 
     def place(self, path: KeyPath) -> str:
         """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.
 
         For a missing key it is the block that lacks it.
         """
+        if found := _line_of(path, self.over):
+            return found
         if path and path[0] in self.command_line:
             return "command line, --config"
-        for length in range(len(path), 0, -1):
-            for name, lines in reversed(self.lines):
-                if path[:length] in lines:
-                    return f"{name}, line {lines[path[:length]]}"
+        if found := _line_of(path, self.lines):
+            return found
         names = [name for name, _ in self.lines]
         return " with ".join(names) if names else "the configuration"
+
+
+def _line_of(path: KeyPath, files: Sequence[tuple[str, Mapping[KeyPath, int]]]) -> str | None:
+    """Return the last of some files that has a key, or a block that it is in, and the line."""
+    for length in range(len(path), 0, -1):
+        for name, lines in reversed(files):
+            if path[:length] in lines:
+                return f"{name}, line {lines[path[:length]]}"
+    return None
 
 
 def read_places(files: Sequence[str | Path], command_line: Iterable[Hashable] = ()) -> ConfigFiles:

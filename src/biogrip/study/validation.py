@@ -14,7 +14,7 @@ from biogrip.study.case_blocks import METHOD_BLOCKS, OVERRIDABLE, CaseBlock, Sha
 from biogrip.study.config import StudyConfig
 from biogrip.study.interpretations import read_blocks
 from biogrip.study.measurement_block import MeasurementBlock
-from biogrip.study.messages import MOST_EXPLAINED, checked, inside, unknown
+from biogrip.study.messages import MISSING, MOST_EXPLAINED, checked, inside, unknown
 from biogrip.study.plain import plain
 from biogrip.study.source import ConfigFiles, KeyPath, dotted, overlaid
 from biogrip.study.sweep_checks import placed, sweep_problems
@@ -57,6 +57,12 @@ def measurement_problem(key: str, value: Any) -> str | None:
     return next((text for path, text in found if path == (key,)), None)
 
 
+def some_case_problems(block: Mapping[str, Any]) -> list[Problem]:
+    """Return what is wrong in some blocks of a case, whatever the case lacks."""
+    found = [*_unwritable((), block)] or _with_methods(CaseBlock, block)[1]
+    return [(path, text) for path, text in found if text != MISSING]
+
+
 def _with_methods(kind: type[T], block: Any) -> tuple[T | None, list[Problem]]:
     """Build a config block, or find what is not allowed in it and in the blocks of methods."""
     built, problems = checked(kind, block)
@@ -76,7 +82,7 @@ def _method_problems(path: KeyPath, kind: type[Shared], block: Mapping[str, Any]
     for name in METHOD_BLOCKS:
         problems = checked(block_class(name), block.get(name, {}))[1]
         if problems and name not in block:
-            problems = [((), "is missing and has no default.")]
+            problems = [((), MISSING)]
         found += [((*path, name, *place), text) for place, text in problems]
     return found
 
@@ -102,7 +108,7 @@ def _origin(path: KeyPath, files: ConfigFiles) -> KeyPath:
         return path
     for length in range(len(path), 2, -1):
         for candidate in (path[:length], path[2:length]):
-            if any(candidate in lines for _, lines in files.lines):
+            if any(candidate in lines for _, lines in (*files.lines, *files.over)):
                 return path if candidate == path[:length] else path[2:]
     return path[2:]
 
