@@ -72,8 +72,15 @@ def found(trace: str) -> dict[str, Any]:
     return data
 
 
-def test_a_row_says_what_options_and_config_say_of_one_trace(here: Path) -> None:
+def test_a_row_says_what_options_and_config_say_of_one_trace(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert identify("cells.tsv", "--config", "few.yaml", "--csv", "table.csv") == 0
+    # What is not so of all traces is said of each.
+    printed = capsys.readouterr().out
+    assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
+    assert "other.csv: Assumed" not in printed
+    assert "\nLimits are statistical only: the gripper is taken as exact.\n" in printed
     rows = {name: found(name) for name in ("usual.csv", "other.csv")}
     assert [each.pop("cell") for each in rows.values()] == ["one", "two"]
     factors = [each.pop("factors") for each in rows.values()]

@@ -14,9 +14,9 @@ from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import bound
 from biogrip.study.schema import Schema, tidy
-from biogrip.study.sheet import CELL, GROUP
+from biogrip.study.sheet import GROUP
 from biogrip.study.sheet_columns import FIX, FIXED, settings_by_column
-from biogrip.study.sheet_text import FILE
+from biogrip.study.sheet_text import CELL, FILE
 
 _NO_DEFAULT = "–"
 _MOST_LISTED = 6

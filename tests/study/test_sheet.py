@@ -9,11 +9,13 @@ import yaml
 
 from biogrip.errors import BiogripError
 from biogrip.study.case_blocks import NAMABLE
+from biogrip.study.load import load_study
 from biogrip.study.named_blocks import NamedBlocks, read_named_blocks
 from biogrip.study.sheet import Cell, Row, cells_of, read_sheet
 from biogrip.study.sheet_columns import BLOCKS, Setting, setting_of, settings_by_column
 from biogrip.study.sheet_text import is_sheet
-from tests.helpers.places import ROOT
+from biogrip.study.source import read_config
+from tests.helpers.places import CONFIG, ROOT
 
 SHORT = {"phases": [{"duration_s": 5.0, "torque_Nm": 1e-9}]}
 LONG = {"phases": [{"duration_s": 50.0, "torque_Nm": 1e-9}]}
@@ -145,8 +147,9 @@ def test_a_key_is_laid_over_the_block_that_its_row_names(folder: Path) -> None:
         ),
         (
             "file,protocl\na.csv,1\n",
-            "column 'protocl': is no key of a case. Did you mean 'prot",
+            "column 'protocl': is no known column. Did you mean 'protocol'? If it is a factor,",
         ),
+        ("file,Cell\na.csv,1\n", "column 'Cell': is no known column. Did you mean 'cell'? If "),
         ("file,noise_rad\na.csv,1\n", "Did you mean 'measurement.noise_rad'? If it is a factor,"),
         ("file,gripper.left\na.csv,1\n", "is a block of keys, allowed is one of its keys."),
         (
@@ -289,6 +292,11 @@ def test_a_config_defines_blocks_by_name(folder: Path) -> None:
     blocks.refuse_unused([("protocol", "short"), ("protocol", "long")])
     with pytest.raises(BiogripError, match=r"line \d+: blocks.protocol.long: is named by no row"):
         blocks.refuse_unused([("protocol", "short")])
+
+
+def test_a_study_has_no_rows_that_name_blocks() -> None:
+    with pytest.raises(BiogripError, match="blocks: is for rows of a sheet, which this study has"):
+        load_study({**read_config(CONFIG), "blocks": {"protocol": {"short": SHORT}}}, [CONFIG])
 
 
 @pytest.mark.parametrize(

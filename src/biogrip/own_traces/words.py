@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -187,20 +187,37 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
         lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
-        lines += [*one_sided_in_words(found), found[0]["limits"]]
-        provided = [q["provided"] for q in found[0]["quantities"] if q["provided"]]
-        lines += [f"Sums hold provided {words}." for words in provided]
-        lines += fixed_in_words(found[0])
+        lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
+        lines += _once(found, _provided)
+        lines += _once(found, fixed_in_words)
         lines += [
             f"{visible(each['trace'])}: {note['weight']}: {visible(note['text'])}"
             for each in found
             for note in each["notes"]
         ]
-        lines += [taken_for_granted(found[0])] if found[0]["by_default"] else []
+        lines += _once(found, lambda it: [taken_for_granted(it)] if it["by_default"] else [])
     if refused:
         lines.append(f"Not identified, {len(refused)} of {len(refused) + len(found)}:")
         lines += [f"  {visible_lines(reason)}" for reason in refused.values()]
     return "\n".join(lines)
+
+
+def _once(
+    found: Sequence[Mapping[str, Any]], words_of: Callable[[Mapping[str, Any]], list[str]]
+) -> list[str]:
+    """Return what is said of every trace, or, where that differs, of each with its name."""
+    said = [words_of(each) for each in found]
+    if all(words == said[0] for words in said):
+        return said[0]
+    return [
+        f"{visible(each['trace'])}: {line}"
+        for each, words in zip(found, said, strict=True)
+        for line in words
+    ]
+
+
+def _provided(found: Mapping[str, Any]) -> list[str]:
+    return [f"Sums hold provided {q['provided']}." for q in found["quantities"] if q["provided"]]
 
 
 def labels_of(found: Iterable[Mapping[str, Any]]) -> list[str]:

@@ -9,13 +9,14 @@ from typing import Any
 from biogrip.errors import BiogripError, nearest
 from biogrip.study.named_blocks import NamedBlocks
 from biogrip.study.sheet_columns import Setting, leaves, nested, setting_of, shown
-from biogrip.study.sheet_text import FILE, Line, Table, read_table
+from biogrip.study.sheet_text import CELL, FILE, Line, Table, read_table
 from biogrip.study.source import KeyPath, overlaid
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.study.yaml_text import shown_path
 from biogrip.traces.columns import place
 
-CELL, GROUP = "cell", "group"
+GROUP = "group"
+"""The factor that makes groups by default."""
 
 MOST_SHOWN = 10
 """Number of problems in a message."""
@@ -115,22 +116,20 @@ def cells_of(sheet: Sheet, by: str | None = None) -> tuple[str, list[Cell]]:
         If there is no such factor, a cell has no value of it, or a cell is in two groups.
     """
     factor = _factor(sheet, by)
-    first: dict[str, Row] = {}
+    by_cell: dict[str, list[Row]] = {}
     problems = []
     for row in sheet.rows:
+        own = by_cell.setdefault(row.cell, [])
+        own.append(row)
         if not row.factors[factor]:
             where = place(sheet.path, row.line, factor)
             problems.append(f"{where}: found nothing, allowed is a name.")
-        problems += _in_two_groups(sheet.path, row, first.setdefault(row.cell, row), factor)
+        problems += _in_two_groups(sheet.path, row, own[0], factor)
     if problems:
         raise BiogripError(_listed(problems))
     return factor, [
-        Cell(
-            name,
-            row.factors[factor],
-            tuple(sorted((it for it in sheet.rows if it.cell == name), key=lambda it: it.file)),
-        )
-        for name, row in first.items()
+        Cell(name, rows[0].factors[factor], tuple(sorted(rows, key=lambda row: row.file)))
+        for name, rows in by_cell.items()
     ]
 
 

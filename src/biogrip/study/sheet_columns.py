@@ -11,6 +11,7 @@ import yaml
 from biogrip.errors import nearest
 from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock
 from biogrip.study.schema import Schema, schema_of
+from biogrip.study.sheet_text import CELL
 from biogrip.study.source import KeyPath
 from biogrip.study.validation import some_case_problems
 from biogrip.study.yaml_text import scalar_problem
@@ -130,9 +131,12 @@ def _left_out(column: str) -> str | None:
 
 
 def _mistyped(column: str, known: Mapping[str, Setting]) -> str | None:
-    """Return a message about a name that is nearly a block's, or a key's without its block."""
+    """Return a message about a name that is nearly a block's, or a key's without its block.
+
+    So is one that is nearly that of cells, for each trace would be a cell of its own.
+    """
     end = next((name for name in known if "." in name and name.rpartition(".")[2] == column), None)
-    blocks = [name for name in known if "." not in name]
+    blocks = [CELL, *(name for name in known if "." not in name)]
     close = get_close_matches(column.lower(), blocks, n=1, cutoff=_CLOSE)
     if end and ("_" in column or close):
         hint = end
@@ -140,7 +144,7 @@ def _mistyped(column: str, known: Mapping[str, Setting]) -> str | None:
         hint = close[0]
     else:
         return None
-    return f"is no key of a case. Did you mean '{hint}'? If it is a factor, give it another name."
+    return f"is no known column. Did you mean '{hint}'? If it is a factor, give it another name."
 
 
 def _single(block: Schema, path: tuple[str, ...]) -> Iterator[Setting]:

@@ -10,8 +10,8 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.traces.cells import SEPARATORS, cells_or_none
 from biogrip.traces.columns import listed, place
 
-FILE = "file"
-"""The column that every sheet has."""
+FILE, CELL = "file", "cell"
+"""The column that every sheet has, and that of the names of cells."""
 
 # Bytes in which the header of a sheet is looked for.
 _HEAD = 100_000

@@ -1,14 +1,16 @@
 """Keys of config files with their line numbers, for error messages."""
 
 from collections.abc import Hashable, Iterable, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from biogrip.errors import BiogripError
-from biogrip.study.yaml_text import compose, no_yaml, scalar_problem, shown_path
+from biogrip.study.yaml_text import compose, no_yaml, read_text, scalar_problem, shown_path
 
 KeyPath = tuple[Hashable, ...]
 
@@ -20,7 +22,7 @@ _LONGEST_NAME = 80
 class ConfigFiles:
     """Config files of a study with line numbers, the later merged over the earlier."""
 
-    lines: tuple[tuple[str, dict[KeyPath, int]], ...]
+    lines: tuple[tuple[str, Mapping[KeyPath, int]], ...]
     """Line (from 1) of every key and list item, by file."""
     command_line: frozenset[Hashable] = frozenset()
     """Top-level keys set on the command line, which override all files."""
@@ -87,9 +89,16 @@ def overlaid(base: Any, over: Any) -> Any:
     return over
 
 
-def _read(file: Path) -> tuple[dict[KeyPath, int], dict[str, Any]]:
+def _read(file: Path) -> tuple[Mapping[KeyPath, int], dict[str, Any]]:
     """Return the line number of every key, and the content of the file."""
-    root = compose(file)
+    lines, content = _parsed(file, read_text(file))
+    return lines, deepcopy(content)
+
+
+# The default study is read again for every trace.
+@lru_cache(maxsize=16)
+def _parsed(file: Path, text: str) -> tuple[dict[KeyPath, int], dict[str, Any]]:
+    root = compose(file, text)
     lines: dict[KeyPath, int] = {}
     if root is None:
         return lines, {}

@@ -49,16 +49,15 @@ def shown_path(file: Path) -> str:
     return visible(file.relative_to(here) if file.is_relative_to(here) else file)
 
 
-def compose(file: Path) -> yaml.Node | None:
-    """Parse the document in a file to a tree of nodes, with aliases not expanded; None if empty.
+def compose(file: Path, text: str) -> yaml.Node | None:
+    """Parse the text of a file to a tree of nodes, with aliases not expanded; None if empty.
 
     Raises
     ------
     BiogripError
-        With file and line, if the file cannot be read, is not UTF-8 or not YAML, exceeds a bound on
-        bytes, levels, values or text, or has tags.
+        With file and line, if it is not YAML, exceeds a bound on levels, values or text, or has
+        tags.
     """
-    text = _text(file)
     try:
         _check_size(file, text)
         root: yaml.Node | None = yaml.compose(text, Loader=_Loader)
@@ -92,7 +91,14 @@ def scalar_problem(node: yaml.ScalarNode) -> str | None:
     return reading and f"found {text[:_SHOWN]}, which YAML reads {reading}, or text in quotes."
 
 
-def _text(file: Path) -> str:
+def read_text(file: Path) -> str:
+    """Read a YAML file as text.
+
+    Raises
+    ------
+    BiogripError
+        With file and line, if it cannot be read, is not UTF-8 or exceeds the bound on bytes.
+    """
     try:
         # Opening a pipe without a writer would block forever.
         if file.exists() and not (file.is_file() or file.is_dir()):
