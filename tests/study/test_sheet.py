@@ -1,5 +1,6 @@
 """Sheets of traces: what is read of them, and what is refused."""
 
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,15 @@ def refusal(folder: Path, text: str, blocks: NamedBlocks | None = None) -> str:
     with pytest.raises(BiogripError) as caught:
         read_sheet(sheet(folder, text), blocks)
     return str(caught.value).replace(str(folder / "cells.tsv"), "cells.tsv")
+
+
+def test_a_sheet_is_a_file(folder: Path) -> None:
+    """A pipe without a writer would block."""
+    os.mkfifo(folder / "pipe.tsv")
+    for name, said in (("pipe.tsv", "no regular file"), ("gone.tsv", "a file that exists")):
+        with pytest.raises(BiogripError, match=said):
+            read_sheet(folder / name)
+        assert not is_sheet(folder / name)
 
 
 def test_cells_of_groups_have_replicates(folder: Path) -> None:

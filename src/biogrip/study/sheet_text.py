@@ -7,6 +7,7 @@ from pathlib import Path
 
 from biogrip.digits import counted
 from biogrip.errors import BiogripError, nearest
+from biogrip.study.trace_file import trace_file_problem
 from biogrip.traces.cells import SEPARATORS, cells_or_none
 from biogrip.traces.columns import listed, place
 
@@ -60,8 +61,11 @@ def read_table(path: Path) -> Table:
     Raises
     ------
     BiogripError
-        If it cannot be read as text, or has no rows, no column ``file`` or two columns of a name.
+        If it is no file, cannot be read as text, or has no rows, no column ``file`` or two columns
+        of a name.
     """
+    if problem := trace_file_problem(path):
+        raise BiogripError(f"{place(path)}: {problem}")
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
