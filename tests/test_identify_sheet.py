@@ -122,6 +122,13 @@ def test_sheets_and_traces_may_be_mixed(here: Path, capsys: pytest.CaptureFixtur
     assert "cell" not in found("usual.csv")
 
 
+def test_traces_none_of_which_is_there_are_listed(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert identify("usuel.csv", "otter.csv") == 1
+    assert "Not identified, 2 of 2:" in capsys.readouterr().out
+
+
 def test_what_a_row_says_goes_before_options(here: Path) -> None:
     write(
         here / "cells.tsv",
@@ -140,6 +147,35 @@ def test_what_a_row_says_goes_before_options(here: Path) -> None:
     assert data["assumed"]["measurement"]["noise_rad"] == 2e-6
     assert "onset_s" not in data
     assert data["cell"] == "usual"
+
+
+def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None:
+    """In one batch: noise, drift, equations, gripper, known and unknown parameters, and model."""
+    settings = {
+        "measurement.noise_model": "coloured",
+        "measurement.drift": "true",
+        "measurement.noise_rad": "1e-6",
+        "models.identification": "nonlinear",
+        "gripper.uncertainty.arm_length_m": "1e-5",
+        "fix.c_p": "250",
+        "sample.model": "maxwell",
+    }
+    # Half of the readings are enough.
+    first, *lines = (here / "usual.csv").read_text().splitlines(keepends=True)
+    rows = [["file", *settings], ["usual.csv", *[""] * len(settings)]]
+    for number, value in enumerate(settings.values()):
+        (here / f"{number}.csv").write_text("".join([first, *lines[::2]]))
+        rows.append(
+            [f"{number}.csv", *["" if n != number else value for n in range(len(settings))]]
+        )
+    (here / "few.yaml").write_text(yaml.safe_dump({**FEW, "blocks": {}}))
+    write(here / "cells.tsv", rows)
+    assert identify("cells.tsv", "--config", "few.yaml") == 0
+    written = {row[0]: found(row[0]) for row in rows[1:]}
+    for row in rows[1:]:
+        write(here / "cells.tsv", [rows[0], row])
+        assert identify("cells.tsv", "--config", "few.yaml") == 0
+        assert found(row[0]) == written[row[0]]
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def identify_traces(
     page
         True to draw what a page shows of each.
     """
-    if len(options) == 1:
+    if len(options) <= 1:
         return identify_batch(options, outputs, page=page)
     processors = len(os.sched_getaffinity(0))
     size = min(_MOST_IN_BATCH, -(-len(options) // processors))
