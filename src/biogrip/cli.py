@@ -143,6 +143,7 @@ def _parser() -> argparse.ArgumentParser:
         ("batch", "batch of seeds, e.g. seeds_0-49"),
         ("sweep", "name of the sweep"),
         ("seed", "number of the seed"),
+        ("rows", "first row of a batch of the sheet of traces, from 0"),
     ):
         make.add_argument(f"--{name}", help=text)
     make.add_argument("--made-for", help=argparse.SUPPRESS)
@@ -419,7 +420,7 @@ def _trace_options(command: _Parser) -> None:
 def _make(options: argparse.Namespace) -> None:
     from biogrip.running.make import make
 
-    names = ("case", "method", "batch", "sweep", "seed")
+    names = ("case", "method", "batch", "sweep", "seed", "rows")
     given = {name: getattr(options, name) for name in names}
     job = {name: text for name, text in given.items() if text}
     make(options.products, job, RESULTS, options.made_for)

@@ -48,7 +48,7 @@ OPEN = ConfigDict(strict=True, extra="allow", frozen=True, defer_build=True)
 
 def kind_of(value: Any) -> str | None:
     """Return the kind of a value in words, by which pydantic chooses among alternatives."""
-    if isinstance(value, Mapping | BaseModel):
+    if isinstance(value, Mapping | BaseModel | Block):
         return "a block of keys"
     if isinstance(value, list | tuple):
         return "a list"

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
+from biogrip.own_traces.fitted_traces import check_rows
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -13,7 +14,13 @@ from biogrip.running import preparation
 from biogrip.running.locks import sign_locks
 from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
-from biogrip.running.rules import GROUPS, ProductRule, files_of, make_rules
+from biogrip.running.rules import (
+    GROUPS,
+    ProductRule,
+    all_written,
+    files_of,
+    make_rules,
+)
 from biogrip.running.wholeness import Claim, message_only, say_what_else_is_there
 from biogrip.study.load import load_study
 from biogrip.study.source import read_places
@@ -40,6 +47,7 @@ with message_only():
     )
     if workflow.exec_mode == ExecMode.DEFAULT:
         check_traces(STUDY)
+        check_rows(STUDY)
 
 RESULTS = Path("results")
 PLAN = Plan(STUDY, RESULTS)
@@ -108,7 +116,7 @@ def begin():
 def end():
     """Record what the jobs have written, and say what else there is."""
     CLAIM.end()
-    say_what_else_is_there(RESULTS, ALL_FILES)
+    say_what_else_is_there(RESULTS, all_written(RULES))
 
 
 onstart:

@@ -99,11 +99,14 @@ def _joined(outcomes: Iterable[Outcome]) -> Outcome:
 
 
 def identify_batch(
-    options: Sequence[IdentifyOptions], outputs: Sequence[Path], *, page: bool
+    options: Sequence[IdentifyOptions], outputs: Sequence[Path] | None, *, page: bool
 ) -> Outcome:
-    """Identify the traces of one batch; arguments and result as of `identify_traces`."""
+    """Identify the traces of one batch; arguments and result as of `identify_traces`.
+
+    Without `outputs`, no file is written.
+    """
     results: dict[int, Identified | BiogripError] = {}
-    if len(options) == 1:
+    if len(options) == 1 and outputs is not None:
         try:
             results[0] = identify_trace(options[0], outputs[0])
         except BiogripError as error:
@@ -126,7 +129,7 @@ def identify_batch(
 
 
 def _results(
-    options: Sequence[IdentifyOptions], outputs: Sequence[Path]
+    options: Sequence[IdentifyOptions], outputs: Sequence[Path] | None
 ) -> dict[int, Identified | BiogripError]:
     """Return results or errors of traces by their index, those alike fitted together."""
     results: dict[int, Identified | BiogripError] = {}
@@ -143,7 +146,7 @@ def _results(
             found = identify_alike(
                 [options[index] for index in group],
                 [traces[index] for index in group],
-                [outputs[index] for index in group],
+                None if outputs is None else [outputs[index] for index in group],
                 progress,
             )
             results.update(zip(group, found, strict=True))

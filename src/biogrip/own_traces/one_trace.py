@@ -79,6 +79,8 @@ class IdentifyOptions:
     row
         Row of the sheet that lists the trace, if one does. What it says goes before options and
         config.
+    blocks
+        Blocks that a study's config gives, in place of those of `config`.
     """
 
     trace: Path
@@ -88,6 +90,7 @@ class IdentifyOptions:
     posterior: bool = False
     fixed: Mapping[str, float] = field(default_factory=dict)
     row: Row | None = None
+    blocks: Mapping[str, Any] | None = None
 
     @property
     def settings(self) -> Mapping[str, Any]:
@@ -97,9 +100,20 @@ class IdentifyOptions:
     @property
     def given(self) -> dict[str, Any]:
         """Blocks of the user's: those of the config, and over them those of a sheet's row."""
-        config = read_configs([self.config]) if self.config else {}
-        found: dict[str, Any] = overlaid(config, dict(self.settings))
+        found: dict[str, Any] = overlaid(self._own_blocks, dict(self.settings))
         return found
+
+    @property
+    def merged(self) -> dict[str, Any]:
+        """Blocks of the default study, and over them the user's but for those of a row."""
+        found: dict[str, Any] = overlaid(read_configs([default_config()]), self._own_blocks)
+        return found
+
+    @property
+    def _own_blocks(self) -> dict[str, Any]:
+        if self.blocks is not None:
+            return dict(self.blocks)
+        return read_configs([self.config]) if self.config else {}
 
 
 @dataclass(frozen=True)
@@ -175,7 +189,7 @@ def read(options: IdentifyOptions, case: Case, progress: Progress) -> TraceCase:
 def identify_alike(
     options: Sequence[IdentifyOptions],
     traces: Sequence[TraceCase],
-    outputs: Sequence[Path],
+    outputs: Sequence[Path] | None,
     progress: Progress,
 ) -> list[Identified]:
     """Identify several traces, each as if it were alone, and write the result of each.
@@ -187,7 +201,7 @@ def identify_alike(
     traces
         The traces: of the same model, budget of fits and confidence.
     outputs
-        JSON file of each.
+        JSON file of each; None to write nothing.
     progress
         Counter of the five steps, or six with a posterior.
 
@@ -231,7 +245,7 @@ def identify_alike(
         _posterior(own, fit, of_trace, progress) if own.case.posterior is not None else None
         for own, fit, of_trace in zip(traces, fits, data, strict=True)
     ]
-    for own, of_trace, samples, output in zip(traces, data, drawn, outputs, strict=True):
+    for own, of_trace, samples, output in zip(traces, data, drawn, outputs or (), strict=False):
         if samples is not None:
             words = {WRITTEN_BY: __version__}
             path = output.with_suffix(SAMPLES)
@@ -352,7 +366,7 @@ def study_of(options: IdentifyOptions) -> Study:
     for path, text in fixed_problems(sample.model, options.fixed):
         raise BiogripError(f"--fix: {dotted(path)}: {text}" if path else f"--fix: {text}")
     files = [default_config(), *([options.config] if options.config else [])]
-    merged = read_configs(files)
+    merged = options.merged
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     read_as, settings = options.read_as, dict(options.settings)

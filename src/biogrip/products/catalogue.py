@@ -1,4 +1,4 @@
-"""Registry of all products, collected from the modules of this package."""
+"""Registry of all products, collected from the modules of some packages."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -7,9 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from pkgutil import walk_packages
 
-import biogrip.products
 from biogrip.errors import BiogripError, nearest
 from biogrip.products.product import Product
+
+_PACKAGES = "biogrip.products", "biogrip.own_traces"
 
 
 @cache
@@ -51,7 +52,10 @@ def _product(name: str) -> Product:
 
 @cache
 def _modules() -> tuple[str, ...]:
-    return tuple(m.name for m in walk_packages(biogrip.products.__path__, "biogrip.products."))
+    paths = {name: import_module(name).__path__ for name in _PACKAGES}
+    return tuple(
+        module.name for name, path in paths.items() for module in walk_packages(path, f"{name}.")
+    )
 
 
 @cache

@@ -15,6 +15,7 @@ from biogrip.keys import Block, Distinct, OneOf, Problem
 from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
+from biogrip.study.traces_block import Traces
 
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
 """Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
@@ -119,7 +120,6 @@ class StudyConfig(Shared):
     cases: Annotated[
         Mapping[_CaseName, CaseBlock],
         Field(
-            min_length=1,
             max_length=_MOST_CASES,
             description=f"The samples of the study, by name, at most {_MOST_CASES}. Any of the "
             f"blocks {', '.join(OVERRIDABLE)} may be given in a case, too; its keys then hold for "
@@ -133,10 +133,16 @@ class StudyConfig(Shared):
         ],
         Field(
             description="Blocks by name, as `protocol: {short: {phases: ...}}`, that rows of a "
-            "sheet name in a column `protocol`; they are laid over the config's own. For `biogrip "
-            "identify` and `biogrip groups` alone."
+            "sheet name in a column `protocol`; they are laid over the config's own."
         ),
     ] = {}
+    traces: Annotated[
+        Traces | None,
+        Field(
+            description="A sheet of recorded traces, a row a trace, which are identified in "
+            "batches. The study then has the default cases only if it names `cases`, too."
+        ),
+    ] = None
     only: Annotated[
         tuple[str, ...],
         Field(
@@ -172,8 +178,10 @@ class StudyConfig(Shared):
             if seeds > _MOST_BATCHES * self.batch_size:
                 text = f"found {self.batch_size}, which makes {seeds} seeds more than "
                 yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
-        if self.blocks:
+        if self.blocks and not self.traces:
             yield ("blocks",), "is for rows of a sheet, which this study has none of; leave it out."
+        if not (self.cases or self.traces):
+            yield ("cases",), "found none, allowed is one or more, or a sheet under `traces`."
         yield from self._band_problems()
         for name, case in self.cases.items():
             for path, text in case.comb_problems(self.actuator):
@@ -190,7 +198,7 @@ class StudyConfig(Shared):
 
     def _band_problems(self) -> Iterator[Problem]:
         """Find power-law models in a study whose protocols exceed their range of validity."""
-        longest = max(case.protocol.end_s for case in self.cases.values())
+        longest = max((case.protocol.end_s for case in self.cases.values()), default=0.0)
         for index, name in enumerate(self.model_selection.models):
             if not CANDIDATES[name].model.power_law:
                 continue

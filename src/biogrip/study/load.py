@@ -5,12 +5,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from biogrip.errors import BiogripError
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
+from biogrip.study.named_blocks import KEY as BLOCKS
+from biogrip.study.named_blocks import read_named_blocks
 from biogrip.study.schema import schema_of
-from biogrip.study.source import KeyPath, overlaid, read_config, read_places
+from biogrip.study.sheet import read_sheet
+from biogrip.study.source import ConfigFiles, KeyPath, overlaid, read_config, read_places
 from biogrip.study.study import Study
+from biogrip.study.traces_block import KEY as TRACES
+from biogrip.study.traces_block import READ
 from biogrip.study.validation import checked_study
+
+# Keys that say nothing of recorded traces.
+_NOT_OF_TRACES = (TRACES, BLOCKS, "cases", "only", "seeds", "batch_size", "sweeps")
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
@@ -47,8 +56,45 @@ def load_study(
         If anything in the config cannot be used.
     """
     places = replace(read_places(files, command_line), over=tuple(over))
-    complete = _fill_in(schema_of(StudyConfig).with_numbers(config))
+    complete = _fill_in(schema_of(StudyConfig).with_numbers(_with_rows(config, files, places)))
     return Study(checked_study(complete, places, for_workflow=for_workflow))
+
+
+def _with_rows(
+    config: Mapping[str, Any], files: Sequence[str | Path], places: ConfigFiles
+) -> Mapping[str, Any]:
+    """Return a config with the rows of its sheet of traces, if it has one.
+
+    Rows are laid over what files and command line give beyond the first file, the default study.
+    Its cases are left out unless some are given, too.
+    """
+    block = config.get(TRACES)
+    block = {"sheet": block} if isinstance(block, str) else block
+    if not isinstance(block, Mapping) or not isinstance(block.get("sheet"), str):
+        return config
+    for name in set(block) & set(READ):
+        place = places.place((TRACES, name))
+        raise BiogripError(f"{place}: {TRACES}.{name}: is not for a config; leave it out.")
+    own = [Path(file) for file in files[1:]]
+    given = read_configs(own)
+    given |= {key: config[key] for key in config if key in places.command_line}
+    naming = [file for file in own if BLOCKS in read_config(file)]
+    blocks = read_named_blocks(naming[-1] if naming else None)
+    sheet = read_sheet(Path(block["sheet"]), blocks)
+    blocks.refuse_unused(sheet.named)
+    rows = [
+        {
+            "file": str(row.file),
+            "cell": row.cell,
+            "line": row.line,
+            "factors": dict(row.factors),
+            "settings": dict(row.settings),
+        }
+        for row in sheet.rows
+    ]
+    kept = {key: value for key, value in given.items() if key not in _NOT_OF_TRACES}
+    filled = {**config, TRACES: {**block, "rows": rows, "given": kept}}
+    return filled if "cases" in given else {**filled, "cases": {}, "reconstructed": []}
 
 
 def _fill_in(config: dict[str, Any]) -> dict[str, Any]:

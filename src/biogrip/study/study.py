@@ -25,6 +25,7 @@ from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
     from biogrip.identify.least_squares import LeastSquaresSettings
+    from biogrip.study.traces_block import TracesBlock
 
 _Part = TypeVar("_Part")
 
@@ -277,6 +278,8 @@ class Study:
     """Increase of chi^2 over the lowest known that still counts as the global optimum."""
     gripper = _of_study(lambda study: study.config.gripper.neutral)
     """The gripper in its neutral configuration."""
+    traces = _of_study(lambda study: cast("TracesBlock | None", study.config.traces))
+    """Sheet of recorded traces, with its rows, if there is one."""
     jaw_gap_m = _of_study(lambda study: study.config.gripper.jaw_gap_m)
     """Distance between the jaws in the neutral configuration."""
     actuator = _of_study(lambda study: study.config.actuator)

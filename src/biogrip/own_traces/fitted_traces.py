@@ -1,0 +1,201 @@
+"""Traces of a study's sheet, identified in batches: a file of results for each."""
+
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from biogrip.digits import rounded_numbers
+from biogrip.errors import BiogripError
+from biogrip.files import write_text
+from biogrip.own_traces.many_traces import identify_batch
+from biogrip.own_traces.one_trace import IdentifyOptions
+from biogrip.own_traces.read_as import ReadAs
+from biogrip.own_traces.rows_of_sheets import cases_of
+from biogrip.products.digest import digest
+from biogrip.products.files.rows import write_rows
+from biogrip.products.plan import ROWS_A_BATCH, Plan, Wildcards
+from biogrip.products.product import Product, Reads, Weight
+from biogrip.products.source_files import fingerprint
+from biogrip.study.sheet import Row
+from biogrip.study.study import Study
+
+FOLDER = Path("results/traces")
+BATCHES = f"{FOLDER}/batches/{{rows}}.csv"
+"""Lists of the traces of a batch, with the files of their results."""
+
+_COLUMNS = ("trace", "results", "sha256")
+_MINUTES, _MEGABYTES = 60, 1000
+_LONGEST_STEM, _LETTERS = 60, 8
+
+
+@dataclass(frozen=True)
+class TraceToFit:
+    """A trace, and all that its fit depends on but its readings and the code."""
+
+    file: str
+    """Its file."""
+    model: str
+    """Name of the sample model."""
+    given: Mapping[str, Any]
+    """Blocks that the config gives."""
+    settings: Mapping[str, Any]
+    """Blocks of its row."""
+
+    @property
+    def results(self) -> Path:
+        """File of its results, a name of its own for every path."""
+        stem = re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.file).stem)[:_LONGEST_STEM]
+        own = hashlib.sha256(self.file.encode(errors="surrogateescape")).hexdigest()
+        return FOLDER / f"{stem}-{own[:_LETTERS]}.json"
+
+    @property
+    def options(self) -> IdentifyOptions:
+        """Options to identify it with."""
+        file = Path(self.file)
+        # Its cell and factors change no fit: what shows them reads them from the sheet.
+        row = Row(file, 1, file, file.stem, {}, self.settings)
+        return IdentifyOptions(file, self.model, ReadAs(), None, row=row, blocks=self.given)
+
+    def made_for(self) -> str:
+        """Return a digest of its readings, of what its fit depends on, and of the code."""
+        readings = hashlib.sha256(Path(self.file).read_bytes()).hexdigest()
+        return "-".join((readings, digest(self), fingerprint(__name__)))
+
+
+@dataclass(frozen=True)
+class FittedTrace:
+    """Results of a trace, as its file has them.
+
+    Parameters
+    ----------
+    data
+        As `identify_trace` writes it; None if the trace could not be read.
+    on_page
+        What a page shows of it.
+    refused
+        Message if it could not be read.
+    """
+
+    data: dict[str, Any] | None
+    on_page: dict[str, Any] | None
+    refused: str | None
+
+
+def fit(to_fit: list[TraceToFit], traces: list[Path], batch: Path) -> None:
+    """Identify those traces of a batch whose results are not there yet, and list all results.
+
+    A result is there if its file says that it was made of the same readings and settings by the
+    same code.
+    """
+    missing = [own for own in to_fit if read_results(own.results, own.made_for()) is None]
+    if missing:
+        outcome = identify_batch([own.options for own in missing], None, page=True)
+        found = {each["trace"]: each for each in outcome.found}
+        shown = dict(zip(found, outcome.on_page, strict=True))
+        for own in missing:
+            results = {
+                "made_for": own.made_for(),
+                "refused": outcome.refused.get(own.file),
+                "data": rounded_numbers(found.get(own.file)),
+                "on_page": rounded_numbers(shown.get(own.file)),
+            }
+            write_text(
+                own.results, json.dumps({"seal": _seal(results), **results}, indent=1) + "\n"
+            )
+    listed = [(own.file, own.results.name, _hash(own.results)) for own in to_fit]
+    write_rows(batch, _COLUMNS, listed)
+
+
+def read_results(file: Path, made_for: str | None = None) -> FittedTrace | None:
+    """Return the results in a file, or None if they are not whole, or made for something else."""
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        if found.pop("seal") != _seal(found) or made_for not in (None, found["made_for"]):
+            return None
+        return FittedTrace(found["data"], found["on_page"], found["refused"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+
+
+def read_every(traces: Iterable[TraceToFit]) -> Iterator[FittedTrace]:
+    """Yield the results of traces.
+
+    Raises
+    ------
+    BiogripError
+        If the results of a trace are not there, or were changed.
+    """
+    for own in traces:
+        found = read_results(own.results)
+        if found is None:
+            raise BiogripError(
+                f"{own.results}: is not there, or is not as it was written. Remove "
+                f"{Path(BATCHES).parent} and run again: only this trace is fitted."
+            )
+        yield found
+
+
+def _seal(results: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(results, indent=1).encode()).hexdigest()
+
+
+def _hash(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def every_trace(study: Study) -> list[TraceToFit]:
+    """Return the traces of a study's sheet."""
+    block = study.traces
+    if block is None:
+        return []
+    rows = block.rows
+    return [TraceToFit(row.file, block.model, block.given, row.settings) for row in rows]
+
+
+def check_rows(study: Study) -> None:
+    """Check the settings of all rows of a study's sheet together with its config.
+
+    Raises
+    ------
+    BiogripError
+        With the places of the first few problems.
+    """
+    block = study.traces
+    if block is not None:
+        sheet = Path(block.sheet)
+        cases_of(
+            [
+                replace(
+                    own.options,
+                    row=Row(sheet, row.line, Path(row.file), row.cell, {}, row.settings),
+                )
+                for own, row in zip(every_trace(study), block.rows, strict=True)
+            ]
+        )
+
+
+def _to_fit(study: Study, job: Wildcards) -> list[TraceToFit]:
+    first = int(job["rows"])
+    return every_trace(study)[first : first + ROWS_A_BATCH]
+
+
+def _files(plan: Plan, job: Wildcards) -> list[str]:
+    return [own.file for own in _to_fit(plan.study, job)]
+
+
+FITTED_TRACES = Product(
+    "fitted_traces",
+    {"batch": BATCHES},
+    fit,
+    _to_fit,
+    lambda plan: plan.row_jobs,
+    message="Identifying the traces from row {rows}",
+    reads={"traces": Reads(_files)},
+    weight=Weight(_MINUTES, _MEGABYTES),
+    beside=lambda study, job: [str(own.results) for own in _to_fit(study, job)],
+    of_traces=True,
+)
