@@ -2,11 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.study.load import read_configs
 from biogrip.study.plain import plain
 from biogrip.study.study import Case
 
@@ -61,9 +59,8 @@ def by_default(given: Mapping[str, Any]) -> list[str]:
     return [name for name in blocks if not set(given.get(name) or ()) - {"uncertainty"}]
 
 
-def names_models(config: Path | None) -> bool:
-    """Return True if the config names the sample models to try (``model_selection.models``)."""
-    given = read_configs([config]) if config else {}
+def names_models(given: Mapping[str, Any]) -> bool:
+    """Return True if blocks of a config name the models to try (``model_selection.models``)."""
     return "models" in (given.get("model_selection") or {})
 
 

@@ -183,7 +183,7 @@ def read(options: IdentifyOptions, case: Case, progress: Progress) -> TraceCase:
     """
     recorded, case = read_trace(options.trace, case, options.given, progress.note)
     problem = case.problem.weighted(recorded.sd_rad)
-    return TraceCase(case, recorded, problem, names_models(options.config))
+    return TraceCase(case, recorded, problem, names_models(options.given))
 
 
 def identify_alike(

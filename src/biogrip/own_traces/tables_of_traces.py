@@ -3,12 +3,16 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from biogrip.errors import BiogripError
+from biogrip.files import write_text
+from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.fitted_traces import BATCHES, TraceToFit, every_trace, read_every
 from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.page import write_page
 from biogrip.products.product import Product, Reads
-from biogrip.study.sheet import Row
+from biogrip.study.sheet import MOST_SHOWN, Row
 from biogrip.study.study import Study
+from biogrip.terminal import visible
 
 CATEGORY = "Traces"
 
@@ -65,6 +69,29 @@ def show_traces(traces: TracesShown, batches: list[Path], page: Path) -> None:
     write_page(outcome.on_page, outcome.refused, page)
 
 
+def check_traces(traces: TracesShown, batches: list[Path], ok: Path) -> None:
+    """Write the number of traces if all could be read and no fit is rejected.
+
+    Raises
+    ------
+    BiogripError
+        With the first few others.
+    """
+    outcome = traces.outcome
+    problems = [f"{visible(file)}: cannot be used." for file in outcome.refused]
+    problems += [
+        f"{visible(each['trace'])}: the fit is rejected: {each['reasons'][0]}"
+        for each in outcome.found
+        if each["fit"] == REJECTED
+    ]
+    if problems:
+        more = len(problems) - MOST_SHOWN
+        raise BiogripError(
+            "\n".join(problems[:MOST_SHOWN] + ([f"... and {more} more."] if more > 0 else []))
+        )
+    write_text(ok, f"{len(outcome.found)}\n")
+
+
 EVERY_BATCH = Reads(lambda plan, _: [BATCHES.format(**job) for job in plan.row_jobs])
 """The lists of all batches."""
 
@@ -90,5 +117,17 @@ PAGE = Product(
     category=CATEGORY,
     item="All traces",
     caption="Every trace of the sheet: status of its fit, verdicts, values and limits.",
+    of_traces=True,
+)
+
+ALL_OK = Product(
+    "traces_ok",
+    {"ok": "results/traces/ok.txt"},
+    check_traces,
+    lambda study, _: shown(study),
+    lambda plan: [],
+    message="Looking for traces that cannot be used or whose fits are rejected",
+    reads={"batches": EVERY_BATCH},
+    by_default=False,
     of_traces=True,
 )

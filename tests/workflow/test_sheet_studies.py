@@ -1,0 +1,137 @@
+"""A sheet of traces as a study: what is made, and what is fitted again."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from biogrip.experiment.sample import CANDIDATES
+from biogrip.response.simulation import simulated_rotation
+from tests.helpers.default import STUDY
+from tests.helpers.runs import Run, biogrip, called, replaced, snakemake
+
+SHEET = """file\tcell\tdish\tmeasurement.noise_rad
+a.csv\tfirst\tA\t
+b.csv\tsecond\tA\t1e-6
+c.csv\tthird\tB\t
+"""
+CONFIG = """traces: cells.tsv
+least_squares: {candidates: 50, starts: 3}
+model_selection: {models: [damper, liquid_drop]}
+"""
+
+
+def trace(file: Path, seed: int) -> None:
+    """Write a trace of a liquid drop in noise, of 120 readings."""
+    case = STUDY.cases["liquid_drop_1"].problem
+    time_s = np.linspace(0, 400, 120)
+    network = CANDIDATES["liquid_drop"].model.network(np.array([[20.0 + seed, 5.0, 300.0]]))
+    clean = simulated_rotation(case.gripper, network, case.torque, time_s, nonlinear=False)[0]
+    noisy = clean + 1e-6 * np.random.default_rng(seed).standard_normal(len(time_s))
+    np.savetxt(file, np.c_[time_s, noisy], "%.9g", ",", header="time_s,rotation_rad", comments="")
+
+
+def run(folder: Path) -> Run:
+    """Run the study of the folder, which must succeed."""
+    done = called(folder, "run", "lab.yaml", "-j2")
+    assert done.status == 0, done.output
+    assert "other studies" not in done.output
+    return done
+
+
+def results(folder: Path) -> dict[str, tuple[bytes, int]]:
+    """Bytes and time of every trace's results, by the trace."""
+    found = {}
+    for file in (folder / "results" / "traces").glob("*.json"):
+        found[file.name.partition("-")[0]] = file.read_bytes(), file.stat().st_mtime_ns
+    return found
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    for seed, name in enumerate("abc"):
+        trace(tmp_path / f"{name}.csv", seed)
+    (tmp_path / "cells.tsv").write_text(SHEET)
+    (tmp_path / "lab.yaml").write_text(CONFIG)
+    return tmp_path
+
+
+def table(folder: Path) -> pd.DataFrame:
+    return pd.read_csv(folder / "results" / "tables" / "traces.csv").set_index("cell")
+
+
+def test_only_what_is_new_or_has_changed_is_fitted(lab: Path) -> None:
+    """A row, a trace, a setting; not a row's place or factor. What was edited is made again."""
+    run(lab)
+    first = results(lab)
+    assert table(lab)["dish"].tolist() == ["A", "A", "B"]
+    assert not list((lab / "results" / "tables").glob("errors*"))
+    page = (lab / "results" / "traces.html").read_text()
+    assert all(name in page for name in ("a.csv", "b.csv", "c.csv"))
+    again = snakemake(lab, "-n", config=CONFIG)
+    assert "Nothing to be done" in again.output, again.output
+
+    trace(lab / "new.csv", 3)
+    lines = replaced(SHEET, "b.csv", "new.csv\tnew\tB\t\nb.csv")
+    (lab / "cells.tsv").write_text(replaced(lines, "third\tB", "third\tC"))
+    run(lab)
+    more = results(lab)
+    assert {name for name in more if more[name] != first.get(name)} == {"new"}
+    assert table(lab)["dish"].to_dict() == {"first": "A", "new": "B", "second": "A", "third": "C"}
+
+    trace(lab / "a.csv", 4)
+    (lab / "cells.tsv").write_text(replaced(lines, "third\tB\t", "third\tC\t2e-6"))
+    run(lab)
+    changed = results(lab)
+    assert {name for name in more if more[name] != changed[name]} == {"a", "c"}
+
+    (edited,) = (lab / "results" / "traces").glob("b-*.json")
+    edited.write_text(replaced(edited.read_text(), '"fit": "ok"', '"fit": "rejected"'))
+    run(lab)
+    mended = results(lab)
+    assert mended["b"][0] == changed["b"][0]
+    assert {name for name in more if mended[name] != changed[name]} == {"b"}
+
+
+def test_a_study_says_of_a_trace_what_the_command_says(lab: Path) -> None:
+    """Of each alone, by the same settings: the same numbers, digit by digit."""
+    run(lab)
+    (lab / "own.yaml").write_text(CONFIG.partition("\n")[2])
+    for name, more in (("a", []), ("b", ["--noise", "1e-6"])):
+        done = biogrip(lab, "identify", f"{name}.csv", "--config", "own.yaml", *more)
+        assert done.returncode == 0, done.stderr
+        alone = json.loads((lab / f"{name}.identified.json").read_text())
+        (file,) = (lab / "results" / "traces").glob(f"{name}-*.json")
+        data = json.loads(file.read_text())["data"]
+        for key in ("fit", "quantities", "models", "misfit_rad", "notes"):
+            assert data[key] == alone[key], key
+
+
+def test_a_trace_that_cannot_be_read_is_a_row_that_says_so(lab: Path) -> None:
+    (lab / "b.csv").write_text("time_s,rotation_rad\n0,1e-6\nten,2e-6\n")
+    run(lab)
+    found = table(lab)
+    assert found["fit"].to_dict()["second"] == "none"
+    assert found["fit"].to_dict()["third"] == "ok"
+    assert "line 3" in (lab / "results" / "traces.html").read_text()
+    asked = called(lab, "make", "traces_ok")
+    assert asked.status == 1
+    assert "b.csv" in asked.output
+    trace(lab / "b.csv", 1)
+    run(lab)
+    assert called(lab, "make", "traces_ok").status == 0
+
+
+def test_a_sheet_that_cannot_be_used_stops_with_line_and_column(lab: Path) -> None:
+    (lab / "cells.tsv").write_text(replaced(SHEET, "\t1e-6", "\tmuch"))
+    done = called(lab, "run", "lab.yaml", "-j2")
+    assert done.status != 0
+    assert "cells.tsv, line 3, column 'measurement.noise_rad': found" in done.output
+    (lab / "cells.tsv").write_text(SHEET)
+    (lab / "lab.yaml").write_text("traces: {sheet: cells.tsv, rows: []}\n")
+    done = called(lab, "run", "lab.yaml", "-j2")
+    assert done.status != 0
+    assert "lab.yaml, line 1: traces.rows: is not for a config" in done.output
+    assert "Traceback" not in done.output
