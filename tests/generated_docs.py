@@ -132,6 +132,19 @@ def _limits_of(row: dict[str, str]) -> str:
     return row["verdict"]
 
 
+def claims() -> str:
+    """Claims of the paper with their verdicts; the evidence is in the published table."""
+    rows = read_table(PUBLISHED / "tables" / "claims.csv")
+    return _table(
+        {
+            "place": re.sub("sections? ", "§", row["place"]),
+            "claim": row["claim"],
+            "verdict": row["verdict"],
+        }
+        for row in rows
+    )
+
+
 def _percent(text: str) -> str:
     try:
         return f"{float(f'{float(text):.2g}') + 0.0:g} %"
@@ -425,7 +438,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     },
     ROOT / "docs" / "design.md": {"sequential": experiments_needed, "shapes": bounds_by_shape},
     ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
-    ROOT / "docs" / "reproduction.md": {"results": paper_against_study},
+    ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }
 """Parts of documents that are written, by what."""
 

@@ -1,4 +1,4 @@
-"""Paths of the default config and of the Snakefile, installed or in the repository."""
+"""Paths of the default config, the Snakefile and published results, installed or not."""
 
 from pathlib import Path
 
@@ -15,3 +15,8 @@ def default_config() -> Path:
 def snakefile() -> Path:
     """Return the Snakefile that runs a study."""
     return _TOP / "Snakefile"
+
+
+def published(name: str) -> Path:
+    """Return a published table, by its path from ``results/published`` on."""
+    return _TOP / "results" / "published" / name

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from biogrip.arrays import Array
 from biogrip.errors import BiogripError
@@ -16,7 +14,7 @@ from biogrip.identify.success import typical
 from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instrument import Quantity
 from biogrip.products.batches import parse_batch
-from biogrip.products.files.identifications import read_identifications
+from biogrip.products.files.identifications import read_histories, read_identifications
 from biogrip.products.files.traces import Measurements, read_measurements
 from biogrip.response.nuisance import within
 from biogrip.response.simulation import simulated_rotation
@@ -101,23 +99,7 @@ def read_history(
     path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
 ) -> pd.DataFrame:
     """Read one method's histories of the seeds drawn individually and of the one shown, Parquet."""
-    columns = ["seed", "generation", *values]
-    try:
-        # Import of pandas' own Parquet reader would take a tenth of the memory.
-        with pq.ParquetFile(path, read_dictionary=["method"]) as file:
-            parts = [
-                _of_seeds(file.read_row_group(group, ["method", *columns]), method, shown)
-                for group in range(file.num_row_groups)
-            ]
-        return pd.concat(parts, ignore_index=True)[columns]
-    except (KeyError, OSError, TypeError, ValueError, pa.ArrowException) as error:
-        raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
-
-
-def _of_seeds(rows: pa.Table, method: str, shown: int) -> pd.DataFrame:
-    frame = rows.to_pandas()
-    drawn = (frame["seed"] < SHOWN_SEEDS) | (frame["seed"] == shown)
-    return frame[drawn & (frame["method"] == method)]
+    return read_histories(path, method, values, lambda seed: (seed < SHOWN_SEEDS) | (seed == shown))
 
 
 def scale_of(values: Array, unit: str) -> tuple[float, str]:

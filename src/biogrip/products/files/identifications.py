@@ -1,6 +1,6 @@
 """Identified parameters, histories and processor times: a row per seed and method."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -101,6 +101,37 @@ def read_identifications(path: Path, method: str | None = None) -> "pd.DataFrame
     if chosen.empty:
         raise BiogripError(f"{path}: holds no identification by {method}.")
     return chosen
+
+
+def read_histories(
+    path: Path,
+    method: str,
+    values: Sequence[str],
+    chosen: "Callable[[pd.Series[int]], pd.Series[bool]]" = lambda seed: seed >= 0,
+) -> "pd.DataFrame":
+    """Read columns of one method's histories of the chosen seeds, Parquet.
+
+    Raises
+    ------
+    BiogripError
+        If the file cannot be read.
+    """
+    import pandas as pd
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    columns = ["seed", "generation", *values]
+    try:
+        # Import of pandas' own Parquet reader would take a tenth of the memory.
+        with pq.ParquetFile(path, read_dictionary=["method"]) as file:
+            groups = (
+                file.read_row_group(group, ["method", *columns]).to_pandas()
+                for group in range(file.num_row_groups)
+            )
+            parts = [rows[chosen(rows["seed"]) & (rows["method"] == method)] for rows in groups]
+        return pd.concat(parts, ignore_index=True)[columns]
+    except (KeyError, OSError, TypeError, ValueError, pa.ArrowException) as error:
+        raise BiogripError(f"{path}: cannot be read as histories: {error}.") from error
 
 
 def _row(record: Record) -> tuple[str | int, ...]:

@@ -5,19 +5,24 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from biogrip.digits import with_unit
 from biogrip.identifiability.verdicts import DETERMINED
+from biogrip.products.tables.claim_rules import (
+    FEWEST_SEEDS,
+    IN_PART,
+    NOT,
+    REPLICATED,
+    by_value,
+)
 
 Row = Mapping[str, str]
-# With fewer, no seed is outside of the middle 90 %.
-_FEWEST_SEEDS = 20
 
 
 def compare_with_paper(
     errors: Iterable[Row], verdicts: Iterable[Row], names: Mapping[str, str]
 ) -> str:
-    """Say which values of the paper the study replicates, partly or not; "" if it has none.
+    """Say which values of the paper the study replicates, in part or not; "" if it has none.
 
     A value is replicated if it is within the middle 90 % of the seeds, and the typical seed is as
-    close to the target as the limits of a trace without noise; partly if it is only within.
+    close to the target as the limits of a trace without noise; in part if it is only within.
 
     Parameters
     ----------
@@ -30,9 +35,9 @@ def compare_with_paper(
     if not rows:
         return ""
     fewest = min(int(row["seeds"]) for row in rows)
-    if fewest < _FEWEST_SEEDS:
+    if fewest < FEWEST_SEEDS:
         return (
-            f"Which of the paper's values are replicated takes {_FEWEST_SEEDS} seeds a case to "
+            f"Which of the paper's values are replicated takes {FEWEST_SEEDS} seeds a case to "
             f"say, and this study has {fewest}."
         )
     limits = {(row["case"], row["quantity"]): row for row in verdicts}
@@ -42,15 +47,15 @@ def compare_with_paper(
             float(row[key]) for key in ("p05_identified", "paper_identified", "p95_identified")
         )
         close = _is_close(row["typical_identified"], limits[row["case"], row["parameter"]])
-        kind = "not" if not low <= value <= high else "replicated" if close else "partly"
+        kind = by_value(low, value, high, is_close=close)
         members = found.setdefault(kind, {})
         members.setdefault(names[row["case"]], []).append(row["parameter"])
     meanings = {
-        "replicated": "replicated (within the middle 90 % of our seeds, of which the typical one "
+        REPLICATED: "replicated (within the middle 90 % of our seeds, of which the typical one "
         "is as close to the target as a trace allows)",
-        "partly": "replicated in part (within, but the typical one is further off, or there are "
+        IN_PART: "replicated in part (within, but the typical one is further off, or there are "
         "no such limits)",
-        "not": "not replicated",
+        NOT: "not replicated",
     }
     parts = [_parts(meaning, found[kind]) for kind, meaning in meanings.items() if kind in found]
     return f"Of {len(rows)} values of the paper, sums included, {'; '.join(parts)}."

@@ -53,7 +53,7 @@ _FOLDERS = ("results/figures/", "results/tables/")
 _FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
 _STORY = ("moduli",)
 _SHOWN = ("overview", "linkage", "torque")
-_FIRST = ("errors", "methods", "coverage", "models")
+_FIRST = ("errors", "claims", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
 
 
