@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,11 @@ from tests.helpers import loaded
 from tests.helpers.places import ROOT
 
 # A whole study in a few seconds: real physics and algorithm, little of each.
+_PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+_WHEEL = _PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+SHIPPED = [name for name in _WHEEL if name.startswith(("results/", "benchmarks/", "CITATION"))]
+"""What claims and the article read beside the code."""
+
 SMALL = """
 seeds: 4
 batch_size: 2
@@ -185,6 +191,9 @@ def copied_tree(folder: Path) -> Tree:
     for name in ("src", "workflow", "config", "profiles"):
         shutil.copytree(ROOT / name, folder / name)
     shutil.copy(ROOT / "Snakefile", folder)
+    for name in SHIPPED:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, folder / name)
     return Tree(folder, folder / "study")
 
 

@@ -126,7 +126,7 @@ def test_adding_a_case_plans_that_case_and_what_puts_cases_together(tiny_copy: P
     run = snakemake(tiny_copy, "-n", config=TINY + NEW_CASE)
     assert run.status == 0, run.output
     together = {"errors", "tables", "model_difference", "study_figures", "contact_loss"}
-    together.add("report")
+    together |= {"claims", "report"}
     jobs = run.all_jobs()
     assert together <= set(jobs)
     assert {rule: jobs.pop(rule) for rule in together} == dict.fromkeys(together, 1)
@@ -159,7 +159,7 @@ def tree(tiny: Path, tmp_path_factory: pytest.TempPathFactory) -> Tree:
     ("file", "jobs"),
     [
         ("src/biogrip/products/figures/scatter.py", {"case_figures": 1, "report": 1}),
-        ("src/biogrip/products/tables/models.py", {"tables": 1, "report": 1}),
+        ("src/biogrip/products/tables/models.py", {"tables": 1, "claims": 1, "report": 1}),
     ],
 )
 def test_an_edit_reruns_exactly_what_it_is_used_in(
@@ -214,7 +214,8 @@ def test_a_method_said_otherwise_reruns_what_says_it(tree: Tree) -> None:
     file = tree.root / "src/biogrip/identify/methods.py"
     with edited(file, f"\nfrom dataclasses import replace\n{said}"):
         run = tree.run("-n", config=TINY)
-    assert run.all_jobs() == {"tables": 1, "study_figures": 1, "case_figures": 1, "report": 1}
+    drawn = {"study_figures": 1, "case_figures": 1}
+    assert run.all_jobs() == {"tables": 1, "claims": 1, **drawn, "report": 1}
 
 
 def test_an_edited_model_reruns_what_it_is_used_in(tree: Tree) -> None:

@@ -1,4 +1,4 @@
-"""Paths of the default config, the Snakefile and published results, installed or not."""
+"""Paths of the default config, the Snakefile and other files, installed or in the repository."""
 
 from pathlib import Path
 
@@ -17,6 +17,6 @@ def snakefile() -> Path:
     return _TOP / "Snakefile"
 
 
-def published(name: str) -> Path:
-    """Return a published table, by its path from ``results/published`` on."""
-    return _TOP / "results" / "published" / name
+def shipped(name: str) -> Path:
+    """Return another file that comes with the code, by its path in the repository."""
+    return _TOP / name

@@ -18,7 +18,6 @@ from markupsafe import Markup, escape
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
-from biogrip.products.catalogue import products
 from biogrip.products.files.identifications import HISTORIES
 from biogrip.products.files.identifications import PATH as IDENTIFICATIONS
 from biogrip.products.files.rows import read_table
@@ -34,8 +33,8 @@ from biogrip.products.report.answers import (
     say_what_traces_tell,
     say_which_method_finds_it,
 )
+from biogrip.products.report.entries import Entry, entries, files_shown, rules_of
 from biogrip.products.report.explorer_data import CaseFiles, explorer_data
-from biogrip.products.rule_products import group_by_rule
 from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.tables.verdicts import target_of
 from biogrip.products.uses import each, every, using
@@ -48,30 +47,12 @@ PAGE = "results/report.html"
 _MOST_PICTURE_LETTERS = 2_800_000
 _SOURCES = ("report.html.j2", "report.css", "mechanics.js", "inference.js", "explorer.js")
 _LIBRARIES = ("biogrip", "numpy", "scipy", "pandas", "matplotlib", "snakemake", "plotly")
-_FOLDERS = ("results/figures/", "results/tables/")
 # Category, and which of a product's files is shown.
 _FIGURES, _TABLES, _DOWNLOADS = ("Figures", "png"), ("Tables", "html"), ("Tables", "csv")
 _STORY = ("moduli",)
 _SHOWN = ("overview", "linkage", "torque")
 _FIRST = ("errors", "claims", "methods", "coverage", "models")
 _EVIDENCE = ("gripper", "gene_ranges", "evidence", "printed_values")
-
-
-@dataclass(frozen=True)
-class Entry:
-    """A figure or table in the report."""
-
-    name: str
-    """Name of the product."""
-    whose: str
-    """Name of its case or sweep, if any."""
-    caption: str
-    file: str
-    """Path among the results."""
-    rule: str
-    """Snakemake rule that makes it."""
-    command: str
-    """Command that makes it again."""
 
 
 @dataclass(frozen=True)
@@ -99,11 +80,11 @@ _STUDY = using(
 def content(study: Study, _: Wildcards) -> Content:
     """Return the content of the report, except results."""
     plan = Plan(study, Path("results"))
-    rules = _rules(plan)
+    rules = rules_of(plan)
     return Content(
         _STUDY(study),
-        tuple(_entries(plan, _FIGURES, rules)),
-        tuple(_entries(plan, _TABLES, rules)),
+        tuple(entries(plan, _FIGURES, rules)),
+        tuple(entries(plan, _TABLES, rules)),
         yaml.safe_dump(plain(study.config), allow_unicode=True),
         {name: Path(__file__).with_name(name).read_text(encoding="utf-8") for name in _SOURCES},
     )
@@ -200,46 +181,6 @@ def write(
     )
     with atomic_write(page) as scratch, scratch.open("wb") as file:
         parts.dump(file, encoding="utf-8")
-
-
-def _files(plan: Plan, kinds: tuple[str, str]) -> Iterable[tuple[Product, Wildcards, str]]:
-    """Yield products of a category with their jobs and the shown file of each."""
-    category, kind = kinds
-    for product in products().values():
-        for job in product.jobs(plan) if product.category == category else []:
-            file = product.outputs(job)[kind]
-            # Skip processor times, since the report must be reproducible.
-            if file.startswith(_FOLDERS):
-                yield product, job, file
-
-
-def _rules(plan: Plan) -> dict[tuple[Any, ...], str]:
-    """Return the rule of every job of every product."""
-    return {
-        (product.name, *job.items()): each.rule
-        for each in group_by_rule(products().values(), plan)
-        for product in each.products
-        for job in each.jobs
-    }
-
-
-def _entries(
-    plan: Plan, kinds: tuple[str, str], rules: Mapping[tuple[Any, ...], str]
-) -> Iterable[Entry]:
-    for product, job, file in _files(plan, kinds):
-        options = "".join(f" --{name} {value}" for name, value in job.items())
-        yield Entry(
-            product.name,
-            job.get("case") or job.get("sweep") or "",
-            product.caption,
-            file,
-            rules[product.name, *job.items()],
-            f"biogrip make {product.name}{options}",
-        )
-
-
-def _reads(kinds: tuple[str, str]) -> Reads:
-    return Reads(lambda plan, _: [file for _, _, file in _files(plan, kinds)])
 
 
 def _images(paths: Sequence[Path]) -> Iterable[str | None]:
@@ -343,9 +284,9 @@ REPORT = Product(
     lambda plan: [{}],
     message="Writing the page of the study",
     reads={
-        "figures": _reads(_FIGURES),
-        "tables": _reads(_TABLES),
-        "downloads": _reads(_DOWNLOADS),
+        "figures": files_shown(_FIGURES),
+        "tables": files_shown(_TABLES),
+        "downloads": files_shown(_DOWNLOADS),
         "identifications": of_cases(IDENTIFICATIONS, every),
         "histories": of_cases(HISTORIES, every),
         "verdicts": of_cases(VERDICTS, every),

@@ -26,9 +26,8 @@ from biogrip.products.tables.methods import METHODS_COMPARED
 from biogrip.products.tables.models import MODELS_COMPARED
 from biogrip.products.tables.printed_values import PRINTED_VALUES
 from biogrip.products.tables.verdicts import VERDICTS
-from biogrip.products.uses import each, from_study
-from biogrip.products.uses import published as reported
-from biogrip.study.defaults import published
+from biogrip.products.uses import each, from_study, published
+from biogrip.study.defaults import shipped
 from biogrip.study.study import Study
 
 
@@ -191,10 +190,10 @@ _COLUMNS = (
 )
 
 
-_SWEEPS = (
-    "robustness/tables/robustness_noise.csv",
-    "robustness/tables/robustness_gripper.csv",
-    "interpretations/tables/interpretations.csv",
+SWEEPS = (
+    "results/published/robustness/tables/robustness_noise.csv",
+    "results/published/robustness/tables/robustness_gripper.csv",
+    "results/published/interpretations/tables/interpretations.csv",
 )
 _READ: tuple[Product, ...] = (
     *(CONTACT, COVERAGE, ERRORS, EVIDENCE, LINEARISATION, MECHANICS, METHODS_COMPARED),
@@ -226,7 +225,7 @@ def _tables(plan: Plan, _: Wildcards) -> list[str]:
 
 
 def _sweeps(_: Study) -> dict[str, str]:
-    files = map(published, _SWEEPS)
+    files = map(shipped, SWEEPS)
     return {file.stem: file.read_text(encoding="utf-8") for file in files}
 
 
@@ -235,13 +234,13 @@ CLAIMS_JUDGED = table(
     caption="What the paper claims, with a verdict and the evidence.",
     uses=from_study(
         "shown gripper actuator study_seed near_noise_tolerance",
-        cases=each(reported, "truth noise phases gripper calibration"),
+        cases=each(published, "truth noise phases gripper calibration"),
         published_sweeps=_sweeps,
     ),
     reads={
-        "identifications": of_cases(PATH, reported),
-        "histories": of_cases(HISTORIES, reported),
+        "identifications": of_cases(PATH, published),
+        "histories": of_cases(HISTORIES, published),
         "tables": Reads(_tables),
     },
-    when=reported,
+    when=published,
 )
