@@ -231,7 +231,7 @@ def _sweeps(_: Study) -> dict[str, str]:
 
 CLAIMS_JUDGED = table(
     claims,
-    caption="What the paper claims, with a verdict and the evidence.",
+    caption=f"What the paper claims, with a verdict and the evidence. {RULES}",
     uses=from_study(
         "shown gripper actuator study_seed near_noise_tolerance",
         cases=each(published, "truth noise phases gripper calibration"),
