@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
-import biogrip.products
+import biogrip
 from biogrip.errors import BiogripError
 from biogrip.products.catalogue import chosen, products
 from biogrip.products.digest import digest
@@ -60,10 +60,10 @@ def everything(monkeypatch: pytest.MonkeyPatch) -> list[ProductRule]:
 
 def test_every_module_that_declares_something_is_found() -> None:
     """Its source is the independent count."""
-    (folder,) = map(Path, biogrip.products.__path__)
+    (folder,) = map(Path, biogrip.__path__)
     declare = re.compile(r"(?<!\.)\b(Product|table|drawing)\(\n")
     declared = {
-        ".".join((biogrip.products.__name__, *file.relative_to(folder).with_suffix("").parts))
+        ".".join((biogrip.__name__, *file.relative_to(folder).with_suffix("").parts))
         for file in folder.rglob("*.py")
         if file.name != "declared.py" and declare.search(file.read_text(encoding="utf-8"))
     }

@@ -9,6 +9,7 @@ from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.fitted_traces import BATCHES, TraceToFit, every_trace, read_every
 from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.page import write_page
+from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads
 from biogrip.study.sheet import MOST_SHOWN, Row
 from biogrip.study.study import Study
@@ -92,6 +93,11 @@ def check_traces(traces: TracesShown, batches: list[Path], ok: Path) -> None:
     write_text(ok, f"{len(outcome.found)}\n")
 
 
+def once(plan: Plan) -> list[Wildcards]:
+    """Return the one job of a product of all traces, if there is a sheet."""
+    return [{}] if plan.study.traces else []
+
+
 EVERY_BATCH = Reads(lambda plan, _: [BATCHES.format(**job) for job in plan.row_jobs])
 """The lists of all batches."""
 
@@ -100,7 +106,7 @@ TABLE = Product(
     {"csv": "results/tables/traces.csv"},
     list_traces,
     lambda study, _: shown(study),
-    lambda plan: [{}],
+    once,
     message="Listing all traces",
     reads={"batches": EVERY_BATCH},
     of_traces=True,
@@ -111,7 +117,7 @@ PAGE = Product(
     {"page": "results/traces.html"},
     show_traces,
     lambda study, _: shown(study),
-    lambda plan: [{}],
+    once,
     message="Writing the page of all traces",
     reads={"batches": EVERY_BATCH},
     category=CATEGORY,
