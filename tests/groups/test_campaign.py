@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from tests.helpers import populations_campaign
 from tests.helpers.groups_campaign import QUANTITIES, TABLE, counted, dishes
 from tests.helpers.ranks_campaign import DISHES, rows
 from tests.helpers.ranks_campaign import TABLE as RANKS
@@ -18,14 +19,22 @@ def test_cells_are_known_as_well_as_they_say() -> None:
     (alone,) = dishes([1], 1.0, 5)
     for together, own in zip(found[1], alone, strict=True):
         for one, other in zip(together, own, strict=True):
-            assert one.estimates.cells == other.estimates.cells
-            assert np.array_equal(one.estimates.log_values, other.estimates.log_values)
-            assert np.array_equal(one.estimates.deviations, other.estimates.deviations)
+            for ours, theirs in zip(one.cells, other.cells, strict=True):
+                assert (ours.profile.low, ours.profile.high) == (
+                    theirs.profile.low,
+                    theirs.profile.high,
+                )
+                assert np.array_equal(ours.profile.increases, theirs.profile.increases)
     # At this rate the interval of k, the first, is skewed, and no multiple of a deviation.
     for index in range(1, len(QUANTITIES)):
         own = [dish[index] for pair in found for dish in pair]
-        away = np.concatenate(
-            [(d.estimates.log_values - d.truth) / d.estimates.deviations for d in own]
+        away = np.array(
+            [
+                (each.profile.best - truth) / each.log_deviation
+                for dish in own
+                for each, truth in zip(dish.cells, dish.truth, strict=True)
+                if each.is_determined
+            ]
         )
         # Of twenty squares, 1.5e-4 of chi^2 is beyond either limit.
         assert len(away) > 15
@@ -64,10 +73,29 @@ def test_published_power_is_that_designed(published: pd.DataFrame) -> None:
     assert (apart[small] <= allowed[small]).all()
 
 
+def test_cells_that_may_be_bounded_are_counted() -> None:
+    found = pd.DataFrame(populations_campaign.rows(2))
+    assert len(found) == len(populations_campaign.SETTINGS)
+    assert (found["determined_percent"] > 0).all()
+    assert found["shrunk_coverage_percent"].between(50, 100).all()
+
+
+def test_published_populations_hold_the_truth() -> None:
+    """Four standard deviations of a share of 95 %: 2.8 % of 1000 medians, 3.9 % of 500 pairs.
+
+    Where errors hide the spread, few cells hold more than they promise.
+    """
+    published = pd.read_csv(populations_campaign.TABLE)
+    assert (published["false_positive_percent"] < 8).all()
+    assert (published["median_coverage_percent"] > 95 - 2.8).all()
+    assert (published["spread_coverage_percent"] > 95 - 2.8).all()
+    assert published["shrunk_coverage_percent"].between(92.2, 97).all()
+
+
 def test_pairs_of_unequal_dishes_are_counted() -> None:
-    found = pd.DataFrame(rows(4))
+    found = pd.DataFrame(rows(2))
     assert len(found) == 2 * len(DISHES)
-    assert set(found["coverage_percent"]) <= {0.0, 25.0, 50.0, 75.0, 100.0}
+    assert set(found["coverage_percent"]) <= {0.0, 50.0, 100.0}
     few = found[["cells_1", "cells_2"]].min(axis=1) < 6
     assert (found["rank_coverage_percent"].isna() == few).all()
 

@@ -16,13 +16,12 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
 from biogrip.groups.comparison import difference
-from biogrip.groups.group_findings import log_deviation
-from biogrip.groups.population import FEWEST_CELLS, Estimates, estimate_population
+from biogrip.groups.group_findings import CellProfile, population_of
+from biogrip.groups.population import Interval
 from biogrip.groups.power import power
 from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likelihood
 from biogrip.identifiability.profiles import Profile, compute_profiles
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
-from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.problem import make_problem
 from biogrip.products.stages.full_judgements import refitted
 from biogrip.response.linear import rotation, step_response
@@ -39,10 +38,10 @@ PAIRS_AT_ONCE = 5
 
 @dataclass(frozen=True)
 class Dish:
-    """Cells that determine a quantity: true logarithms, and what their traces tell of them."""
+    """Cells of a dish: true logarithms of a quantity, and their profiles."""
 
     truth: Array
-    estimates: Estimates
+    cells: list[CellProfile]
 
 
 def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[list[list[Dish]]]:
@@ -118,15 +117,16 @@ def profiles(likelihoods: list[Likelihood]) -> list[list[tuple[Likelihood, Profi
 def _dish(
     quantity: Quantity, q: int, logs: Array, judged: list[list[tuple[Likelihood, Profile]]]
 ) -> Dish:
-    truth, names, values, deviations = [], [], [], []
-    for cell, (x, of_cell) in enumerate(zip(logs, judged, strict=True)):
-        likelihood, profile = of_cell[q]
-        if profile.low is not None and profile.high is not None:
-            truth.append(quantity.log(x))
-            names.append(f"cell {cell}")
-            values.append(profile.best)
-            deviations.append(log_deviation(Finding(quantity, profile, 0.0), likelihood))
-    return Dish(np.array(truth), Estimates(tuple(names), np.array(values), np.array(deviations)))
+    cells = [
+        CellProfile(f"cell {number}", of_cell[q][1], of_cell[q][0].threshold, of_cell[q][0].freedom)
+        for number, of_cell in enumerate(judged)
+    ]
+    return Dish(np.array([float(quantity.log(x)) for x in logs]), cells)
+
+
+def held_by(interval: Interval, truth: float) -> bool:
+    """Return whether an interval holds the truth."""
+    return interval.low <= truth <= interval.high
 
 
 def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -> pd.DataFrame:
@@ -136,19 +136,18 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
         held, seen, spreads, shrunk, widths = [], [], [], [], []
         determined = []
         for first, second in ((one[q], other[q]) for one, other in found):
-            own = [each.estimates for each in (first, second)]
-            determined += [len(each.cells) for each in own]
-            if min(len(each.cells) for each in own) < FEWEST_CELLS:
+            determined += [cell.is_determined for dish in (first, second) for cell in dish.cells]
+            one, other = (population_of(dish.cells, CONFIDENCE) for dish in (first, second))
+            if one is None or other is None:
                 continue
-            populations = [estimate_population(each, CONFIDENCE) for each in own]
-            compared = difference(*populations)
+            compared = difference(one, other)
             held.append(compared.low <= RATIO <= compared.high)
             seen.append(compared.p_value < 1 - CONFIDENCE)
-            for dish, each in zip((first, second), populations, strict=True):
-                spreads.append(each.spread_low <= SPREAD <= each.spread_high)
-                away = np.abs(each.shrunk - dish.truth)
-                shrunk += list(away <= each.reach * each.shrunk_deviations)
-                widths += list(each.estimates.deviations**2)
+            for dish, each in ((first, one), (second, other)):
+                spreads.append(held_by(each.spread, SPREAD))
+                known = zip(each.cells, dish.truth, dish.cells, strict=True)
+                shrunk += [held_by(own, y) for own, y, cell in known if cell.is_bounded]
+                widths += [cell.log_deviation**2 for cell in dish.cells if cell.is_determined]
         error = float(np.sqrt(np.mean(widths)))
         rows.append(
             {
@@ -157,7 +156,7 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
                 "cells": cells,
                 "spread": SPREAD,
                 "ratio": RATIO,
-                "determined_percent": 100 * np.sum(determined) / (2 * cells * len(found)),
+                "determined_percent": 100 * np.mean(determined),
                 "error": error,
                 "pairs": len(held),
                 "coverage_percent": 100 * np.mean(held),

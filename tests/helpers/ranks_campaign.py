@@ -13,7 +13,7 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.groups.comparison import difference
 from biogrip.groups.median_ratio import shift
-from biogrip.groups.population import Estimates, estimate_population
+from tests.helpers.cells import normal_population
 from tests.helpers.places import ROOT
 
 TABLE = ROOT / "results" / "published" / "groups" / "tables" / "ranks.csv"
@@ -63,12 +63,7 @@ def _held(
 ) -> tuple[float, float]:
     """Return 1 where the interval of medians, and that of ranks, holds the ratio; NaN without."""
     values = [spread * draw(rng, n) + ERROR * rng.standard_normal(n) for n, spread in dishes]
-    one, other = (
-        estimate_population(
-            Estimates(tuple(map(str, range(len(own)))), own, np.full(len(own), ERROR)), CONFIDENCE
-        )
-        for own in values
-    )
+    one, other = (normal_population(own, np.full(len(own), ERROR), CONFIDENCE) for own in values)
     apart, ranks = difference(one, other), shift(values[0], values[1], CONFIDENCE)
     by_ranks = np.nan if ranks.low is None else float(ranks.low <= 0 <= (ranks.high or 0.0))
     return float(apart.low <= 1 <= apart.high), by_ranks

@@ -1,7 +1,9 @@
 """Difference between the populations of two dishes, as a ratio of medians (Welch's t test).
 
 Means of logarithms with unequal variances are compared by Welch's t, with Satterthwaite's degrees
-of freedom. If estimation errors are negligible this is Welch's test of the cells' logarithms.
+of freedom. If estimation errors are negligible this is Welch's test of the cells' logarithms. Where
+the limits of a median are not symmetric, each side of the difference has the deviations of the
+sides that it depends on.
 
 References
 ----------
@@ -9,13 +11,15 @@ References
    Biometrics Bulletin 2 (1946), 110-114.
 .. [2] B. L. Welch, The generalization of "Student's" problem when several different population
    variances are involved, Biometrika 34 (1947), 28-35.
-.. [3] S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of
+.. [3] G. Y. Zou and A. Donner, Construction of confidence limits about effect measures: a general
+   approach, Statistics in Medicine 27 (2008), 1693-1702: limits that are not symmetric.
+.. [4] S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of
    Statistics 6 (1979), 65-70.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, hypot
+from math import exp, sqrt
 
 from biogrip.groups.population import Population
 
@@ -26,10 +30,11 @@ class Difference:
 
     log_ratio: float
     """Logarithm of the ratio."""
-    deviation: float
-    """Its standard deviation."""
-    freedom: float
-    """Degrees of freedom of the deviation; need not be an integer."""
+    down: tuple[float, float]
+    """Its standard deviation downwards, and the degrees of freedom, which need not be an
+    integer."""
+    up: tuple[float, float]
+    """Both upwards."""
     confidence: float
     """Confidence level of the interval, e.g. 0.95."""
 
@@ -41,37 +46,51 @@ class Difference:
     @property
     def low(self) -> float:
         """Lower confidence limit of the ratio."""
-        return exp(self.log_ratio - self._reach)
+        return exp(self.log_ratio - self._reach(*self.down))
 
     @property
     def high(self) -> float:
         """Upper confidence limit of the ratio."""
-        return exp(self.log_ratio + self._reach)
+        return exp(self.log_ratio + self._reach(*self.up))
+
+    @property
+    def freedom(self) -> float:
+        """Degrees of freedom towards a ratio of 1."""
+        return self._towards_one[1]
 
     @property
     def p_value(self) -> float:
         """Two-sided p value of the hypothesis that the ratio is 1."""
         from scipy.special import stdtr
 
-        return float(2 * stdtr(self.freedom, -abs(self.log_ratio) / self.deviation))
+        deviation, freedom = self._towards_one
+        return float(2 * stdtr(freedom, -abs(self.log_ratio) / deviation))
 
     @property
-    def _reach(self) -> float:
+    def _towards_one(self) -> tuple[float, float]:
+        return self.down if self.log_ratio > 0 else self.up
+
+    def _reach(self, deviation: float, freedom: float) -> float:
         from scipy.special import stdtrit
 
-        return float(stdtrit(self.freedom, (1 + self.confidence) / 2)) * self.deviation
+        return float(stdtrit(freedom, (1 + self.confidence) / 2)) * deviation
 
 
 def difference(one: Population, other: Population) -> Difference:
     """Return the difference of a population from another, whose median is the denominator."""
-    first, second = one.deviation**2, other.deviation**2
-    freedom = (first + second) ** 2 / (first**2 / one.freedom + second**2 / other.freedom)
+    freedoms = one.freedom, other.freedom
     return Difference(
-        one.centre - other.centre,
-        hypot(one.deviation, other.deviation),
-        freedom,
+        one.centre.centre - other.centre.centre,
+        _side(one.deviations[0], other.deviations[1], *freedoms),
+        _side(one.deviations[1], other.deviations[0], *freedoms),
         one.confidence,
     )
+
+
+def _side(one: float, other: float, freedom: int, other_freedom: int) -> tuple[float, float]:
+    """Return the deviation of a difference, and its degrees of freedom after Satterthwaite."""
+    both = one**2 + other**2
+    return sqrt(both), both**2 / (one**4 / freedom + other**4 / other_freedom)
 
 
 def adjusted(p_values: Sequence[float]) -> list[float]:

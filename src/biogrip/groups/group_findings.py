@@ -6,14 +6,20 @@ from math import sqrt
 
 import numpy as np
 
+from biogrip.groups.cell_likelihood import make_cell_likelihood
 from biogrip.groups.comparison import Difference, adjusted, difference
 from biogrip.groups.joint_fit import JointFit
 from biogrip.groups.median_ratio import Shift, shift
-from biogrip.groups.population import FEWEST_CELLS, Estimates, Population, estimate_population
+from biogrip.groups.population import (
+    FEWEST_CELLS,
+    Estimates,
+    Interval,
+    Population,
+    estimate_population,
+)
 from biogrip.groups.power import detectable_ratio
-from biogrip.identifiability.likelihood import Likelihood
+from biogrip.identifiability.profiles import Profile
 from biogrip.identifiability.quantities import Quantity
-from biogrip.identifiability.verdicts import DETERMINED, Finding
 
 USUAL_POWER = 0.8
 """Power at which the smallest detectable ratio is given (Cohen 1988)."""
@@ -29,6 +35,36 @@ class JudgedCell:
 
 
 @dataclass(frozen=True)
+class CellProfile:
+    """Profile of one quantity in one cell."""
+
+    name: str
+    profile: Profile
+    threshold: float
+    """Increase of chi^2 at its limits."""
+    freedom: float
+    """Degrees of freedom of the noise, see `Likelihood`."""
+
+    @property
+    def is_bounded(self) -> bool:
+        """True if it has a limit on one side at least."""
+        return self.profile.low is not None or self.profile.high is not None
+
+    @property
+    def is_determined(self) -> bool:
+        """True if it has limits on both."""
+        return self.profile.low is not None and self.profile.high is not None
+
+    @property
+    def log_deviation(self) -> float:
+        """Standard deviation of the logarithm from the width of its interval, if it has one."""
+        low, high = self.profile.low, self.profile.high
+        assert low is not None
+        assert high is not None
+        return (high - low) / (2 * sqrt(self.threshold))
+
+
+@dataclass(frozen=True)
 class GroupFinding:
     """Cells and population of one quantity in one group."""
 
@@ -40,8 +76,13 @@ class GroupFinding:
     """Estimates of cells that determine the quantity."""
     others: tuple[str, ...]
     """Names of the other cells."""
+    bounded: tuple[str, ...]
+    """Names of those among them whose traces bound it on one side."""
     population: Population | None
-    """Population of the estimates; None if there are too few cells."""
+    """Population of all cells, by their profiles; None if too few determine the quantity."""
+    shrunk: tuple[tuple[str, Interval], ...]
+    """Logarithm in each cell that determines or bounds the quantity, as its own traces and the
+    population tell together; empty without a population."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +142,8 @@ def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDiffere
         apart = [difference(one, other) for _, one, other in pairs]
         p_values = adjusted([each.p_value for each in apart])
         for (finding, one, other), each, p_value in zip(pairs, apart, p_values, strict=True):
+            known = finding.estimates.log_values, first.estimates.log_values
+            ranks = shift(*known, each.confidence)
             compared.append(
                 GroupDifference(
                     quantity,
@@ -108,47 +151,63 @@ def differences_of_groups(findings: Sequence[GroupFinding]) -> list[GroupDiffere
                     first.group,
                     each,
                     p_value,
-                    shift(one.estimates.log_values, other.estimates.log_values, each.confidence),
+                    ranks,
                     _detectable_ratio(one, other),
                 )
             )
     return compared
 
 
-def log_deviation(finding: Finding, likelihood: Likelihood) -> float:
-    """Return the standard deviation of a quantity's logarithm from its interval's width."""
-    low, high = finding.profile.low, finding.profile.high
-    assert low is not None
-    assert high is not None
-    return (high - low) / (2 * sqrt(likelihood.threshold))
+def estimates_of(cells: Sequence[CellProfile]) -> Estimates:
+    """Return values and errors of the cells that determine a quantity, from limits and optimum."""
+    known = [cell for cell in cells if cell.is_determined]
+    return Estimates(
+        tuple(cell.name for cell in known),
+        np.array([cell.profile.best for cell in known]),
+        np.array([cell.log_deviation for cell in known]),
+    )
+
+
+def population_of(cells: Sequence[CellProfile], confidence: float) -> Population | None:
+    """Estimate the population of cells; None if fewer than `FEWEST_CELLS` determine a quantity."""
+    estimates = estimates_of(cells)
+    if len(estimates.cells) < FEWEST_CELLS:
+        return None
+    return estimate_population(
+        estimates,
+        [
+            make_cell_likelihood(cell.profile.log_values, cell.profile.increases, cell.freedom)
+            for cell in cells
+        ],
+        confidence,
+        freedom=sum(cell.is_bounded for cell in cells) - 1,
+    )
 
 
 def _finding(
     group: str, quantity: Quantity, index: int, cells: Sequence[JudgedCell], confidence: float
 ) -> GroupFinding:
-    diagnoses = [(cell.name, cell.fit.diagnosis) for cell in cells]
-    known = [
-        (
-            name,
-            each.findings[index].profile.best,
-            log_deviation(each.findings[index], each.likelihood),
+    own = [
+        CellProfile(
+            cell.name,
+            cell.fit.diagnosis.findings[index].profile,
+            cell.fit.diagnosis.likelihood.threshold,
+            cell.fit.diagnosis.likelihood.freedom,
         )
-        for name, each in diagnoses
-        if each.findings[index].verdict == DETERMINED
+        for cell in cells
     ]
-    names = tuple(name for name, _, _ in known)
-    estimates = Estimates(
-        names,
-        np.array([value for _, value, _ in known]),
-        np.array([error for _, _, error in known]),
-    )
+    estimates, population = estimates_of(own), population_of(own, confidence)
+    others = [cell for cell in own if not cell.is_determined]
+    shrunk = zip(own, population.cells, strict=True) if population else ()
     return GroupFinding(
         group,
         quantity.label,
         quantity.unit,
         estimates,
-        tuple(name for name, _ in diagnoses if name not in names),
-        estimate_population(estimates, confidence) if len(names) >= FEWEST_CELLS else None,
+        tuple(cell.name for cell in others),
+        tuple(cell.name for cell in others if cell.is_bounded),
+        population,
+        tuple((cell.name, interval) for cell, interval in shrunk if cell.is_bounded),
     )
 
 

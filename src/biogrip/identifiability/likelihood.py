@@ -11,6 +11,7 @@ References
 """
 
 from dataclasses import dataclass
+from math import inf
 from statistics import NormalDist
 
 import numpy as np
@@ -50,6 +51,8 @@ class Likelihood:
     """Increase that a profile must reach at an end of the range to have a limit on that side: the
     quantile at `CERTAIN`. A profile that levels off between `threshold` and `certainty` would have
     a limit by chance of the noise alone."""
+    freedom: float = inf
+    """Degrees of freedom of the noise's estimated variance; infinite if the noise is known."""
 
     def increase(self, misfit_rad: float) -> float:
         """Return the increase of chi^2 over the optimum."""
@@ -90,6 +93,7 @@ def make_likelihood(
         Standard deviation of the noise if it is known.
     """
     levels = (confidence, CERTAIN)
+    freedom = inf
     if noise_rad is not None:
         threshold, certainty = (NormalDist().inv_cdf((1 + level) / 2) ** 2 for level in levels)
     else:
@@ -97,8 +101,11 @@ def make_likelihood(
         noise_rad = misfit_rad * float(np.sqrt(problem.residuals.samples / left))
         from scipy.special import fdtri
 
-        threshold, certainty = fdtri(1, min(left, problem.residuals.freedom), levels)
-    return Likelihood(problem, best, misfit_rad, noise_rad, float(threshold), float(certainty))
+        freedom = float(min(left, problem.residuals.freedom))
+        threshold, certainty = fdtri(1, freedom, levels)
+    return Likelihood(
+        problem, best, misfit_rad, noise_rad, float(threshold), float(certainty), freedom
+    )
 
 
 def compute_fall(

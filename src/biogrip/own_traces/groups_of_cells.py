@@ -1,7 +1,7 @@
 """The command ``biogrip groups``: recorded traces of cells, compared between groups of cells."""
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from hashlib import sha256
 from math import exp
@@ -257,7 +257,7 @@ def in_words(found: dict[str, Any]) -> str:
     parts += [found["limits"], *fixed_in_words(found)]
     parts += [_cell_in_words(cell, found) for cell in found["cells"]]
     parts.append(_groups_in_words(found["groups"], percent))
-    parts += _left_out_in_words(found["groups"])
+    parts += _not_determined_in_words(found["groups"])
     if found["rejected"]:
         parts.append(f"Left out, as their fits are rejected: {', '.join(found['rejected'])}.")
     if found["differences"]:
@@ -390,34 +390,30 @@ def _group_data(finding: GroupFinding) -> dict[str, Any]:
             )
         ],
         "not_determined": list(finding.others),
+        "bounded": list(finding.bounded),
     }
     if population is not None:
-        reach = population.reach * population.shrunk_deviations
+        middle, spread = population.centre, population.spread
         data |= {
-            "median": population.median,
-            "low": population.low,
-            "high": population.high,
+            "median": exp(middle.centre),
+            "low": exp(middle.low),
+            "high": exp(middle.high),
             "spread": {
-                "log_deviation": population.spread,
-                "low": population.spread_low,
-                "high": population.spread_high,
+                "log_deviation": spread.centre,
+                "low": spread.low,
+                "high": spread.high,
             },
-            "shrunk": _shrunk(known.cells, population.shrunk, reach),
+            "shrunk": [
+                {
+                    "cell": cell,
+                    "value": exp(own.centre),
+                    "low": exp(own.low),
+                    "high": exp(own.high),
+                }
+                for cell, own in finding.shrunk
+            ],
         }
     return data
-
-
-def _shrunk(cells: Iterable[str], values: Array, reach: Array) -> list[dict[str, Any]]:
-    ends = (np.exp(values), np.exp(values - reach), np.exp(values + reach))
-    return [
-        {
-            "cell": cell,
-            "value": float(value),
-            "low": float(low),
-            "high": float(high),
-        }
-        for cell, value, low, high in zip(cells, *ends, strict=True)
-    ]
 
 
 def _difference_data(each: GroupDifference) -> dict[str, Any]:
@@ -475,14 +471,20 @@ def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
     return _table(table, header)
 
 
-def _left_out_in_words(rows: list[dict[str, Any]]) -> list[str]:
-    """Name the cells that do not determine a quantity, and so are left out of its median."""
-    words = [
-        f"{row['group']}: the median of {row['quantity']} is without undetermined cells: "
-        f"{', '.join(row['not_determined'])}."
-        for row in rows
-        if row["not_determined"] and "median" in row
-    ]
+def _not_determined_in_words(rows: list[dict[str, Any]]) -> list[str]:
+    """Name the cells that do not determine a quantity, and what they add to its median."""
+    words = []
+    for row in rows:
+        flat = [cell for cell in row["not_determined"] if cell not in row["bounded"]]
+        said = [
+            f"{what}: {', '.join(cells)}"
+            for what, cells in (
+                ("only their bound counts", row["bounded"]),
+                ("next to nothing is known", flat),
+            )
+            if cells and "median" in row
+        ]
+        words += [f"{row['group']}, {row['quantity']}: {'; '.join(said)}."] if said else []
     return ["\n".join(words)] if words else []
 
 
