@@ -30,8 +30,8 @@ from biogrip.arrays import Array
 # square/12, or 0.5 %. Below the least likelihood no knots are added.
 _STEP = 0.25
 _LEAST = 1e-6
-# Steps between knots in spreads of a population, below which a trapezium errs by less than 1e-5.
-_NARROW = 0.01
+# Steps between knots in spreads of a population, below which trapezia err by less than 1e-3.
+_NARROW = 0.1
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,8 @@ class CellLikelihood:
         """Integrate the likelihood over normal populations, from each knot to the next.
 
         The integral of a straight line with a normal density is exact, however narrow the
-        population is beside the distance of knots; where it is far wider, it is a trapezium.
+        population is beside the distance of knots. Where it is far wider, differences of nearly
+        equal numbers would lose their digits, and trapezia do.
 
         Parameters
         ----------
@@ -64,6 +65,15 @@ class CellLikelihood:
         (n_knots + 1, n_populations)
             The first and the last are those beyond the ends.
         """
+        likely = np.maximum(self.values[:-1], self.values[1:]) > _LEAST
+        narrow = np.max(np.diff(self.knots)[likely]) < _NARROW * spreads
+        found = np.empty((len(self.knots) + 1, len(spreads)))
+        for wide, integrals in ((~narrow, self._exact), (narrow, self._trapezia)):
+            if np.any(wide):
+                found[:, wide] = integrals(centres[wide], spreads[wide])
+        return found
+
+    def _exact(self, centres: Array, spreads: Array) -> Array:
         from scipy.special import ndtr
 
         z = (self.knots[:, None] - centres) / spreads
@@ -74,13 +84,17 @@ class CellLikelihood:
         density = np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
         slopes = (np.diff(self.values) / np.diff(self.knots))[:, None]
         at_centre = self.values[:-1, None] - slopes * z[:-1] * spreads
-        exact = at_centre * shares + slopes * spreads * (density[:-1] - density[1:])
-        # In the exact one, differences of nearly equal numbers lose their digits.
-        steps, heights = np.diff(z, axis=0), self.values[:, None] * density
-        trapezium = steps * (heights[:-1] + heights[1:]) / 2
-        between = np.where(steps < _NARROW, trapezium, exact)
+        between = at_centre * shares + slopes * spreads * (density[:-1] - density[1:])
         ends = self.values[0] * below[0], self.values[-1] * above[-1]
         return np.vstack((ends[0], np.maximum(between, 0.0), ends[1]))
+
+    def _trapezia(self, centres: Array, spreads: Array) -> Array:
+        from scipy.special import ndtr
+
+        z = (self.knots[:, None] - centres) / spreads
+        heights = np.exp(-0.5 * z * z) * (self.values / np.sqrt(2 * np.pi))[:, None]
+        between = np.diff(z, axis=0) * (heights[:-1] + heights[1:]) / 2
+        return np.vstack((self.values[0] * ndtr(z[0]), between, self.values[-1] * ndtr(-z[-1])))
 
 
 def make_cell_likelihood(
