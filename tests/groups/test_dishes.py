@@ -12,8 +12,8 @@ from biogrip.groups.group_findings import (
     JudgedCell,
     differences_of_groups,
     findings_of_groups,
+    judged_cell,
 )
-from biogrip.groups.joint_fit import JointFit
 from biogrip.groups.power import power
 from biogrip.identifiability.diagnosis import Diagnosis
 from biogrip.identifiability.likelihood import Likelihood
@@ -30,7 +30,7 @@ def judged(group: str, number: int, k: float | None, c: float | None) -> JudgedC
     findings = [Finding(each, profile(value), 0.01) for each, value in ((K, k), (C, c))]
     likelihood = cast(Likelihood, Mock(threshold=THRESHOLD, freedom=np.inf))
     told = Diagnosis(likelihood, findings, [], cast(Any, None), [])
-    return JudgedCell(f"{group}{number}", group, JointFit(told, (1e-6,), None))
+    return judged_cell(f"{group}{number}", group, told)
 
 
 def profile(value: float | None) -> Profile:

@@ -8,7 +8,6 @@ import numpy as np
 
 from biogrip.groups.cell_likelihood import make_cell_likelihood
 from biogrip.groups.comparison import Difference, adjusted, difference
-from biogrip.groups.joint_fit import JointFit
 from biogrip.groups.median_ratio import Shift, shift
 from biogrip.groups.population import (
     FEWEST_CELLS,
@@ -18,20 +17,11 @@ from biogrip.groups.population import (
     estimate_population,
 )
 from biogrip.groups.power import detectable_ratio
+from biogrip.identifiability.diagnosis import Diagnosis
 from biogrip.identifiability.profiles import Profile
-from biogrip.identifiability.quantities import Quantity
 
 USUAL_POWER = 0.8
 """Power at which the smallest detectable ratio is given (Cohen 1988)."""
-
-
-@dataclass(frozen=True)
-class JudgedCell:
-    """A cell of a group, with the joint fit of its traces."""
-
-    name: str
-    group: str
-    fit: JointFit
 
 
 @dataclass(frozen=True)
@@ -62,6 +52,24 @@ class CellProfile:
         assert low is not None
         assert high is not None
         return (high - low) / (2 * sqrt(self.threshold))
+
+
+@dataclass(frozen=True)
+class QuantityProfile:
+    """Profile of a quantity with its label and unit."""
+
+    quantity: str
+    unit: str
+    of_cell: CellProfile
+
+
+@dataclass(frozen=True)
+class JudgedCell:
+    """A cell of a group, with the profile of each quantity."""
+
+    name: str
+    group: str
+    profiles: tuple[QuantityProfile, ...]
 
 
 @dataclass(frozen=True)
@@ -104,6 +112,23 @@ class GroupDifference:
     """Smallest ratio that as many cells with this scatter detect with `USUAL_POWER`."""
 
 
+def judged_cell(name: str, group: str, diagnosis: Diagnosis) -> JudgedCell:
+    """Return a cell with the profiles of its diagnosis."""
+    likelihood = diagnosis.likelihood
+    return JudgedCell(
+        name,
+        group,
+        tuple(
+            QuantityProfile(
+                finding.quantity.label,
+                finding.quantity.unit,
+                CellProfile(name, finding.profile, likelihood.threshold, likelihood.freedom),
+            )
+            for finding in diagnosis.findings
+        ),
+    )
+
+
 def findings_of_groups(
     cells: Sequence[JudgedCell], groups: Sequence[str], confidence: float
 ) -> list[GroupFinding]:
@@ -118,11 +143,10 @@ def findings_of_groups(
     confidence
         Confidence level of the intervals, e.g. 0.95.
     """
-    quantities = [finding.quantity for finding in cells[0].fit.diagnosis.findings]
     return [
-        _finding(group, quantity, index, [c for c in cells if c.group == group], confidence)
+        _finding(group, index, cells, confidence)
         for group in groups
-        for index, quantity in enumerate(quantities)
+        for index in range(len(cells[0].profiles))
     ]
 
 
@@ -185,23 +209,16 @@ def population_of(cells: Sequence[CellProfile], confidence: float) -> Population
 
 
 def _finding(
-    group: str, quantity: Quantity, index: int, cells: Sequence[JudgedCell], confidence: float
+    group: str, index: int, cells: Sequence[JudgedCell], confidence: float
 ) -> GroupFinding:
-    own = [
-        CellProfile(
-            cell.name,
-            cell.fit.diagnosis.findings[index].profile,
-            cell.fit.diagnosis.likelihood.threshold,
-            cell.fit.diagnosis.likelihood.freedom,
-        )
-        for cell in cells
-    ]
+    quantity = cells[0].profiles[index]
+    own = [cell.profiles[index].of_cell for cell in cells if cell.group == group]
     estimates, population = estimates_of(own), population_of(own, confidence)
     others = [cell for cell in own if not cell.is_determined]
     shrunk = zip(own, population.cells, strict=True) if population else ()
     return GroupFinding(
         group,
-        quantity.label,
+        quantity.quantity,
         quantity.unit,
         estimates,
         tuple(cell.name for cell in others),

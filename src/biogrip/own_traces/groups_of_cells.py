@@ -1,54 +1,40 @@
 """The command ``biogrip groups``: recorded traces of cells, compared between groups of cells."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from hashlib import sha256
+from collections.abc import Mapping, Sequence
 from math import exp
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from tabulate import tabulate
 
 from biogrip import __version__
-from biogrip.arrays import Array
 from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError, nearest
-from biogrip.experiment.random_streams import stream
 from biogrip.files import refuse_inputs, write_text
 from biogrip.groups.group_findings import (
     USUAL_POWER,
     GroupDifference,
     GroupFinding,
-    JudgedCell,
     differences_of_groups,
     findings_of_groups,
 )
-from biogrip.groups.joint_fit import JointFit, fitted_jointly
 from biogrip.groups.population import FEWEST_CELLS
-from biogrip.identifiability.fit_status import DOUBTFUL, HARMLESS, OK, REJECTED, Note
-from biogrip.identify.answer import Identification
+from biogrip.identifiability.fit_status import DOUBTFUL, OK, REJECTED
 from biogrip.identify.case_problem import CaseProblem
-from biogrip.identify.identifier import best_fit
-from biogrip.identify.problem import Problem
 from biogrip.own_traces.assumed import gripper_in_limits
-from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data, study_of
+from biogrip.own_traces.judged_cells import CellJudge, CellResults, same_readings
+from biogrip.own_traces.one_trace import IdentifyOptions, fixed_data
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output, in_own_units
-from biogrip.own_traces.read_as import ReadAs, read_trace
+from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.rows_of_sheets import cases_of, refuse_mixed_models, with_row
 from biogrip.own_traces.words import fixed_in_words, in_unit
-from biogrip.products.files.traces import Measurements
-from biogrip.products.files.verdicts import exact_data
-from biogrip.products.stages.judgement import ONSET_AS_FITTED, fit_judged, notes_on_fit
 from biogrip.progress import Progress
-from biogrip.response.noise_estimate import estimate_noise
 from biogrip.study.named_blocks import read_named_blocks
-from biogrip.study.sheet import Cell, Row, cells_of, read_sheet
+from biogrip.study.sheet import Cell, cells_of, read_sheet
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
 from biogrip.terminal import visible, visible_lines
-from biogrip.traces.late_onset import note_late_onset
 
 _LIMITS = (
     "Limits are statistical only: all cells share the gripper, whose uncertainty changes their "
@@ -58,26 +44,6 @@ _LIMITS_OF_SEVERAL = (
     "Limits are statistical only: the grippers, which differ from trace to trace, are taken as "
     "exact."
 )
-
-
-@dataclass(frozen=True)
-class _TraceProblem:
-    """A usable recorded trace: its fit problem, its case, and notes on its noise."""
-
-    trace: Path
-    problem: Problem
-    case: Case
-    case_problem: CaseProblem
-    recorded: Measurements
-    notes: list[Note]
-
-    def notes_at(self, best: Array) -> list[Note]:
-        """Return the notes on its noise, and on an onset that a joint best fit shows to be late."""
-        time_s, rotation_rad = self.recorded.time_s, self.recorded.rotation_rad[0]
-        if not self.case.may_start_late:
-            return self.notes
-        late = note_late_onset(self.case_problem, time_s, rotation_rad, best)
-        return [*self.notes, *(replace(n, text=f"{self.trace.name}: {n.text}") for n in late)]
 
 
 def groups(
@@ -166,69 +132,99 @@ def compare_groups(
     rows = [with_row(options, row) for cell in cells for row in cell.rows]
     cases = cases_of(rows)
     refuse_mixed_models(rows, cases)
-    case_problem, confidence = cases[0].problem, cases[0].confidence
-    fixed = [fixed_data(case.problem) for case in cases]
-    one_gripper = all(case.block.gripper == cases[0].block.gripper for case in cases)
+    confidence = cases[0].confidence
     progress = Progress(str(options.trace), len(cells))
-    judged: list[JudgedCell] = []
-    data: list[dict[str, Any]] = []
-    traces = _Traces(options)
+    judge = CellJudge(options, confidence, progress.within)
+    results: list[CellResults] = []
     for cell in cells:
         progress.doing(f"cell {cell.name}")
-        usable = traces.of(cell)
-        if usable:
-            fit = fitted_jointly(
-                [each.problem for each in usable],
-                usable[0].case_problem.searched,
-                _identify(usable[0], progress.within),
-                confidence=confidence,
-                noise_rad=_known_noise(usable),
-            )
-            best = fit.diagnosis.likelihood.best
-            fit.diagnosis.notes.extend(note for each in usable for note in each.notes_at(best))
-            judged.append(JudgedCell(cell.name, cell.group, fit))
-            data.append(
-                {
-                    "cell": cell.name,
-                    "group": cell.group,
-                    "traces": [
-                        {"file": str(each.trace), "noise_rad": noise}
-                        for each, noise in zip(usable, _noise_of(fit, usable), strict=True)
-                    ],
-                    "agreement_p": fit.agreement,
-                    **(fixed_data(usable[0].case_problem) if fixed[1:] != fixed[:-1] else {}),
-                    **exact_data(fit.diagnosis),
-                }
-            )
+        results.append(judge.judged(cell))
         progress.done()
-    if not judged:
-        raise BiogripError(
-            f"{visible(options.trace)}: none of its traces can be used; the first: "
-            f"{traces.skipped[0]['reason']}"
-        )
-    # The reference group is the first in the table, even if none of its traces can be used.
-    names = list(dict.fromkeys(cell.group for cell in cells))
-    status = {cell.name: cell.fit.diagnosis.status for cell in judged}
-    kept = [cell for cell in judged if status[cell.name] != REJECTED]
-    if not kept:
-        raise BiogripError(
-            f"{visible(options.trace)}: the fits of all cells are rejected; the first: "
-            f"{data[0]['reasons'][0]}"
-        )
-    findings = findings_of_groups(kept, names, confidence)
-    certain = [cell for cell in kept if status[cell.name] == OK]
-    without = findings_of_groups(certain, names, confidence) if certain else []
-    read = case_problem.instrument.read
     found = {
+        **header(options, cases, factor),
+        **compared(results, cells, str(options.trace), confidence),
+    }
+    read = cases[0].problem.instrument.read
+    written = in_own_units(rounded_numbers(found), read)
+    write_text(output, json.dumps(written, indent=1) + "\n")
+    return found
+
+
+def header(options: IdentifyOptions, cases: Sequence[Case], factor: str) -> dict[str, Any]:
+    """Return what is common to all cells of a sheet, as plain data.
+
+    Parameters
+    ----------
+    options
+        Options for all traces; its own trace is the sheet.
+    cases
+        Case of each trace.
+    factor
+        Name of the factor that makes the groups.
+    """
+    case_problem = cases[0].problem
+    fixed = [fixed_data(case.problem) for case in cases]
+    one_gripper = all(case.block.gripper == cases[0].block.gripper for case in cases)
+    read = case_problem.instrument.read
+    return {
         WRITTEN_BY: __version__,
         "table": str(options.trace),
         "by": factor,
         "model": case_problem.model.name,
         "model_title": case_problem.model.title,
-        "confidence": confidence,
+        "confidence": cases[0].confidence,
         **(fixed[0] if fixed[1:] == fixed[:-1] else {}),
         "reads": {"quantity": read.name, "unit": read.unit},
         "limits": _limits(case_problem, one_gripper=one_gripper),
+    }
+
+
+def compared(
+    results: Sequence[CellResults], cells: Sequence[Cell], sheet: str, confidence: float
+) -> dict[str, Any]:
+    """Return populations of groups and differences between them, as plain data.
+
+    Parameters
+    ----------
+    results
+        Results of each cell.
+    cells
+        All cells of the sheet; the group of the first is the reference, even if it is empty.
+    sheet
+        Name of the sheet, for messages.
+    confidence
+        Confidence level of all limits, e.g. 0.95.
+
+    Raises
+    ------
+    BiogripError
+        If no trace can be used, or the fits of all cells are rejected.
+    """
+    results = _without_copies(results)
+    judged = [each for each in results if each.data is not None]
+    skipped = [one for each in results for one in each.skipped]
+    if not judged:
+        raise BiogripError(
+            f"{visible(sheet)}: none of its traces can be used; the first: {skipped[0]['reason']}"
+        )
+    data = [each.data for each in judged if each.data is not None]
+    fixed = [own.get("fixed") for own in data]
+    if fixed[1:] == fixed[:-1]:
+        # What is the same for all cells is said once.
+        data = [{key: own[key] for key in own if key != "fixed"} for own in data]
+    # The reference group is the first in the table, even if none of its traces can be used.
+    names = list(dict.fromkeys(cell.group for cell in cells))
+    status = {own["cell"]: own["fit"] for own in data}
+    kept = [each.judged for each in judged if status[each.judged.name] != REJECTED]
+    if not kept:
+        raise BiogripError(
+            f"{visible(sheet)}: the fits of all cells are rejected; the first: "
+            f"{data[0]['reasons'][0]}"
+        )
+    findings = findings_of_groups(kept, names, confidence)
+    certain = [cell for cell in kept if status[cell.name] == OK]
+    without = findings_of_groups(certain, names, confidence) if certain else []
+    return {
         "cells": data,
         "groups": [_group_data(finding) for finding in findings],
         "differences": [_difference_data(each) for each in differences_of_groups(findings)],
@@ -237,11 +233,22 @@ def compare_groups(
         "differences_without_doubtful": [
             _difference_data(each) for each in differences_of_groups(without)
         ],
-        "skipped": traces.skipped,
+        "skipped": skipped,
     }
-    written = in_own_units(rounded_numbers(found), read)
-    write_text(output, json.dumps(written, indent=1) + "\n")
-    return found
+
+
+def _without_copies(results: Sequence[CellResults]) -> list[CellResults]:
+    """Leave out cells with readings of an earlier one: copies of a file would feign agreement."""
+    first: dict[str, str] = {}
+    kept = []
+    for each in results:
+        own = each
+        for digest, file in each.readings.items():
+            before = first.setdefault(digest, file)
+            if before != file and own.data is not None:
+                own = own.left_out(file, same_readings(file, before))
+        kept.append(own)
+    return kept
 
 
 def _limits(case_problem: CaseProblem, *, one_gripper: bool) -> str:
@@ -294,87 +301,6 @@ def _without(cells: list[Cell], exclude: Sequence[str]) -> list[Cell]:
     if not kept:
         raise BiogripError("--exclude: found all cells, allowed is to keep one at least.")
     return kept
-
-
-class _Traces:
-    """Reader of traces that collects those that cannot be used in ``skipped``."""
-
-    def __init__(self, options: IdentifyOptions) -> None:
-        self.skipped: list[dict[str, str]] = []
-        self._options = options
-        self._read: dict[bytes, Path] = {}
-
-    def of(self, cell: Cell) -> list[_TraceProblem]:
-        """Return the fit problems of the usable traces of a cell."""
-        case_problem = []
-        for row in cell.rows:
-            try:
-                case_problem.append(self._trace_problem(row))
-            except BiogripError as error:
-                name = visible(row.file)
-                reason = str(error) if name in str(error) else f"{name}: {error}"
-                self.skipped.append({"trace": str(row.file), "cell": cell.name, "reason": reason})
-        return _in_common_ranges(case_problem)
-
-    def _trace_problem(self, row: Row) -> _TraceProblem:
-        options, trace = with_row(self._options, row), row.file
-        (case,) = study_of(options).cases.values()
-        recorded, case = read_trace(trace, case, options.given)
-        rotation_rad = recorded.rotation_rad[0]
-        # Noise never repeats: equal rotations are a copied file, and would feign agreement.
-        same = sha256(rotation_rad.tobytes()).digest()
-        if (before := self._read.setdefault(same, trace)) != trace:
-            raise BiogripError(
-                f"{visible(trace)}: found the same readings as in {visible(before)}, "
-                "allowed is each trace once."
-            )
-        case_problem = case.problem.weighted(recorded.sd_rad)
-        problem = case_problem.of(recorded.time_s, rotation_rad)
-        notes = [Note(HARMLESS, ONSET_AS_FITTED)] if case.problem.fit_start else []
-        if case.problem.coloured:
-            # All cells share one gripper: its calibration error is common to them, not noise.
-            assumed = replace(case_problem, uncertainty={})
-            fit = fit_judged(case, assumed, recorded.time_s, rotation_rad, 0)
-            problem, notes = fit.problem, [*notes, *notes_on_fit(fit)]
-        return _TraceProblem(trace, problem, case, case_problem, recorded, notes)
-
-
-def _in_common_ranges(traces: list[_TraceProblem]) -> list[_TraceProblem]:
-    """Return the traces of a cell with search ranges that contain those of each."""
-    if len(traces) < 2:
-        return traces
-    low = np.min([each.problem.low for each in traces], axis=0)
-    high = np.max([each.problem.high for each in traces], axis=0)
-    return [replace(each, problem=replace(each.problem, low=low, high=high)) for each in traces]
-
-
-def _noise_of(fit: JointFit, traces: Sequence[_TraceProblem]) -> Sequence[float]:
-    """Return the noise of each trace in rad; of a rejected fit, as given or that of neighbours."""
-    if fit.diagnosis.status != REJECTED:
-        return fit.noise_rad
-    return [
-        each.case_problem.noise_rad or estimate_noise(each.recorded.rotation_rad[0])
-        for each in traces
-    ]
-
-
-def _known_noise(traces: Sequence[_TraceProblem]) -> list[float] | None:
-    levels = [each.case_problem.noise_rad for each in traces]
-    known = [level for level in levels if level is not None]
-    return known if len(known) == len(traces) else None
-
-
-def _identify(
-    case_problem: _TraceProblem, progress: Callable[[int, float], None]
-) -> Callable[[Problem], Identification]:
-    """Return a function that finds global optima with the seeds and budget of `identify_trace`."""
-    case = case_problem.case
-
-    def found(problem: Problem) -> Identification:
-        rng = stream(case.study.study_seed, case.name, 0, "identifiability")
-        return best_fit(problem, case.least_squares, rng, progress)
-
-    return found
 
 
 def _group_data(finding: GroupFinding) -> dict[str, Any]:
