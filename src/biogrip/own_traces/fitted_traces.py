@@ -1,16 +1,19 @@
 """Traces of a study's sheet, identified in batches: a file of results for each."""
 
 import hashlib
-import json
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from biogrip.digits import rounded_numbers
-from biogrip.errors import BiogripError
-from biogrip.files import write_text
+from biogrip.own_traces.kept_results import (
+    FOLDER,
+    file_of,
+    kept_results,
+    read_results,
+    write_results,
+)
 from biogrip.own_traces.many_traces import identify_batch
 from biogrip.own_traces.one_trace import IdentifyOptions
 from biogrip.own_traces.read_as import ReadAs
@@ -23,13 +26,11 @@ from biogrip.products.source_files import fingerprint
 from biogrip.study.sheet import Row
 from biogrip.study.study import Study
 
-FOLDER = Path("results/traces")
 BATCHES = f"{FOLDER}/batches/{{rows}}.csv"
 """Lists of the traces of a batch, with the files of their results."""
 
 _COLUMNS = ("trace", "results", "sha256")
 _MINUTES, _MEGABYTES = 60, 1000
-_LONGEST_STEM, _LETTERS = 60, 8
 
 
 @dataclass(frozen=True)
@@ -47,10 +48,8 @@ class TraceToFit:
 
     @property
     def results(self) -> Path:
-        """File of its results, a name of its own for every path."""
-        stem = re.sub(r"[^A-Za-z0-9_-]", "_", Path(self.file).stem)[:_LONGEST_STEM]
-        own = hashlib.sha256(self.file.encode(errors="surrogateescape")).hexdigest()
-        return FOLDER / f"{stem}-{own[:_LETTERS]}.json"
+        """File of its results."""
+        return file_of(FOLDER, Path(self.file).stem, self.file)
 
     @property
     def options(self) -> IdentifyOptions:
@@ -98,27 +97,13 @@ def fit(to_fit: list[TraceToFit], traces: list[Path], batch: Path) -> None:
         shown = dict(zip(found, outcome.on_page, strict=True))
         for own in missing:
             results = {
-                "made_for": own.made_for(),
                 "refused": outcome.refused.get(own.file),
-                "data": rounded_numbers(found.get(own.file)),
-                "on_page": rounded_numbers(shown.get(own.file)),
+                "data": found.get(own.file),
+                "on_page": shown.get(own.file),
             }
-            write_text(
-                own.results, json.dumps({"seal": _seal(results), **results}, indent=1) + "\n"
-            )
+            write_results(own.results, own.made_for(), rounded_numbers(results))
     listed = [(own.file, own.results.name, _hash(own.results)) for own in to_fit]
     write_rows(batch, _COLUMNS, listed)
-
-
-def read_results(file: Path, made_for: str | None = None) -> FittedTrace | None:
-    """Return the results in a file, or None if they are not whole, or made for something else."""
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-        if found.pop("seal") != _seal(found) or made_for not in (None, found["made_for"]):
-            return None
-        return FittedTrace(found["data"], found["on_page"], found["refused"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None
 
 
 def read_every(traces: Iterable[TraceToFit]) -> Iterator[FittedTrace]:
@@ -130,17 +115,8 @@ def read_every(traces: Iterable[TraceToFit]) -> Iterator[FittedTrace]:
         If the results of a trace are not there, or were changed.
     """
     for own in traces:
-        found = read_results(own.results)
-        if found is None:
-            raise BiogripError(
-                f"{own.results}: is not there, or is not as it was written. Remove "
-                f"{Path(BATCHES).parent} and run again: only this trace is fitted."
-            )
-        yield found
-
-
-def _seal(results: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(results, indent=1).encode()).hexdigest()
+        found = kept_results(own.results)
+        yield FittedTrace(found["data"], found["on_page"], found["refused"])
 
 
 def _hash(file: Path) -> str:
