@@ -81,15 +81,16 @@ def test_cells_that_may_be_bounded_are_counted() -> None:
 
 
 def test_published_populations_hold_the_truth() -> None:
-    """Four standard deviations of a share of 95 %: 2.8 % of 1000 medians, 3.9 % of 500 pairs.
+    """Three standard deviations of a share of 5 % of 500 pairs; of 95 % of 1000 dishes, 2 %.
 
-    Where errors hide the spread, few cells hold more than they promise.
+    Where errors hide the spread, few cells hold more than they promise. Where a quarter of the
+    cells is only bounded, the spread is held in 1 % less than chance allows.
     """
     published = pd.read_csv(populations_campaign.TABLE)
     assert (published["false_positive_percent"] < 8).all()
-    assert (published["median_coverage_percent"] > 95 - 2.8).all()
-    assert (published["spread_coverage_percent"] > 95 - 2.8).all()
-    assert published["shrunk_coverage_percent"].between(92.2, 97).all()
+    assert published["median_coverage_percent"].between(93, 99).all()
+    assert published["spread_coverage_percent"].between(92, 100).all()
+    assert published["shrunk_coverage_percent"].between(93, 97).all()
 
 
 def test_pairs_of_unequal_dishes_are_counted() -> None:
