@@ -6,7 +6,7 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
-from biogrip.own_traces.fitted_traces import check_rows
+from biogrip.own_traces.fitted_cells import check_sheet
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -47,7 +47,7 @@ with message_only():
     )
     if workflow.exec_mode == ExecMode.DEFAULT:
         check_traces(STUDY)
-        check_rows(STUDY)
+        check_sheet(STUDY)
 
 RESULTS = Path("results")
 PLAN = Plan(STUDY, RESULTS)

@@ -10,7 +10,7 @@ import numpy as np
 from biogrip.digits import rounded_numbers
 from biogrip.groups.group_findings import CellProfile, JudgedCell, QuantityProfile
 from biogrip.identifiability.profiles import Profile
-from biogrip.own_traces.fitted_traces import TraceToFit, every_trace
+from biogrip.own_traces.fitted_traces import TraceToFit, every_trace, options_of
 from biogrip.own_traces.judged_cells import CellJudge, CellResults
 from biogrip.own_traces.kept_results import (
     FOLDER,
@@ -19,6 +19,7 @@ from biogrip.own_traces.kept_results import (
     read_results,
     write_results,
 )
+from biogrip.own_traces.rows_of_sheets import cases_of, refuse_mixed_models
 from biogrip.products.digest import digest
 from biogrip.products.files.rows import write_rows
 from biogrip.products.plan import ROWS_A_BATCH, Plan, Wildcards
@@ -155,6 +156,20 @@ def groups_of(study: Study) -> list[Cell]:
     return cells_of(Sheet(path, tuple(rows[0].factors), rows), factor)[1]
 
 
+def check_sheet(study: Study) -> None:
+    """Check all rows of a study's sheet together with its config, and its groups.
+
+    Raises
+    ------
+    BiogripError
+        With the places of the first few problems.
+    """
+    if traces := options_of(study):
+        cases = cases_of(traces)
+        if groups_of(study):
+            refuse_mixed_models(traces, cases)
+
+
 def every_cell(study: Study) -> list[CellToFit]:
     """Return the cells of a study's sheet, if it has groups."""
     traces = {own.file: own for own in every_trace(study)}
@@ -170,7 +185,8 @@ def _to_fit(study: Study, job: Wildcards) -> list[CellToFit]:
     return every_cell(study)[first : first + ROWS_A_BATCH]
 
 
-def _jobs(plan: Plan) -> list[Wildcards]:
+def jobs_of_cells(plan: Plan) -> list[Wildcards]:
+    """Return the batches of cells: the number of the first cell of each."""
     count = len(groups_of(plan.study))
     return [{"rows": str(start)} for start in range(0, count, ROWS_A_BATCH)]
 
@@ -184,7 +200,7 @@ FITTED_CELLS = Product(
     {"batch": BATCHES},
     fit,
     _to_fit,
-    _jobs,
+    jobs_of_cells,
     message="Identifying the cells from number {rows} from all their traces",
     reads={"traces": Reads(_files)},
     weight=Weight(60, 1000),

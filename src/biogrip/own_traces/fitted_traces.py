@@ -17,7 +17,6 @@ from biogrip.own_traces.kept_results import (
 from biogrip.own_traces.many_traces import identify_batch
 from biogrip.own_traces.one_trace import IdentifyOptions
 from biogrip.own_traces.read_as import ReadAs
-from biogrip.own_traces.rows_of_sheets import cases_of
 from biogrip.products.digest import digest
 from biogrip.products.files.rows import write_rows
 from biogrip.products.plan import ROWS_A_BATCH, Plan, Wildcards
@@ -132,26 +131,16 @@ def every_trace(study: Study) -> list[TraceToFit]:
     return [TraceToFit(row.file, block.model, block.given, row.settings) for row in rows]
 
 
-def check_rows(study: Study) -> None:
-    """Check the settings of all rows of a study's sheet together with its config.
-
-    Raises
-    ------
-    BiogripError
-        With the places of the first few problems.
-    """
+def options_of(study: Study) -> list[IdentifyOptions]:
+    """Return the options of all traces, with the lines of their rows for messages."""
     block = study.traces
-    if block is not None:
-        sheet = Path(block.sheet)
-        cases_of(
-            [
-                replace(
-                    own.options,
-                    row=Row(sheet, row.line, Path(row.file), row.cell, {}, row.settings),
-                )
-                for own, row in zip(every_trace(study), block.rows, strict=True)
-            ]
-        )
+    if block is None:
+        return []
+    sheet = Path(block.sheet)
+    return [
+        replace(own.options, row=Row(sheet, row.line, Path(row.file), row.cell, {}, row.settings))
+        for own, row in zip(every_trace(study), block.rows, strict=True)
+    ]
 
 
 def _to_fit(study: Study, job: Wildcards) -> list[TraceToFit]:

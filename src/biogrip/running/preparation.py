@@ -13,7 +13,7 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from biogrip.own_traces.fitted_traces import check_rows
+from biogrip.own_traces.fitted_cells import check_sheet
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -149,7 +149,7 @@ def _checked(options: Any, folder: Path) -> Study:
     with chdir(folder if folder.is_dir() else "."):
         study = load_study(config, [default_config(), *files], command_line=options.config)
         check_traces(study)
-        check_rows(study)
+        check_sheet(study)
     return study
 
 
