@@ -7,17 +7,21 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 import shutil
+from collections.abc import Iterator
 from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
 from biogrip.experiment.protocol import Phase, TorqueHistory, hold, torque_history
 from biogrip.instrument.gripper import Arm, Gripper
+from tests.helpers.browser import chromium, executable
 from tests.helpers.default import study_of
 from tests.helpers.in_process import make_in_process
 from tests.helpers.pictures import in_coarse_dots
 from tests.helpers.places import EXAMPLE
+from tests.helpers.required import cannot_run
 from tests.helpers.runs import RECORDED, SMALL, TINY, built_once, snakemake
 
 
@@ -46,6 +50,14 @@ def pytest_collection_finish() -> None:
     """Leave what is loaded out of every later search for cycles, a twelfth of the time else."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if executable() is None:
+        cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")
+    with chromium() as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

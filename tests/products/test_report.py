@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import yaml
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser
 
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import Harmonic, Load, Phase, TorqueHistory, torque_history
@@ -29,22 +28,12 @@ from biogrip.products.source_files import fingerprint
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 from biogrip.running.manifest import Manifest
-from tests.helpers.browser import chromium, executable
 from tests.helpers.places import ROOT
-from tests.helpers.required import cannot_run
 
 MOST_BYTES = 8_000_000
 PHONE = {"width": 400, "height": 800}
 CLOSE = 1e-9
 CASE = "endothelial_cell"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    if executable() is None:
-        cannot_run("BIOGRIP_REQUIRE_CHROMIUM", "Chromium is missing: apt-get install chromium")
-    with chromium() as started:
-        yield started
 
 
 @pytest.fixture(scope="module")

@@ -24,8 +24,8 @@ from biogrip.own_design.designed import (
 )
 from biogrip.own_design.drawings import drawings
 from biogrip.own_traces.outputs import WRITTEN_BY
-from biogrip.own_traces.page import embedded
 from biogrip.products.figures.style import styled
+from biogrip.products.pages.figure_address import figure_address
 
 _SHOWN = 12
 
@@ -97,7 +97,7 @@ def write_page(designs: Iterable[Designed], page: Path) -> None:
 def _describe(found: Designed) -> dict[str, Any]:
     plan, inputs, instrument = found.plan, found.inputs, found.inputs.instrument
     with styled():
-        figures = [(title, embedded(drawn)) for title, drawn in drawings(found)]
+        figures = [(title, figure_address(drawn)) for title, drawn in drawings(found)]
     kinds = {kind(phase) for phase in plan.phases}
     shown = [column for column in _columns(instrument) if column.only in (None, *kinds)]
     return {

@@ -377,6 +377,20 @@ def _cell_in_words(cell: dict[str, Any], found: dict[str, Any]) -> str:
 
 
 def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
+    header, table = group_rows(rows, percent)
+    return _table(table, header)
+
+
+def group_rows(rows: Iterable[dict[str, Any]], percent: str) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows of a table of groups and their medians.
+
+    Parameters
+    ----------
+    rows
+        What `compare_groups` returns under ``groups``.
+    percent
+        Confidence of the limits in words.
+    """
     table = []
     for row in rows:
         cells = len(row["determined"])
@@ -394,7 +408,7 @@ def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
         *("group", "quantity", "cells that determine it"),
         *("median", f"{percent} interval", "spread, times", f"{percent} interval"),
     ]
-    return _table(table, header)
+    return header, table
 
 
 def _not_determined_in_words(rows: list[dict[str, Any]]) -> list[str]:
@@ -415,6 +429,14 @@ def _not_determined_in_words(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
+    header, table = difference_rows(rows, percent)
+    return _table(table, header)
+
+
+def difference_rows(
+    rows: Iterable[dict[str, Any]], percent: str
+) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows of a table of differences; arguments as of `group_rows`."""
     table = []
     for row in rows:
         ranks = row["by_ranks"]
@@ -437,7 +459,7 @@ def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
         *("quantity", "groups", "ratio of medians", f"{percent} interval", "p", "adjusted p"),
         *("by ranks", f"ratio found in {100 * USUAL_POWER:g} %"),
     ]
-    return _table(table, header)
+    return header, table
 
 
 def _table(rows: list[list[str]], header: list[str]) -> str:

@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from biogrip.arrays import Array
 from biogrip.digits import with_unit
+from biogrip.products.figures.axis_limits import is_over_decades, scale_of_fit
 from biogrip.products.figures.declared import drawing
-from biogrip.products.figures.results import Fit, scale_of, typical_fit
+from biogrip.products.figures.results import Fit, typical_fit
 from biogrip.products.figures.style import COLUMN_IN, FITTED, MEASURED, TARGET, figure
 from biogrip.products.files.identifications import PATH
 from biogrip.products.files.traces import MEASUREMENTS
@@ -19,8 +19,6 @@ from biogrip.products.stages.calibrated import CALIBRATED
 from biogrip.products.uses import every, from_case
 from biogrip.study.study import Case
 
-# Ratio of the longest to the shortest interval from which times are drawn on a logarithmic scale.
-_SPARSER = 30.0
 _READINGS: dict[str, Any] = {"linestyle": "", "marker": ".", "markersize": 1.2, "rasterized": True}
 
 
@@ -38,7 +36,7 @@ def draw(
 
 def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
     """Draw a trace, its target and its fit over time; return factor and unit of the readings."""
-    factor, unit = _scale(fit)
+    factor, unit = scale_of_fit(fit)
     axes.plot(fit.time_s, factor * fit.measured_rad, color=MEASURED, **_READINGS)
     kind = "recorded trace" if fit.target_rad is None else "noisy measurement"
     axes.plot([], [], ".", color=MEASURED, markersize=4, label=kind)
@@ -47,17 +45,6 @@ def draw_traces(axes: Axes, fit: Fit, label: str) -> tuple[float, str]:
     axes.plot(fit.time_s, factor * fit.fitted_rad, "--", color=FITTED, label=label)
     axes.set_ylabel(with_unit(fit.read.title, unit))
     return factor, unit
-
-
-def _is_over_decades(time_s: Array) -> bool:
-    """Return True for times that are dense at first and sparse at last, after zero."""
-    return bool(time_s[0] > 0 and np.max(np.diff(time_s)) > _SPARSER * np.min(np.diff(time_s)))
-
-
-def _scale(fit: Fit) -> tuple[float, str]:
-    """Return factor and unit with a prefix, where the unit of the readings may have one."""
-    plain = fit.read.unit.isalpha()
-    return scale_of(fit.fitted_rad, fit.read.unit) if plain else (1.0, fit.read.unit)
 
 
 def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ()) -> Figure:
@@ -81,7 +68,7 @@ def draw_fit(fit: Fit, label: str, title: str, axis_rad: tuple[float, ...] = ())
     residuals.set_ylabel(with_unit("residual", unit) if fit.sd_rad is None else "residual / sd")
     residuals.set_xlabel("time (s)")
     residuals.set_xlim(fit.time_s[0], fit.time_s[-1])
-    if _is_over_decades(fit.time_s):
+    if is_over_decades(fit.time_s):
         residuals.set_xscale("log")
         if low > 0:
             traces.set(yscale="log", ylim=(0.8 * factor * low, 1.25 * factor * high))

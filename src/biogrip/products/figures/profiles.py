@@ -13,6 +13,11 @@ from matplotlib.ticker import MaxNLocator
 from biogrip.arrays import Array
 from biogrip.digits import with_unit
 from biogrip.identifiability.likelihood import CERTAIN
+from biogrip.products.figures.axis_limits import (
+    HIGHEST_INCREASE,
+    is_wide,
+    profile_limits,
+)
 from biogrip.products.figures.decades import decade_ticks
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.style import BLUE, FITTED, GREY, SHADE, TARGET, panel, row_of_panels
@@ -21,10 +26,6 @@ from biogrip.products.product import JUDGEMENT, the
 from biogrip.products.stages.expected import VERDICTS_EXPECTED
 from biogrip.products.uses import every, from_case
 from biogrip.study.study import Case
-
-_HIGHEST = 12.0
-# Ratio of the ends above which an axis is logarithmic.
-_WIDE = 5.0
 
 
 def draw(case: Case, measured: Path, expected: list[Path]) -> Figure:
@@ -60,15 +61,15 @@ def draw_profiles(
         if set(names) <= set(truths):
             truth = sum(truths[name] for name in names)
             axes.axvline(truth, color=TARGET, linewidth=0.7, label="truth")
-        low, high = _window(item)
-        if high / low > _WIDE:
+        low, high = profile_limits(item)
+        if is_wide(low, high):
             axes.set_xscale("log")
             axes.set_xticks(*decade_ticks(low, high))
             axes.minorticks_off()
         else:
             axes.xaxis.set_major_locator(MaxNLocator(2, steps=[1, 2, 5, 10]))
         axes.set_xlim(low, high)
-        axes.set_ylim(0, _HIGHEST)
+        axes.set_ylim(0, HIGHEST_INCREASE)
         axes.set_xlabel(with_unit(item["symbol"], item["unit"]))
         panel(axes, "abcdefghijklmnopqrstuvwxyz"[index], item["verdict"], 40)
     grid[0].set_ylabel("rise of χ²")
@@ -87,7 +88,7 @@ def _curve(profile: dict[str, Any]) -> tuple[Array, Array]:
 
     # Rounding may have made neighbours equal.
     values, places = np.unique(np.array(profile["values"]), return_index=True)
-    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * _HIGHEST))
+    roots = np.sqrt(np.clip(np.array(profile["increases"])[places], 0.0, 4 * HIGHEST_INCREASE))
     dense = np.unique(np.concatenate([np.linspace(*pair, 6) for pair in pairwise(np.log(values))]))
     return np.exp(dense), PchipInterpolator(np.log(values), roots)(dense) ** 2
 
@@ -103,16 +104,6 @@ def _limits(axes: Axes, item: dict[str, Any]) -> None:
     for limit in (low, high):
         if limit is not None:
             axes.axvline(limit, color=BLUE, linewidth=0.7)
-
-
-def _window(item: dict[str, Any]) -> tuple[float, float]:
-    """Return limits of the x-axis: where the profile is inside the figure, plus a margin."""
-    values, increases = (np.array(item["profile"][key]) for key in ("values", "increases"))
-    inside = np.flatnonzero(increases < _HIGHEST)
-    ends = [item["low"], item["high"], values[inside[0]], values[inside[-1]]]
-    low, high = (float(end([x for x in ends if x is not None])) for end in (min, max))
-    margin = max((high / low) ** 0.05, 1.0002)
-    return max(float(values[0]), low / margin), min(float(values[-1]), high * margin)
 
 
 PROFILES = drawing(
