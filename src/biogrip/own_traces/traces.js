@@ -27,11 +27,14 @@
 
   // Scales, and their ticks as pairs of place and label.
 
+  // The finest steps of 1, 2 or 5 that have no more ticks than most.
   function linearTicks([low, high], most) {
-    const raw = (high - low) / most, ten = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].map((m) => m * ten).find((s) => s >= raw * 0.999);
-    const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
-    return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step).map((v) => [v, inDigits(v, step)]);
+    const ten = 10 ** Math.floor(Math.log10((high - low) / most));
+    for (const step of [0.5, 1, 2, 5, 10].map((m) => m * ten)) {
+      const first = Math.ceil(low / step - 1e-9), last = Math.floor(high / step + 1e-9);
+      if (last - first < most) return Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step).map((v) => [v, inDigits(v, step)]);
+    }
+    return [];
   }
 
   function logTicks([low, high], most) {
@@ -153,7 +156,7 @@
   function drawProfile(profile, levels, name) {
     const box = { left: 36, top: 20, width: 220, height: 120 };
     const x = { ends: profile.axis, log: profile.log, label: withUnit(profile.quantity, profile.unit), most: profile.log ? 3 : 4 };
-    const drawn = axes(box, x, { ends: [0, 12], label: "rise of χ²", most: 4 }, profile.verdict);
+    const drawn = axes(box, x, { ends: [-0.3, 12], label: "rise of χ²", most: 4 }, profile.verdict);
     for (let i = 0; i + 1 < profile.allowed.length; i += 2) {
       const [from, to] = profile.allowed.slice(i, i + 2).map(drawn.X);
       drawn.band("shade", Math.max(from, 0), 0, Math.min(to, box.width), box.height);
@@ -268,7 +271,7 @@
     target.dataset.done = wanted ? "yes" : "";
     target.textContent = wanted ? "Close all that are shown" : "Open all that are shown";
     const next = () => {
-      left.splice(0, 20).forEach((body) => open(body, wanted));
+      left.splice(0, 100).forEach((body) => open(body, wanted));
       if (left.length) setTimeout(next);
     };
     next();
@@ -312,9 +315,10 @@
     const ticks = levels.map((level, i) => [(i + 0.5) / levels.length, level.length > each / 6 ? `${level.slice(0, Math.max(Math.floor(each / 6) - 1, 1))}…` : level]);
     const drawn = axes(box, { ends: [0, 1], ticks: factor < 0 ? [] : ticks, label: factor < 0 ? "cells" : all.factors[factor] },
       { ends: [low / room("bounded above"), high * room("bounded below")], log: true, label: withUnit(name, unit), most: 5 });
-    const bars = [], dots = [];
+    const dots = [];
     levels.forEach((level, i) => {
       const own = cells.filter((cell) => cell.level === level), step = 0.86 * each / Math.max(own.length, 1);
+      const bars = [], width = few(Math.max(Math.min(step * 0.4, 1.2), 0.2));
       const radius = Math.max(Math.min(step * 0.45, 3.2), 0.9);
       for (const [, , median, from, to] of medians.filter((row) => row[0] === level)) {
         drawn.band("around-median", (i + 0.04) * each, drawn.Y(to), (i + 0.96) * each, drawn.Y(from));
@@ -331,11 +335,11 @@
         } else {
           const way = cell.kind === "bounded below" ? -1 : 1, tip = cell.y + 16 * way;
           const shape = `M${few(cell.x - head)} ${few(cell.y)}h${few(2 * head)}M${at} ${few(cell.y)}V${few(tip)}M${few(cell.x - head)} ${few(tip - head * way)}L${at} ${few(tip)}L${few(cell.x + head)} ${few(tip - head * way)}`;
-          drawn.path(`cell arrow${cell.hollow ? " dotted" : ""}`, shape);
+          drawn.add(`<path class="cell arrow${cell.hollow ? " dotted" : ""}" style="stroke-width:${width}" d="${shape}"/>`);
         }
       });
+      drawn.add(`<path class="cell bars" style="stroke-width:${width}" d="${bars.join("")}"/>`);
     });
-    drawn.path("cell", bars.join(""));
     dots.forEach(drawn.add);
     element.innerHTML = `${drawing(380, 226, `Distribution of ${name}: ${words.join(", ")}`, [drawn.text()])}<figcaption>${caption}</figcaption>`;
     const svg = element.querySelector("svg");
