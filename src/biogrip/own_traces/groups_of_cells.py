@@ -1,7 +1,7 @@
 """The command ``biogrip groups``: recorded traces of cells, compared between groups of cells."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import exp
 from pathlib import Path
 from typing import Any

@@ -1,12 +1,15 @@
 """Table and page of the traces of a study's sheet."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.identifiability.fit_status import REJECTED
+from biogrip.own_traces.fitted_cells import groups_of
 from biogrip.own_traces.fitted_traces import BATCHES, TraceToFit, every_trace, read_every
+from biogrip.own_traces.groups_of_study import DATA
 from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.page import write_page
 from biogrip.products.plan import Plan, Wildcards
@@ -64,10 +67,11 @@ def list_traces(traces: TracesShown, batches: list[Path], csv: Path) -> None:
     write_table(traces.outcome, csv, traces.rows)
 
 
-def show_traces(traces: TracesShown, batches: list[Path], page: Path) -> None:
-    """Write the page of all traces."""
+def show_traces(traces: TracesShown, batches: list[Path], groups: list[Path], page: Path) -> None:
+    """Write the page of all traces, with the comparison of groups if there are any."""
     outcome = traces.outcome
-    write_page(outcome.on_page, outcome.refused, page)
+    compared = [json.loads(file.read_text(encoding="utf-8")) for file in groups]
+    write_page(outcome.on_page, outcome.refused, page, *compared)
 
 
 def check_traces(traces: TracesShown, batches: list[Path], ok: Path) -> None:
@@ -119,7 +123,10 @@ PAGE = Product(
     lambda study, _: shown(study),
     once,
     message="Writing the page of all traces",
-    reads={"batches": EVERY_BATCH},
+    reads={
+        "batches": EVERY_BATCH,
+        "groups": Reads(lambda plan, _: [DATA] if groups_of(plan.study) else []),
+    },
     category=CATEGORY,
     item="All traces",
     caption="Every trace of the sheet: status of its fit, verdicts, values and limits.",
