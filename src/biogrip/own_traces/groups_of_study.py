@@ -70,7 +70,9 @@ def compare(compared_cells: GroupsToCompare, batches: list[Path], data: Path) ->
         said = compared(results, cells, compared_cells.sheet, cases[0].confidence)
     except BiogripError as error:
         # Other results of the sheet stand.
-        said = {"cells": [], "groups": [], "differences": [], "problem": str(error)}
+        lists = ("cells", "groups", "differences", "rejected", "doubtful")
+        none = dict.fromkeys((*lists, "differences_without_doubtful", "skipped"), [])
+        said = {**none, "problem": str(error)}
     common = header(rows[0], cases, compared_cells.factor)
     found = {**common, "table": compared_cells.sheet, **said}
     read = cases[0].problem.instrument.read

@@ -157,6 +157,12 @@ def _compared(groups: Mapping[str, Any]) -> dict[str, Any]:
         "doubtful": groups["doubtful"],
         "without": difference_rows(groups["differences_without_doubtful"], percent),
         "limits": groups["limits"],
+        "rejected": [
+            (cell["cell"], cell["reasons"][0])
+            for cell in groups["cells"]
+            if cell["cell"] in groups["rejected"]
+        ],
+        "problem": groups.get("problem"),
     }
 
 
