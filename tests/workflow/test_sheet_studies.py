@@ -135,3 +135,44 @@ def test_a_sheet_that_cannot_be_used_stops_with_line_and_column(lab: Path) -> No
     assert done.status != 0
     assert "lab.yaml, line 1: traces.rows: is not for a config" in done.output
     assert "Traceback" not in done.output
+
+
+def test_groups_of_a_study_are_those_of_the_command(lab: Path) -> None:
+    """Medians, limits and differences, from the same sheet; replicates are fitted jointly."""
+    for seed, name in enumerate(("d", "e", "f", "g"), 10):
+        trace(lab / f"{name}.csv", seed)
+    rows = "".join(f"{file}.csv\t{cell}\tB\t\n" for file, cell in zip("defg", "vwxx", strict=True))
+    (lab / "cells.tsv").write_text(SHEET + rows)
+    run(lab)
+    (lab / "own.yaml").write_text(CONFIG.partition("\n")[2])
+    done = biogrip(lab, "groups", "cells.tsv", "--config", "own.yaml")
+    assert done.returncode == 0, done.stderr
+    by_command = json.loads((lab / "cells.compared.json").read_text())
+    by_study = json.loads((lab / "results" / "traces" / "compared" / "groups.json").read_text())
+    assert [cell["cell"] for cell in by_study["cells"]] == ["first", "second", "third", *"vwx"]
+    for own, other in zip(by_study["cells"], by_command["cells"], strict=True):
+        assert own == other
+    assert by_study["by"] == by_command["by"] == "dish"
+    for own, other in zip(by_study["groups"], by_command["groups"], strict=True):
+        assert own["determined"] == other["determined"]
+        if "median" in other:
+            # Profiles are kept to nine digits.
+            for key in ("median", "low", "high"):
+                assert own[key] == pytest.approx(other[key], rel=1e-4)
+    table = pd.read_csv(lab / "results" / "tables" / "groups.csv")
+    assert set(table["group"]) == {"A", "B"}
+    page = (lab / "results" / "traces.html").read_text()
+    assert "Medians and spreads of the groups" in page
+
+    before = {file: file.read_bytes() for file in (lab / "results/traces/cells").glob("*.json")}
+    trace(lab / "f.csv", 20)
+    run(lab)
+    after = {file: file.read_bytes() for file in before}
+    assert {file.name[0] for file in before if before[file] != after[file]} == {"x"}
+
+
+def test_a_cell_in_two_groups_stops_the_study(lab: Path) -> None:
+    (lab / "cells.tsv").write_text(replaced(SHEET, "third\tB", "second\tB"))
+    done = called(lab, "run", "lab.yaml", "-j2")
+    assert done.status != 0
+    assert "cells.tsv, line 4, column 'dish': found 'B' for the cell 'second'" in done.output

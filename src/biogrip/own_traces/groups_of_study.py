@@ -34,7 +34,7 @@ from biogrip.products.tables.layout import Column, Table
 from biogrip.study.sheet import Cell
 from biogrip.study.study import Study
 
-DATA = "results/traces/groups.json"
+DATA = "results/traces/compared/groups.json"
 """All that is said of cells and groups, as ``biogrip groups`` writes it."""
 
 
@@ -70,13 +70,16 @@ def compare(compared_cells: GroupsToCompare, batches: list[Path], data: Path) ->
         said = compared(results, cells, compared_cells.sheet, cases[0].confidence)
     except BiogripError as error:
         # Other results of the sheet stand.
-        lists = ("cells", "groups", "differences", "rejected", "doubtful")
-        none = dict.fromkeys((*lists, "differences_without_doubtful", "skipped"), [])
-        said = {**none, "problem": str(error)}
+        names = ("groups", "differences", "rejected", "doubtful", "skipped")
+        none: dict[str, Any] = {name: [] for name in names}
+        more = {"cells": [], "differences_without_doubtful": [], "problem": str(error)}
+        said = {**none, **more}
     common = header(rows[0], cases, compared_cells.factor)
-    found = {**common, "table": compared_cells.sheet, **said}
+    # Cells are rounded already, and are not rounded twice.
+    found = rounded_numbers({**common, "table": compared_cells.sheet, **said})
+    found["cells"] = said["cells"]
     read = cases[0].problem.instrument.read
-    write_text(data, json.dumps(in_own_units(rounded_numbers(found), read), indent=1) + "\n")
+    write_text(data, json.dumps(in_own_units(found, read), indent=1) + "\n")
 
 
 def _to_compare(study: Study, _: Wildcards) -> GroupsToCompare:
