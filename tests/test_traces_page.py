@@ -15,8 +15,9 @@ from scipy.interpolate import PchipInterpolator
 
 from biogrip.arrays import Array
 from biogrip.own_traces.curves import curves_of, normal_quantiles
+from biogrip.own_traces.on_page import for_page
 from biogrip.own_traces.one_trace import Identified, IdentifyOptions, identify_trace
-from biogrip.own_traces.page import for_page, write_page
+from biogrip.own_traces.page import write_page
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.figures import style
 from biogrip.products.figures.results import Fit, fit_of

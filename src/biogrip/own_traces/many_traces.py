@@ -121,8 +121,8 @@ def identify_batch(
         else:
             outcome.found.append(result.data)
             if page:
-                # Imported here: loading Matplotlib takes long.
-                from biogrip.own_traces.page import for_page
+                # Imported here: loading pandas takes long.
+                from biogrip.own_traces.on_page import for_page
 
                 outcome.on_page.append(for_page(result))
     return outcome

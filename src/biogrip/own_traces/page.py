@@ -3,67 +3,26 @@
 Texts and tables are HTML; `traces.js` draws in the browser, from the numbers of `curves`.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import jinja2
-import yaml
 
 from biogrip import __version__
 from biogrip.digits import with_unit
 from biogrip.files import write_text
 from biogrip.identifiability.fit_status import DOUBTFUL, OK, REJECTED
-from biogrip.own_traces.curves import curves_of, normal_quantiles
-from biogrip.own_traces.one_trace import Identified
+from biogrip.own_traces.curves import normal_quantiles
+from biogrip.own_traces.on_page import json_in_page
 from biogrip.own_traces.outputs import WRITTEN_BY
 from biogrip.own_traces.strips import strips_of
-from biogrip.own_traces.words import (
-    POSTERIOR_OF_REJECTED,
-    evidence_in_words,
-    for_a_paper,
-    further_notes,
-    in_unit,
-    labels_of,
-    limits_in_short,
-    noise_in_words,
-    one_sided_in_words,
-    taken_for_granted,
-)
+from biogrip.own_traces.words import POSTERIOR_OF_REJECTED, in_unit, labels_of
 from biogrip.terminal import visible, visible_lines
 
 _STATUSES = {OK: "✓", DOUBTFUL: "!", REJECTED: "✕"}
 """Status of a fit, and its mark in the table."""
 _STYLES = (Path(__file__).parents[1] / "products/report/report.css", "traces.css")
-
-
-def for_page(identified: Identified) -> dict[str, Any]:
-    """Return the numbers and sentences of a trace on a page, as plain data."""
-    data = identified.data
-    compared = data["posterior"]["evidence"] if "posterior" in data else []
-    assumed = dict(data["assumed"])
-    # The page names the trace, and says once what several assume alike.
-    assumed["measurement"] = {**assumed["measurement"]}
-    assumed["measurement"].pop("file", None)
-    dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
-    curves = curves_of(identified)
-    return {
-        **data,
-        "trace": visible(data["trace"]),
-        **_cell_and_factors(data),
-        "curves": _json(curves),
-        "drawn_quantiles": len(curves["quantiles"]),
-        "corner": _corner(identified),
-        "noise_in_words": noise_in_words(data),
-        "further_notes": further_notes(data),
-        "for_a_paper": for_a_paper(data),
-        "in_short": {q["quantity"]: limits_in_short(q) for q in data["quantities"]},
-        "setup": yaml.dump(assumed, Dumper=dumper, sort_keys=False, allow_unicode=True),
-        "evidence_in_words": evidence_in_words(compared),
-        "one_sided": " ".join(one_sided_in_words([data])),
-        "granted": taken_for_granted(data) if data["by_default"] else None,
-    }
 
 
 def write_page(
@@ -86,6 +45,7 @@ def write_page(
         Result of `compare_groups` for groups of these traces, if they were compared.
     """
     here = Path(__file__).parent
+    traces = [{**each, **_cell_and_factors(each)} for each in traces]
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
@@ -105,8 +65,8 @@ def write_page(
         written_by=f"{WRITTEN_BY} {__version__}",
         style="".join((here / name).read_text(encoding="utf-8") for name in _STYLES),
         script=(here / "traces.js").read_text(encoding="utf-8"),
-        normal=_json(_normal(traces)),
-        strips=_json(strips_of(traces, groups)) if several and traces else "",
+        normal=json_in_page(_normal(traces)),
+        strips=json_in_page(strips_of(traces, groups)) if several and traces else "",
         columns={label: with_unit(label, units[label]) for label in labels_of(traces)},
         cells=any(each.get("cell") for each in traces),
         factors=_factors(traces),
@@ -121,12 +81,12 @@ def write_page(
     write_text(page, text)
 
 
-def _cell_and_factors(data: Mapping[str, Any]) -> dict[str, Any]:
+def _cell_and_factors(trace: Mapping[str, Any]) -> dict[str, Any]:
     """Return cell and factors that a sheet says of a trace, or nothing."""
-    if "cell" not in data:
+    if "cell" not in trace:
         return {}
-    factors = {visible(name): visible(level) for name, level in data["factors"].items()}
-    return {"cell": visible(data["cell"]), "factors": factors}
+    factors = {visible(name): visible(level) for name, level in trace["factors"].items()}
+    return {"cell": visible(trace["cell"]), "factors": factors}
 
 
 def _normal(traces: Sequence[Mapping[str, Any]]) -> dict[int, list[float]]:
@@ -164,26 +124,3 @@ def _compared(groups: Mapping[str, Any]) -> dict[str, Any]:
         ],
         "problem": groups.get("problem"),
     }
-
-
-def _corner(identified: Identified) -> str | None:
-    """Return a drawing of the posterior as a data URL, if there is one to be shown."""
-    data = identified.data
-    if identified.samples is None or data["fit"] == REJECTED:
-        return None
-    # Imported here: loading Matplotlib takes long.
-    from biogrip.products.figures.corner import draw_corner
-    from biogrip.products.figures.style import styled
-    from biogrip.products.pages.figure_address import figure_address
-
-    parameters = identified.problem.searched.parameters
-    with styled():
-        return figure_address(
-            draw_corner(parameters, identified.samples, data["posterior"], {}, "")
-        )
-
-
-def _json(data: Any) -> str:
-    """Return plain data as JSON that cannot close the script element around it."""
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return text.replace("<", "\\u003c")
