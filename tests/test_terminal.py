@@ -100,17 +100,18 @@ def test_names_of_cells_groups_and_their_traces_are_shown(
     config, table = tmp_path / "few.yaml", tmp_path / f"{FOUND}.csv"
     config.write_text(FEW)
     shutil.copy(EXAMPLE, tmp_path / f"a{FOUND}.csv")
+    (tmp_path / f"b{FOUND}.csv").write_text("no trace\n")
     rows = [["file", "cell", "group"], [f"b{FOUND}.csv", "b", "c"]]
     arguments = ["groups", str(table), "--config", str(config)]
     _write(table, rows)
     assert main(arguments) == 1
     error = capsys.readouterr().err
-    assert f"none of its traces can be used; the first: TRACE: found '{visible(tmp_path)}" in error
+    assert f"none of its traces can be used; the first: {visible(tmp_path)}" in error
     assert not OBEYED.search(error)
     _write(table, [*rows, [f"a{FOUND}.csv", f"cell {FOUND}", f"group {FOUND}"]])
     assert main(arguments) == 1
     said = capsys.readouterr().out
-    for text in (f"cell {FOUND} (group {FOUND})", f"  a{FOUND}.csv: noise", f"b{FOUND}.csv', all"):
+    for text in (f"cell {FOUND} (group {FOUND})", f"  a{FOUND}.csv: noise", f"b{FOUND}.csv, l"):
         assert visible(text) in said
     assert not OBEYED.search(said)
     (skipped,) = json.loads(table.with_suffix(".compared.json").read_text())["skipped"]

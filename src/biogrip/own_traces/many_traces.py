@@ -3,7 +3,6 @@
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -73,20 +72,17 @@ def identify_traces(
     processors = len(os.sched_getaffinity(0))
     size = min(_MOST_IN_BATCH, -(-len(options) // processors))
     batches = [slice(start, start + size) for start in range(0, len(options), size)]
-    found: dict[int, Outcome] = {}
+    found = []
     with worker_processes(min(processors, len(batches))) as processes:
-        jobs = {
-            processes.submit(identify_batch, options[own], outputs[own], page=page): place
-            for place, own in enumerate(batches)
-        }
-        done = 0
-        for job in as_completed(jobs):
-            place = jobs[job]
-            found[place] = job.result()
-            for own in options[batches[place]]:
-                done += 1
-                print(f"{done} of {len(options)}: {visible(own.trace)}", file=sys.stderr)
-    return _joined(found[place] for place in range(len(batches)))
+        jobs = [
+            processes.submit(identify_batch, options[own], outputs[own], page=page)
+            for own in batches
+        ]
+        for own, job in zip(batches, jobs, strict=True):
+            found.append(job.result())
+            for number, each in enumerate(options[own], start=own.start + 1):
+                print(f"{number} of {len(options)}: {visible(each.trace)}", file=sys.stderr)
+    return _joined(found)
 
 
 def _joined(outcomes: Iterable[Outcome]) -> Outcome:
