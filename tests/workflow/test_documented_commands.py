@@ -35,6 +35,7 @@ LEFT = {
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
         *("maxwell.json", "uncertain.json", "posterior.json", "posterior.parquet"),
     ],
+    "howto/dish.md": ["results/traces.html", "results/tables/group_differences.csv"],
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
     "howto/noise.md": [

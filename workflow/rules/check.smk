@@ -12,6 +12,7 @@ OVERLAYS = {
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     "measured": (["measured"], "all", "*"),
+    "dishes": (["dishes"], "all", "*"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 
