@@ -10,7 +10,7 @@ import numpy as np
 from biogrip.digits import rounded_numbers
 from biogrip.groups.group_findings import CellProfile, JudgedCell, QuantityProfile
 from biogrip.identifiability.profiles import Profile
-from biogrip.own_traces.fitted_traces import TraceToFit, every_trace, options_of
+from biogrip.own_traces.fitted_traces import TraceToFit, options_of, trace_of
 from biogrip.own_traces.judged_cells import CellJudge, CellResults
 from biogrip.own_traces.kept_results import (
     FOLDER,
@@ -26,9 +26,8 @@ from biogrip.products.plan import ROWS_A_BATCH, Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.source_files import fingerprint
 from biogrip.progress import Progress
-from biogrip.study.sheet import Cell, Row, Sheet, cells_of
+from biogrip.study.sheet import Cell
 from biogrip.study.study import Study
-from biogrip.study.traces_block import TracesBlock
 
 BATCHES = f"{FOLDER}/cells/batches/{{rows}}.csv"
 """Lists of the cells of a batch."""
@@ -129,33 +128,6 @@ def _profile(cell: str, plain: dict[str, Any]) -> QuantityProfile:
     return QuantityProfile(plain["quantity"], plain["unit"], own)
 
 
-def factor_of(block: TracesBlock) -> str | None:
-    """Return the factor that makes groups, or None if the sheet does not say which."""
-    factors = list(block.rows[0].factors) if block.rows else []
-    if block.by is not None or "group" in factors:
-        return block.by or "group"
-    return factors[0] if len(factors) == 1 else None
-
-
-def groups_of(study: Study) -> list[Cell]:
-    """Return the cells of a study's sheet with their groups; none if there are no groups.
-
-    Raises
-    ------
-    BiogripError
-        If a cell has no group, or two.
-    """
-    block = study.traces
-    if block is None or (factor := factor_of(block)) is None:
-        return []
-    path = Path(block.sheet)
-    rows = tuple(
-        Row(path, row.line, Path(row.file), row.cell, row.factors, row.settings)
-        for row in block.rows
-    )
-    return cells_of(Sheet(path, tuple(rows[0].factors), rows), factor)[1]
-
-
 def check_sheet(study: Study) -> None:
     """Check all rows of a study's sheet together with its config, and its groups.
 
@@ -166,28 +138,34 @@ def check_sheet(study: Study) -> None:
     """
     if traces := options_of(study):
         cases = cases_of(traces)
-        if groups_of(study):
+        if study.cells:
             refuse_mixed_models(traces, cases)
 
 
 def every_cell(study: Study) -> list[CellToFit]:
     """Return the cells of a study's sheet, if it has groups."""
-    traces = {own.file: own for own in every_trace(study)}
+    return _of_cells(study, slice(None))
+
+
+def _of_cells(study: Study, chosen: slice) -> list[CellToFit]:
+    block = study.traces
+    if block is None:
+        return []
     confidence = study.config.identifiability.confidence
     return [
-        CellToFit(cell.name, confidence, tuple(traces[str(row.file)] for row in cell.rows))
-        for cell in groups_of(study)
+        CellToFit(cell.name, confidence, tuple(trace_of(block, row) for row in cell.rows))
+        for cell in study.cells[chosen]
     ]
 
 
 def _to_fit(study: Study, job: Wildcards) -> list[CellToFit]:
     first = int(job["rows"])
-    return every_cell(study)[first : first + ROWS_A_BATCH]
+    return _of_cells(study, slice(first, first + ROWS_A_BATCH))
 
 
 def jobs_of_cells(plan: Plan) -> list[Wildcards]:
     """Return the batches of cells: the number of the first cell of each."""
-    count = len(groups_of(plan.study))
+    count = len(plan.study.cells)
     return [{"rows": str(start)} for start in range(0, count, ROWS_A_BATCH)]
 
 

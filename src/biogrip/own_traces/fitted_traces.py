@@ -1,6 +1,7 @@
 """Traces of a study's sheet, identified in batches: a file of results for each."""
 
 import hashlib
+import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -24,6 +25,7 @@ from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.source_files import fingerprint
 from biogrip.study.sheet import Row
 from biogrip.study.study import Study
+from biogrip.study.traces_block import RowBlock, TracesBlock
 
 BATCHES = f"{FOLDER}/batches/{{rows}}.csv"
 """Lists of the traces of a batch, with the files of their results."""
@@ -124,28 +126,40 @@ def _hash(file: Path) -> str:
 
 def every_trace(study: Study) -> list[TraceToFit]:
     """Return the traces of a study's sheet."""
+    return _of_rows(study, slice(None))
+
+
+def _of_rows(study: Study, chosen: slice) -> list[TraceToFit]:
     block = study.traces
-    if block is None:
-        return []
-    rows = block.rows
-    return [TraceToFit(row.file, block.model, block.given, row.settings) for row in rows]
+    return [] if block is None else [trace_of(block, row) for row in block.rows[chosen]]
+
+
+def trace_of(block: TracesBlock, row: RowBlock | Row) -> TraceToFit:
+    """Return the trace of a row of a study's sheet."""
+    return TraceToFit(str(row.file), block.model, block.given, row.settings)
 
 
 def options_of(study: Study) -> list[IdentifyOptions]:
-    """Return the options of all traces, with the lines of their rows for messages."""
+    """Return the options of the first trace of every setting, with lines for messages."""
     block = study.traces
     if block is None:
         return []
+    first: dict[str, RowBlock] = {}
+    for row in block.rows:
+        first.setdefault(json.dumps(row.settings, sort_keys=True), row)
     sheet = Path(block.sheet)
     return [
-        replace(own.options, row=Row(sheet, row.line, Path(row.file), row.cell, {}, row.settings))
-        for own, row in zip(every_trace(study), block.rows, strict=True)
+        replace(
+            trace_of(block, row).options,
+            row=Row(sheet, row.line, Path(row.file), row.cell, {}, row.settings),
+        )
+        for row in first.values()
     ]
 
 
 def _to_fit(study: Study, job: Wildcards) -> list[TraceToFit]:
     first = int(job["rows"])
-    return every_trace(study)[first : first + ROWS_A_BATCH]
+    return _of_rows(study, slice(first, first + ROWS_A_BATCH))
 
 
 def _files(plan: Plan, job: Wildcards) -> list[str]:

@@ -17,8 +17,6 @@ from biogrip.own_traces.fitted_cells import (
     BATCHES,
     CellToFit,
     every_cell,
-    factor_of,
-    groups_of,
     jobs_of_cells,
     read_cell,
 )
@@ -39,7 +37,7 @@ DATA = "results/traces/compared/groups.json"
 
 
 def _has_groups(study: Study) -> bool:
-    return bool(groups_of(study))
+    return bool(study.cells)
 
 
 @dataclass(frozen=True)
@@ -84,13 +82,13 @@ def compare(compared_cells: GroupsToCompare, batches: list[Path], data: Path) ->
 
 def _to_compare(study: Study, _: Wildcards) -> GroupsToCompare:
     assert study.traces is not None
-    cells, factor = groups_of(study), factor_of(study.traces)
-    groups = [cell.group for cell in cells]
-    return GroupsToCompare(study.traces.sheet, factor or "", every_cell(study), groups)
+    groups = [cell.group for cell in study.cells]
+    factor = study.group_factor or ""
+    return GroupsToCompare(study.traces.sheet, factor, every_cell(study), groups)
 
 
 def _jobs(plan: Plan) -> list[Wildcards]:
-    return [{}] if groups_of(plan.study) else []
+    return [{}] if plan.study.cells else []
 
 
 GROUPS = Product(

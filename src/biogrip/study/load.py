@@ -56,7 +56,8 @@ def load_study(
         If anything in the config cannot be used.
     """
     places = replace(read_places(files, command_line), over=tuple(over))
-    complete = _fill_in(schema_of(StudyConfig).with_numbers(_with_rows(config, files, places)))
+    numbered = schema_of(StudyConfig).with_numbers(config)
+    complete = _fill_in(_with_rows(numbered, files, places))
     return Study(checked_study(complete, places, for_workflow=for_workflow))
 
 
