@@ -7,7 +7,6 @@ from pathlib import Path
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.identifiability.fit_status import REJECTED
-from biogrip.own_traces.fitted_cells import groups_of
 from biogrip.own_traces.fitted_traces import BATCHES, TraceToFit, every_trace, read_every
 from biogrip.own_traces.groups_of_study import DATA
 from biogrip.own_traces.many_traces import Outcome, write_table
@@ -125,7 +124,7 @@ PAGE = Product(
     message="Writing the page of all traces",
     reads={
         "batches": EVERY_BATCH,
-        "groups": Reads(lambda plan, _: [DATA] if groups_of(plan.study) else []),
+        "groups": Reads(lambda plan, _: [DATA] if plan.study.cells else []),
     },
     category=CATEGORY,
     item="All traces",

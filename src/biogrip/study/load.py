@@ -98,7 +98,7 @@ def _with_rows(
     return filled if "cases" in given else {**filled, "cases": {}, "reconstructed": []}
 
 
-def _fill_in(config: dict[str, Any]) -> dict[str, Any]:
+def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:
     """Merge the study's blocks into every case; drop cases set to nothing."""
     cases = config.get("cases")
     if not isinstance(cases, dict):
