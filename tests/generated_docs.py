@@ -197,7 +197,7 @@ def _statuses(rows: pd.DataFrame) -> dict[str, str]:
         one = of.iloc[0]
         wrong = one["rejected_percent"] + one["refused_percent"]
         shares = (one["ok_percent"], one["doubtful_percent"], wrong)
-        found[f"ok / doubtful / rejected, {name}"] = " / ".join(f"{share:.0f}" for share in shares)
+        found[f"ok / doubtful / rejected, {name}"] = "/".join(f"{share:.0f}" for share in shares)
     for name, of in (("white", white), ("coloured", coloured)):
         held = of["coverage_percent"].dropna()
         found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""

@@ -6,7 +6,11 @@ PUBLISHED = Path(workflow.basedir) / "results" / "published"
 # the rule that makes it, and its names.
 OVERLAYS = {
     "robustness": (["robustness"], "all_maps", "robustness_*"),
-    "interpretations": (["interpretations"], "interpretations", "interpretations"),
+    "interpretations": (
+        ["interpretations"],
+        "interpretations interpretations_jointly",
+        "interpretations*",
+    ),
     "design": (["design", "designed"], "all_designs", "designed*"),
     "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),

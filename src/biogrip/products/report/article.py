@@ -36,6 +36,7 @@ SWEEP_TABLES = (
     "coverage/tables/verdict_counts.csv",
     "design/tables/designed.csv",
     "interpretations/tables/interpretations.csv",
+    "interpretations/tables/interpretations_jointly.csv",
     "robustness/tables/robustness_gripper.csv",
     "robustness/tables/robustness_noise.csv",
     "sequential/tables/sequential.csv",

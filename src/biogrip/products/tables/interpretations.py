@@ -5,22 +5,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from biogrip.arrays import BoolArray
 from biogrip.experiment.sample import SINGLE_BRANCH
 from biogrip.experiment.truth import Truth
 from biogrip.identify.success import near_noise, near_noise_words
 from biogrip.products.files.interpretations import INTERPRETATIONS
 from biogrip.products.product import of_cases
 from biogrip.products.stages.interpretations import read_cases
+from biogrip.products.tables.closeness import COMPARED, as_small, compared_parameters
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.uses import each, from_study
 from biogrip.study.study import Study
-
-# Parameters compared jointly with the paper's values; c_p is left out as undetermined.
-_ALL = ("k", "k_p", "c")
-# Relative rounding error of the paper's values.
-_ROUNDING = 0.005
 
 
 def interpretations(study: Study, found: list[Path]) -> Table:
@@ -36,7 +31,7 @@ def interpretations(study: Study, found: list[Path]) -> Table:
         Column("interpretation", "Interpretation"),
         Column("seeds", "Seeds"),
         Column("near_noise_share", f"Share {words}", 2),
-        Column("as_close_share", f"Share as close as the paper in {', '.join(_ALL)}", 2),
+        Column("as_close_share", f"Share as close as the paper in {', '.join(COMPARED)}", 2),
         *(Column(f"error_percent {p.name}", f"Error {p.name} %", 2) for p in SINGLE_BRANCH),
         Column("last_improvement", "Last improvement", 3),
     )
@@ -58,34 +53,19 @@ def _rows(study: Study, case: str, truth: Truth, found: pd.DataFrame) -> list[tu
             for p in SINGLE_BRANCH
             if truth.parameters.get(p.name)
         }
-        close = _as_close(truth, mine)
+        compared = compared_parameters(truth)
         rows.append(
             (
                 case,
                 title,
                 len(mine),
                 float(near_noise(mine, study.near_noise_tolerance).mean()),
-                None if close is None else float(close.mean()),
+                float(as_small(truth, mine).mean()) if compared else None,
                 *(_median(errors.get(p.name)) for p in SINGLE_BRANCH),
                 float(mine["last_improvement"].median()),
             )
         )
     return rows
-
-
-def _as_close(truth: Truth, found: pd.DataFrame) -> BoolArray | None:
-    """Return True for each seed as close to the truth as the paper in compared parameters."""
-    published = truth.published.identified
-    columns = {p.name: p.column for p in SINGLE_BRANCH}
-    names = [name for name in _ALL if name in published and truth.parameters.get(name)]
-    if not names:
-        return None
-    within = [
-        np.abs(found[columns[name]].to_numpy(float) - truth.parameters[name])
-        <= abs(published[name] - truth.parameters[name]) + _ROUNDING * truth.parameters[name]
-        for name in names
-    ]
-    return np.all(within, axis=0)
 
 
 def _median(errors: "np.ndarray | None") -> float | None:
