@@ -292,6 +292,7 @@ def simulated_dishes() -> str:
         {
             "quantity": row["quantity"],
             "samples (Hz)": f"{row['rate_Hz']:g}",
+            "c_p": row["c_p"],
             "cells that determine it": _percent(row["determined_percent"]),
             "error": f"{row['error']:.2g}",
             "ratio held": f"{row['coverage_percent']:.1f} %",

@@ -8,15 +8,17 @@ import pandas as pd
 import pytest
 
 from tests.helpers import populations_campaign
-from tests.helpers.groups_campaign import QUANTITIES, TABLE, counted, dishes
+from tests.helpers.groups_campaign import SETTINGS, TABLE, counted, dishes
 from tests.helpers.ranks_campaign import DISHES, rows
 from tests.helpers.ranks_campaign import TABLE as RANKS
+
+SLOW = SETTINGS["1 Hz"]
 
 
 def test_cells_are_known_as_well_as_they_say() -> None:
     """And what is said of a pair does not depend on which others are simulated with it."""
-    found = dishes([0, 1], 1.0, 5)
-    (alone,) = dishes([1], 1.0, 5)
+    found = dishes([0, 1], SLOW, 5)
+    (alone,) = dishes([1], SLOW, 5)
     for together, own in zip(found[1], alone, strict=True):
         for one, other in zip(together, own, strict=True):
             for ours, theirs in zip(one.cells, other.cells, strict=True):
@@ -26,7 +28,7 @@ def test_cells_are_known_as_well_as_they_say() -> None:
                 )
                 assert np.array_equal(ours.profile.increases, theirs.profile.increases)
     # At this rate the interval of k, the first, is skewed, and no multiple of a deviation.
-    for index in range(1, len(QUANTITIES)):
+    for index in range(1, len(SLOW.quantities)):
         own = [dish[index] for pair in found for dish in pair]
         away = np.array(
             [
@@ -42,8 +44,8 @@ def test_cells_are_known_as_well_as_they_say() -> None:
 
 
 def test_pairs_are_counted() -> None:
-    table = counted(dishes([3], 1.0, 4), 1.0, 4)
-    assert list(table["quantity"]) == [quantity.label for quantity in QUANTITIES]
+    table = counted(dishes([3], SLOW, 4), SLOW, 4)
+    assert list(table["quantity"]) == [quantity.label for quantity in SLOW.quantities]
     assert set(table["coverage_percent"]) <= {0.0, 100.0}
 
 

@@ -1,7 +1,8 @@
 """Whether differences between dishes hold the truth, on simulated dishes from traces to verdicts.
 
-``python -m tests.helpers.groups_campaign [pairs [rate_Hz ...]]`` takes some 15 minutes for 500
-pairs at one rate, and writes the table that the documentation shows. The test suite has a few.
+``python -m tests.helpers.groups_campaign [pairs [setting ...]]`` takes some 15 minutes for 500
+pairs of one of `SETTINGS`, and writes the table that the documentation shows, other settings as
+they are there. The test suite has a few.
 """
 
 import sys
@@ -15,6 +16,7 @@ import pandas as pd
 from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.protocol import sample_times
+from biogrip.experiment.sample import SampleModel, with_fixed
 from biogrip.groups.comparison import difference
 from biogrip.groups.group_findings import CellProfile, population_of
 from biogrip.groups.population import Interval
@@ -30,10 +32,43 @@ from tests.helpers.problems import GRIPPER, MODEL, RANGES, SAMPLES, TORQUE, cond
 
 TABLE = ROOT / "results" / "published" / "groups" / "tables" / "dishes.csv"
 CELL = SAMPLES["endothelial_cell"]
-QUANTITIES = [q for q in parameters_and_sum(MODEL) if q.label in ("k", "k_p", "c + c_p")]
 CELLS, SPREAD, RATIO, CONFIDENCE = 10, 0.3, 1.5, 0.95
 NOISE = Noise("gaussian", 0.1, "peak")
 PAIRS_AT_ONCE = 5
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What cells are measured and identified with.
+
+    Parameters
+    ----------
+    rate_Hz
+        Sampling rate.
+    without_c_p
+        True if c_p, which is next to nothing in these cells, is known to be none.
+    """
+
+    rate_Hz: float
+    without_c_p: bool = False
+
+    @property
+    def model(self) -> SampleModel:
+        """Model that is identified."""
+        return with_fixed(MODEL, {"c_p": 0.0} if self.without_c_p else {})
+
+    @property
+    def quantities(self) -> list[Quantity]:
+        """Quantities that are compared."""
+        names = ("k", "k_p", "c" if self.without_c_p else "c + c_p")
+        return [q for q in parameters_and_sum(self.model) if q.label in names]
+
+
+SETTINGS = {
+    "10 Hz": Setting(10.0),
+    "1 Hz": Setting(1.0),
+    "1 Hz without c_p": Setting(1.0, without_c_p=True),
+}
 
 
 @dataclass(frozen=True)
@@ -44,7 +79,7 @@ class Dish:
     cells: list[CellProfile]
 
 
-def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[list[list[Dish]]]:
+def dishes(pairs: Sequence[int], setting: Setting, cells: int = CELLS) -> list[list[list[Dish]]]:
     """Simulate pairs of dishes; by pair, by dish (the first has the larger values), by quantity.
 
     The parameters of a dish's cells are log-normal about those of the paper's cell, all but c_p
@@ -52,7 +87,12 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
     """
     truth = np.log([CELL[name] for name in MODEL.names])
     varied = np.array([name != "c_p" for name in MODEL.names])
-    times = sample_times(400.0, rate_Hz)
+    times, model, quantities = (
+        sample_times(400.0, setting.rate_Hz),
+        setting.model,
+        setting.quantities,
+    )
+    searched = [MODEL.names.index(name) for name in model.names]
     condensed = condensed_of(TORQUE, times)
     logs, problems = [], []
     for pair in pairs:
@@ -67,7 +107,7 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
             problems += [
                 make_problem(
                     GRIPPER,
-                    MODEL,
+                    model,
                     TORQUE,
                     times,
                     add_noise(clean, NOISE, rng),
@@ -84,13 +124,19 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
                 problem, np.log(each.parameters), each.misfit_rad, confidence=CONFIDENCE
             )
             for problem, each in zip(problems, found, strict=True)
-        ]
+        ],
+        quantities,
     )
     return [
         [
             [
-                _dish(quantity, q, logs[2 * p + d], judged[(2 * p + d) * cells :][:cells])
-                for q, quantity in enumerate(QUANTITIES)
+                _dish(
+                    quantity,
+                    q,
+                    logs[2 * p + d][:, searched],
+                    judged[(2 * p + d) * cells :][:cells],
+                )
+                for q, quantity in enumerate(quantities)
             ]
             for d in range(2)
         ]
@@ -98,16 +144,18 @@ def dishes(pairs: Sequence[int], rate_Hz: float, cells: int = CELLS) -> list[lis
     ]
 
 
-def profiles(likelihoods: list[Likelihood]) -> list[list[tuple[Likelihood, Profile]]]:
-    """Profiles of the quantities, followed again where one has led deeper."""
-    own = compute_profiles(likelihoods, QUANTITIES, smooth=False)
+def profiles(
+    likelihoods: list[Likelihood], quantities: Sequence[Quantity]
+) -> list[list[tuple[Likelihood, Profile]]]:
+    """Profiles of quantities, followed again where one has led deeper."""
+    own = compute_profiles(likelihoods, quantities, smooth=False)
     for index, likelihood in enumerate(likelihoods):
         lowest = min(own[index], key=lambda each: float(each.increases.min()))
         if lowest.increases.min() < -MISSED:
             deeper = refitted(likelihood, lowest.lowest, CONFIDENCE)
             if deeper is not None:
                 likelihoods[index] = deeper
-                own[index] = compute_profiles([deeper], QUANTITIES, smooth=False)[0]
+                own[index] = compute_profiles([deeper], quantities, smooth=False)[0]
     return [
         [(likelihood, each) for each in some]
         for likelihood, some in zip(likelihoods, own, strict=True)
@@ -129,10 +177,10 @@ def held_by(interval: Interval, truth: float) -> bool:
     return interval.low <= truth <= interval.high
 
 
-def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -> pd.DataFrame:
+def counted(found: list[list[list[Dish]]], setting: Setting, cells: int = CELLS) -> pd.DataFrame:
     """Count how often intervals hold the truth and differences are seen, a row a quantity."""
     rows = []
-    for q, quantity in enumerate(QUANTITIES):
+    for q, quantity in enumerate(setting.quantities):
         held, seen, spreads, shrunk, widths = [], [], [], [], []
         determined = []
         for first, second in ((one[q], other[q]) for one, other in found):
@@ -152,7 +200,8 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
         rows.append(
             {
                 "quantity": quantity.label,
-                "rate_Hz": rate_Hz,
+                "rate_Hz": setting.rate_Hz,
+                "c_p": "none" if setting.without_c_p else "fitted",
                 "cells": cells,
                 "spread": SPREAD,
                 "ratio": RATIO,
@@ -169,17 +218,19 @@ def counted(found: list[list[list[Dish]]], rate_Hz: float, cells: int = CELLS) -
     return pd.DataFrame(rows)
 
 
-def main(pairs: int, rates_Hz: list[float]) -> None:
+def main(pairs: int, names: Sequence[str]) -> None:
     """Write the table, and print it."""
-    tables = []
-    for rate_Hz in rates_Hz:
-        found = []
+    tables = dict(iter(pd.read_csv(TABLE).groupby(["rate_Hz", "c_p"])))
+    for name in names:
+        found, setting = [], SETTINGS[name]
         for start in range(0, pairs, PAIRS_AT_ONCE):
-            found += dishes(range(start, min(pairs, start + PAIRS_AT_ONCE)), rate_Hz)
-            print(f"{rate_Hz:g} Hz: {len(found)} of {pairs} pairs", flush=True)
-        tables.append(counted(found, rate_Hz))
-        print(tables[-1].to_string(index=False), flush=True)
-    write(pd.concat(tables), TABLE)
+            found += dishes(range(start, min(pairs, start + PAIRS_AT_ONCE)), setting)
+            print(f"{name}: {len(found)} of {pairs} pairs", flush=True)
+        own = counted(found, setting)
+        tables[setting.rate_Hz, own["c_p"].iloc[0]] = own
+        print(own.to_string(index=False), flush=True)
+    order = [(each.rate_Hz, "none" if each.without_c_p else "fitted") for each in SETTINGS.values()]
+    write(pd.concat([tables[key] for key in order if key in tables]), TABLE)
 
 
 def write(table: pd.DataFrame, path: Path) -> None:
@@ -189,7 +240,4 @@ def write(table: pd.DataFrame, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(
-        int(sys.argv[1]) if len(sys.argv) > 1 else 500,
-        [float(rate) for rate in sys.argv[2:]] or [10.0, 1.0],
-    )
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 500, sys.argv[2:] or list(SETTINGS))
