@@ -100,7 +100,9 @@ def test_a_study_says_of_a_trace_what_the_command_says(lab: Path) -> None:
     run(lab)
     (lab / "own.yaml").write_text(CONFIG.partition("\n")[2])
     for name, more in (("a", []), ("b", ["--noise", "1e-6"])):
-        done = biogrip(lab, "identify", f"{name}.csv", "--config", "own.yaml", *more)
+        # A sheet in the config is meant for the study.
+        config = "lab.yaml" if name == "a" else "own.yaml"
+        done = biogrip(lab, "identify", f"{name}.csv", "--config", config, *more)
         assert done.returncode == 0, done.stderr
         alone = json.loads((lab / f"{name}.identified.json").read_text())
         (file,) = (lab / "results" / "traces").glob(f"{name}-*.json")
@@ -129,6 +131,11 @@ def test_a_sheet_that_cannot_be_used_stops_with_line_and_column(lab: Path) -> No
     done = called(lab, "run", "lab.yaml", "-j2")
     assert done.status != 0
     assert "cells.tsv, line 3, column 'measurement.noise_rad': found" in done.output
+    (lab / "cells.tsv").write_text(SHEET)
+    (lab / "a{b}.csv").write_bytes((lab / "a.csv").read_bytes())
+    (lab / "cells.tsv").write_text(replaced(SHEET, "a.csv", "a{b}.csv"))
+    done = called(lab, "run", "lab.yaml", "-j2")
+    assert "cells.tsv, line 2, column 'file': found 'a{b}.csv', allowed is a name" in done.output
     (lab / "cells.tsv").write_text(SHEET)
     (lab / "lab.yaml").write_text("traces: {sheet: cells.tsv, rows: []}\n")
     done = called(lab, "run", "lab.yaml", "-j2")

@@ -379,9 +379,9 @@ def study_of(options: IdentifyOptions) -> Study:
         measured = laid_over(read_as.over(measured), own)
         merged["measurement"] = measured | {"file": str(options.trace)}
         merged = with_instrument(merged, options.given, read_as, options.trace)
-    # Cases of the config are meant for the workflow, and named blocks are in the settings.
-    merged.pop("only", None)
-    merged.pop("blocks", None)
+    # Cases and a sheet of the config are meant for the workflow; blocks are in the settings.
+    for name in ("only", "blocks", "traces"):
+        merged.pop(name, None)
     if options.posterior:
         merged.setdefault("posterior", {})
     merged["cases"] = {

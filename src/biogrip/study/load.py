@@ -12,11 +12,13 @@ from biogrip.study.named_blocks import KEY as BLOCKS
 from biogrip.study.named_blocks import read_named_blocks
 from biogrip.study.schema import schema_of
 from biogrip.study.sheet import read_sheet
+from biogrip.study.sheet_text import FILE
 from biogrip.study.source import ConfigFiles, KeyPath, overlaid, read_config, read_places
 from biogrip.study.study import Study
 from biogrip.study.traces_block import KEY as TRACES
 from biogrip.study.traces_block import READ
-from biogrip.study.validation import checked_study
+from biogrip.study.validation import brackets_problem, checked_study
+from biogrip.traces.columns import place as place_of
 
 # Keys that say nothing of recorded traces.
 _NOT_OF_TRACES = (TRACES, BLOCKS, "cases", "only", "seeds", "batch_size", "sweeps")
@@ -83,6 +85,9 @@ def _with_rows(
     blocks = read_named_blocks(naming[-1] if naming else None)
     sheet = read_sheet(Path(block["sheet"]), blocks)
     blocks.refuse_unused(sheet.named)
+    for row in sheet.rows:
+        if problem := brackets_problem(str(row.file)):
+            raise BiogripError(f"{place_of(sheet.path, row.line, FILE)}: {problem}")
     rows = [
         {
             "file": str(row.file),

@@ -163,10 +163,15 @@ def _reading_problems(study: StudyConfig) -> Iterator[Problem]:
             yield ("interpretations", interpretation, "changes", *path), text
 
 
+def brackets_problem(file: str) -> str | None:
+    """Return what is wrong with the path of a trace that Snakemake would read as wildcards."""
+    if any(bracket in file for bracket in "{}<>"):
+        return f"found '{file}', allowed is a name without {{ }} < >: Snakemake fills them in."
+    return None
+
+
 def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
     """Find paths of traces that Snakemake would read as wildcards."""
     for name, case in cases.items():
-        file = case.measurement.file or ""
-        if any(bracket in file for bracket in "{}<>"):
-            text = f"found '{file}', allowed is a name without {{ }} < >: Snakemake fills them in."
-            yield ("cases", name, "measurement", "file"), text
+        if problem := brackets_problem(case.measurement.file or ""):
+            yield ("cases", name, "measurement", "file"), problem
