@@ -4,6 +4,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ from biogrip.products.files.rows import write_rows
 from biogrip.products.plan import ROWS_A_BATCH, Plan, Wildcards
 from biogrip.products.product import Product, Reads, Weight
 from biogrip.products.source_files import fingerprint
+from biogrip.study.defaults import default_config
+from biogrip.study.load import NOT_OF_TRACES, read_configs
 from biogrip.study.sheet import Row
 from biogrip.study.study import Study
 from biogrip.study.traces_block import RowBlock, TracesBlock
@@ -46,6 +49,8 @@ class TraceToFit:
     """Blocks that the config gives."""
     settings: Mapping[str, Any]
     """Blocks of its row."""
+    default: str
+    """Digest of the default study, which holds where neither says otherwise."""
 
     @property
     def results(self) -> Path:
@@ -136,7 +141,14 @@ def _of_rows(study: Study, chosen: slice) -> list[TraceToFit]:
 
 def trace_of(block: TracesBlock, row: RowBlock | Row) -> TraceToFit:
     """Return the trace of a row of a study's sheet."""
-    return TraceToFit(str(row.file), block.model, block.given, row.settings)
+    return TraceToFit(str(row.file), block.model, block.given, row.settings, _default())
+
+
+@cache
+def _default() -> str:
+    """Return a digest of what the default study says of traces."""
+    said = read_configs([default_config()])
+    return digest({key: said[key] for key in said if key not in NOT_OF_TRACES})
 
 
 def options_of(study: Study) -> list[IdentifyOptions]:

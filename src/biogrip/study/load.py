@@ -20,8 +20,8 @@ from biogrip.study.traces_block import READ
 from biogrip.study.validation import brackets_problem, checked_study
 from biogrip.traces.columns import place as place_of
 
-# Keys that say nothing of recorded traces.
-_NOT_OF_TRACES = (TRACES, BLOCKS, "cases", "only", "seeds", "batch_size", "sweeps")
+NOT_OF_TRACES = (TRACES, BLOCKS, "cases", "only", "seeds", "batch_size", "sweeps")
+"""Keys that say nothing of recorded traces."""
 
 
 def read_configs(files: Iterable[Path]) -> dict[str, Any]:
@@ -98,7 +98,7 @@ def _with_rows(
         }
         for row in sheet.rows
     ]
-    kept = {key: value for key, value in given.items() if key not in _NOT_OF_TRACES}
+    kept = {key: value for key, value in given.items() if key not in NOT_OF_TRACES}
     filled = {**config, TRACES: {**block, "rows": rows, "given": kept}}
     return filled if "cases" in given else {**filled, "cases": {}, "reconstructed": []}
 
