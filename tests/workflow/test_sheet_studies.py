@@ -3,13 +3,10 @@
 import json
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 
-from biogrip.experiment.sample import CANDIDATES
-from biogrip.response.simulation import simulated_rotation
-from tests.helpers.default import STUDY
+from tests.helpers.drops import write_trace
 from tests.helpers.runs import Run, biogrip, called, replaced, snakemake
 
 SHEET = """file\tcell\tdish\tmeasurement.noise_rad
@@ -21,16 +18,6 @@ CONFIG = """traces: cells.tsv
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, liquid_drop]}
 """
-
-
-def trace(file: Path, seed: int) -> None:
-    """Write a trace of a liquid drop in noise, of 120 readings."""
-    case = STUDY.cases["liquid_drop_1"].problem
-    time_s = np.linspace(0, 400, 120)
-    network = CANDIDATES["liquid_drop"].model.network(np.array([[20.0 + seed, 5.0, 300.0]]))
-    clean = simulated_rotation(case.gripper, network, case.torque, time_s, nonlinear=False)[0]
-    noisy = clean + 1e-6 * np.random.default_rng(seed).standard_normal(len(time_s))
-    np.savetxt(file, np.c_[time_s, noisy], "%.9g", ",", header="time_s,rotation_rad", comments="")
 
 
 def run(folder: Path) -> Run:
@@ -52,7 +39,7 @@ def results(folder: Path) -> dict[str, tuple[bytes, int]]:
 @pytest.fixture
 def lab(tmp_path: Path) -> Path:
     for seed, name in enumerate("abc"):
-        trace(tmp_path / f"{name}.csv", seed)
+        write_trace(tmp_path / f"{name}.csv", seed)
     (tmp_path / "cells.tsv").write_text(SHEET)
     (tmp_path / "lab.yaml").write_text(CONFIG)
     return tmp_path
@@ -73,7 +60,7 @@ def test_only_what_is_new_or_has_changed_is_fitted(lab: Path) -> None:
     again = snakemake(lab, "-n", config=CONFIG)
     assert "Nothing to be done" in again.output, again.output
 
-    trace(lab / "new.csv", 3)
+    write_trace(lab / "new.csv", 3)
     lines = replaced(SHEET, "b.csv", "new.csv\tnew\tB\t\nb.csv")
     (lab / "cells.tsv").write_text(replaced(lines, "third\tB", "third\tC"))
     run(lab)
@@ -81,7 +68,7 @@ def test_only_what_is_new_or_has_changed_is_fitted(lab: Path) -> None:
     assert {name for name in more if more[name] != first.get(name)} == {"new"}
     assert table(lab)["dish"].to_dict() == {"first": "A", "new": "B", "second": "A", "third": "C"}
 
-    trace(lab / "a.csv", 4)
+    write_trace(lab / "a.csv", 4)
     (lab / "cells.tsv").write_text(replaced(lines, "third\tB\t", "third\tC\t2e-6"))
     run(lab)
     changed = results(lab)
@@ -121,7 +108,7 @@ def test_a_trace_that_cannot_be_read_is_a_row_that_says_so(lab: Path) -> None:
     asked = called(lab, "make", "traces_ok")
     assert asked.status == 1
     assert "b.csv" in asked.output
-    trace(lab / "b.csv", 1)
+    write_trace(lab / "b.csv", 1)
     run(lab)
     assert called(lab, "make", "traces_ok").status == 0
 
@@ -147,7 +134,7 @@ def test_a_sheet_that_cannot_be_used_stops_with_line_and_column(lab: Path) -> No
 def test_groups_of_a_study_are_those_of_the_command(lab: Path) -> None:
     """Medians, limits and differences, from the same sheet; replicates are fitted jointly."""
     for seed, name in enumerate(("d", "e", "f", "g"), 10):
-        trace(lab / f"{name}.csv", seed)
+        write_trace(lab / f"{name}.csv", seed)
     rows = "".join(f"{file}.csv\t{cell}\tB\t\n" for file, cell in zip("defg", "vwxx", strict=True))
     (lab / "cells.tsv").write_text(SHEET + rows)
     run(lab)
@@ -172,7 +159,7 @@ def test_groups_of_a_study_are_those_of_the_command(lab: Path) -> None:
     assert "Medians and spreads of the groups" in page
 
     before = {file: file.read_bytes() for file in (lab / "results/traces/cells").glob("*.json")}
-    trace(lab / "f.csv", 20)
+    write_trace(lab / "f.csv", 20)
     run(lab)
     after = {file: file.read_bytes() for file in before}
     assert {file.name[0] for file in before if before[file] != after[file]} == {"x"}

@@ -7,14 +7,15 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, chdir
 from pathlib import Path
 
 import pytest
 
-from tests.helpers.default import study_of
+from biogrip.study.load import load_study, read_configs
+from tests.helpers.drops import write_trace
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
-from tests.helpers.places import ROOT
+from tests.helpers.places import CONFIG, ROOT
 from tests.helpers.required import cannot_run
 from tests.helpers.runs import snakemake, tables
 from tests.helpers.slurm.cluster import SlurmError, missing_packages, one_node_slurm
@@ -64,20 +65,33 @@ model_selection: {models: []}
 cases:
   endothelial_cell: null
   liquid_drop_1: null
+traces: cells.tsv
+"""
+SHEET = """file,cell,measurement.noise_rad
+first.csv,a,
+second.csv,b,1e-6
 """
 
 
 def test_slurm_gives_the_same_bytes(tmp_path: Path, slurm: dict[str, str]) -> None:
-    """Even if a job is lost on the way."""
+    """Even if a job is lost on the way, and a sheet is edited meanwhile."""
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
-    study = study_of(FEW_JOBS)
-    # Of a case, whose jobs are submitted in groups, and one that is submitted alone.
+    for folder in (here, there):
+        (folder / "cells.tsv").write_text(SHEET)
+        for seed, name in enumerate(("first", "second")):
+            write_trace(folder / f"{name}.csv", seed)
+        (folder / "overlay.yaml").write_text(FEW_JOBS)
+    with chdir(here):
+        files = [CONFIG, here / "overlay.yaml"]
+        study = load_study(read_configs(files), files)
+    # Of a case, whose jobs are submitted in groups, one that is submitted alone, and of a sheet.
     wanted = sorted(
         file
         for file in inputs_and_outputs(study)[1]
-        if file.startswith("results/tables/") and Path(file).stem.endswith(("_2", "contact_loss"))
+        if file.startswith("results/tables/")
+        and Path(file).stem.endswith(("_2", "contact_loss", "traces"))
     )
     make_in_process(here, study, wanted)
     arguments = (*wanted, "--profile", "profiles/slurm", *SITE, "--config", "batch_size=2")
@@ -85,6 +99,8 @@ def test_slurm_gives_the_same_bytes(tmp_path: Path, slurm: dict[str, str]) -> No
         running = pool.submit(snakemake, there, *arguments, config=FEW_JOBS, environment=slurm)
         while not running.done() and not _cancel_a_batch(slurm):
             time.sleep(0.2)
+        # Rows are those that the run was planned with, also of the job that starts again.
+        (there / "cells.tsv").write_text("file\nlate.csv\n")
         run = running.result()
     assert run.status == 0, run.output
     assert run.output.count("Trying to restart job") == 1

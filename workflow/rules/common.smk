@@ -13,7 +13,7 @@ from biogrip.products.stages.recording import check_traces
 from biogrip.running import preparation
 from biogrip.running.locks import sign_locks
 from biogrip.running.provenance import Provenance
-from biogrip.running.resolved import write_study
+from biogrip.running.resolved import read_study, write_study
 from biogrip.running.rules import (
     GROUPS,
     ProductRule,
@@ -39,17 +39,21 @@ with message_only():
 configfile: DEFAULT_CONFIG
 
 
+RESULTS = Path("results")
+
 with message_only():
-    STUDY = load_study(
-        config,
-        files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
-        command_line=workflow.config_settings.config,
-    )
     if workflow.exec_mode == ExecMode.DEFAULT:
+        STUDY = load_study(
+            config,
+            files=[DEFAULT_CONFIG, *workflow.overwrite_configfiles],
+            command_line=workflow.config_settings.config,
+        )
         check_traces(STUDY)
         check_sheet(STUDY)
+    else:
+        # On another node: what the run was planned with, without reading a long sheet again.
+        STUDY = read_study(RESULTS)
 
-RESULTS = Path("results")
 PLAN = Plan(STUDY, RESULTS)
 RULES = make_rules(products().values(), PLAN)
 ALL_FILES = files_of(RULES)
