@@ -408,6 +408,7 @@ def compared(dish: list[dict[str, Any]]) -> dict[str, Any]:
                 "detectable_ratio": 1.5,
             }
         ],
+        "rejected": [],
         "doubtful": [],
         "differences_without_doubtful": [],
     }

@@ -52,6 +52,7 @@ LEFT = {
 }
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
+    "config/dishes.yaml": ["results/traces.html", "results/tables/group_differences.csv"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
 # A trace fitted from few starts, with few models, of which the chosen one has two parameters unless
