@@ -30,6 +30,7 @@ from biogrip.worker_processes import worker_processes
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _OF_QUANTITY = ("verdict", "value", "low", "high")
+_OF_TRACE = "trace", "fit", "model", "samples", "noise_rad", "misfit_rad", "fixed", "reads"
 
 
 @dataclass(frozen=True)
@@ -216,6 +217,15 @@ def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None
         for trace in outcome.refused
     ]
     write_rows(table, header, rows)
+
+
+def for_table(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return of the data of a trace what `write_table` writes."""
+    kept = {name: found[name] for name in (*_OF_TRACE, WRITTEN_BY) if name in found}
+    of_quantity = ("quantity", "unit", *_OF_QUANTITY)
+    quantities = [{name: own[name] for name in of_quantity} for own in found["quantities"]]
+    models = [own for own in found["models"] if own["delta_bic"] == 0]
+    return {**kept, "quantities": quantities, "models": models}
 
 
 def _of_row(rows_of: Mapping[str, Row], trace: str, factors: Sequence[str]) -> list[str]:

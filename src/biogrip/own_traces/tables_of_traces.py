@@ -1,15 +1,22 @@
 """Table and page of the traces of a study's sheet."""
 
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from biogrip.errors import BiogripError
 from biogrip.files import write_text
 from biogrip.identifiability.fit_status import REJECTED
-from biogrip.own_traces.fitted_traces import BATCHES, TraceToFit, every_trace, read_every
+from biogrip.own_traces.fitted_traces import (
+    BATCHES,
+    FittedTrace,
+    TraceToFit,
+    every_trace,
+    read_every,
+)
 from biogrip.own_traces.groups_of_study import DATA
-from biogrip.own_traces.many_traces import Outcome, write_table
+from biogrip.own_traces.many_traces import Outcome, for_table, write_table
 from biogrip.own_traces.page import write_page
 from biogrip.products.plan import Plan, Wildcards
 from biogrip.products.product import Product, Reads
@@ -37,20 +44,15 @@ class TracesShown:
             for own, cell, factors in rows
         }
 
-    @property
-    def outcome(self) -> Outcome:
-        """Results of all traces, with their cells and factors."""
-        outcome = Outcome([], {})
+    def results(self) -> Iterator[tuple[str, FittedTrace]]:
+        """Yield the results of each trace, with its cell and factors, by file."""
         rows = self.rows
         for own, results in zip(self.traces, read_every(self.traces), strict=True):
             row = rows[own.file]
             said = {"cell": row.cell, "factors": dict(row.factors)}
-            if results.data is None or results.on_page is None:
-                outcome.refused[own.file] = results.refused or ""
-            else:
-                outcome.found.append({**results.data, **said})
-                outcome.on_page.append({**results.on_page, **said})
-        return outcome
+            data = results.data and {**results.data, **said}
+            on_page = results.on_page and {**results.on_page, **said}
+            yield own.file, FittedTrace(data, on_page, results.refused)
 
 
 def shown(study: Study) -> TracesShown:
@@ -63,14 +65,26 @@ def shown(study: Study) -> TracesShown:
 
 def list_traces(traces: TracesShown, batches: list[Path], csv: Path) -> None:
     """Write a row for each trace: its fit, verdicts, values and limits."""
-    write_table(traces.outcome, csv, traces.rows)
+    outcome = Outcome([], {})
+    for file, results in traces.results():
+        if results.data is None:
+            outcome.refused[file] = results.refused or ""
+        else:
+            # Of very many traces all data would fill the memory.
+            outcome.found.append(for_table(results.data))
+    write_table(outcome, csv, traces.rows)
 
 
 def show_traces(traces: TracesShown, batches: list[Path], groups: list[Path], page: Path) -> None:
     """Write the page of all traces, with the comparison of groups if there are any."""
-    outcome = traces.outcome
+    on_page, refused = [], {}
+    for file, results in traces.results():
+        if results.on_page is None:
+            refused[file] = results.refused or ""
+        else:
+            on_page.append(results.on_page)
     compared = [json.loads(file.read_text(encoding="utf-8")) for file in groups]
-    write_page(outcome.on_page, outcome.refused, page, *compared)
+    write_page(on_page, refused, page, *compared)
 
 
 def check_traces(traces: TracesShown, batches: list[Path], ok: Path) -> None:
@@ -81,19 +95,20 @@ def check_traces(traces: TracesShown, batches: list[Path], ok: Path) -> None:
     BiogripError
         With the first few others.
     """
-    outcome = traces.outcome
-    problems = [f"{visible(file)}: cannot be used." for file in outcome.refused]
-    problems += [
-        f"{visible(each['trace'])}: the fit is rejected: {each['reasons'][0]}"
-        for each in outcome.found
-        if each["fit"] == REJECTED
-    ]
+    unusable, rejected = [], []
+    for file, results in traces.results():
+        if results.data is None:
+            unusable.append(f"{visible(file)}: cannot be used.")
+        elif results.data["fit"] == REJECTED:
+            reason = results.data["reasons"][0]
+            rejected.append(f"{visible(file)}: the fit is rejected: {reason}")
+    problems = unusable + rejected
     if problems:
         more = len(problems) - MOST_SHOWN
         raise BiogripError(
             "\n".join(problems[:MOST_SHOWN] + ([f"... and {more} more."] if more > 0 else []))
         )
-    write_text(ok, f"{len(outcome.found)}\n")
+    write_text(ok, f"{len(traces.traces)}\n")
 
 
 def once(plan: Plan) -> list[Wildcards]:
