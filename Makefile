@@ -99,9 +99,9 @@ bench: $(BENCH_READY)
 	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
 	$(BENCH_BIN)/python -m benchmarks $(SECTIONS)
 
-# All of it, or with SECTIONS=measured only the measured traces.
+# All of it, or with SECTIONS=measured only the measured traces, with SECTIONS=dish only the dish.
 bench-field: $(FIELD_READY)
-	PYTHONPATH=src $(FIELD_BIN)/python -m benchmarks.field $(SECTIONS)
+	$(FIELD_BIN)/python -m benchmarks.field $(SECTIONS)
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml
@@ -170,9 +170,10 @@ $(BENCH_READY): requirements-install.lock requirements.lock requirements-dev.loc
 	$(call ourselves,.venv-bench)
 	touch $(BENCH_READY)
 
-$(FIELD_READY): requirements-install.lock benchmarks/field/requirements.lock
+$(FIELD_READY): requirements-install.lock benchmarks/field/requirements.lock pyproject.toml
 	test -x $(FIELD_BIN)/python || $(FIELD_PYTHON) -m venv .venv-field
 	$(call locked,.venv-field,benchmarks/field/requirements.lock)
+	$(call ourselves,.venv-field)
 	touch $(FIELD_READY)
 
 $(SITE_READY): requirements-install.lock docs/requirements.lock

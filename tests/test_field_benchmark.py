@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from benchmarks.field import by_biogrip, fitted, measured
+from benchmarks.field import by_biogrip, dish, fitted, measured
 from benchmarks.field.by_biogrip import OURS
 from benchmarks.field.compared import compared
 from benchmarks.field.elements import Kelvin, Maxwell
@@ -97,6 +97,21 @@ def test_what_fails_or_takes_too_long_has_reached_nothing(monkeypatch: pytest.Mo
         assert set(row["parameter_errors"].values()) == {None}
     assert known["reached"] == 2
     assert (known["intervals"], known["intervals_hold"]) == (4, 2)
+
+
+def test_cells_of_a_dish_are_identified_by_each_way_as_they_were_made() -> None:
+    def wrong(trace: Trace) -> Fitted:
+        raise ValueError
+
+    cells = dish.dish(3)
+    together, alone, failed = dish.compared([*by_biogrip.METHODS, Method("wrong", wrong)], cells)
+    for row in (together, alone):
+        assert (row["reached"], row["intervals"], row["failures"]) == (3, 9, {})
+        assert row["intervals_hold"] >= 7
+    assert (failed["failures"], failed["reached"]) == ({"ValueError": 3}, 0)
+    elements = np.log([[cell.sample.k_p, cell.sample.k[0]] for cell in dish.dish()])
+    np.testing.assert_allclose(np.exp(elements.mean(axis=0)), [12.3, 35.0], rtol=0.15)
+    np.testing.assert_allclose(elements.std(axis=0), dish.SPREAD, rtol=0.2)
 
 
 def _task(title: str) -> Task:

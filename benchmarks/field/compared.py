@@ -1,22 +1,19 @@
 """Every method on the same traces, and what is counted of it."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.field.elements import Maxwell
-from benchmarks.field.fitted import CREEP, Fitted, Limits, Method, kept_in_bounds, truths
+from benchmarks.field.fitted import CREEP, Fitted, Limits, Method, attempt, truths
 from benchmarks.field.traces import Trace
 from benchmarks.section import Row
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array
-
-Result = TypeVar("Result")
 
 
 @dataclass
@@ -45,9 +42,11 @@ class Runs:
 
     def run(self, method: Method, trace: Trace) -> None:
         """Identify a trace, and keep what came of it."""
-        fit_s, fitted = clocked(partial(self._attempt, partial(method.fit, trace)))
+        fit_s, fitted = clocked(partial(attempt, partial(method.fit, trace), self.failures))
         wanted = fitted.limits if fitted is not None else None
-        limits_s, limits = clocked(partial(self._attempt, wanted)) if wanted else (0.0, None)
+        limits_s, limits = (
+            clocked(partial(attempt, wanted, self.failures)) if wanted else (0.0, None)
+        )
         self.fit_s.append(fit_s)
         self.whole_s.append(fit_s + limits_s)
         self.chi2.append(np.inf if fitted is None else chi2(trace, method.measured, fitted))
@@ -56,15 +55,6 @@ class Runs:
             None if fitted is None else _compliance(trace, method.measured, fitted)
         )
         self.limits.append(limits)
-
-    def _attempt(self, call: Callable[[], Result]) -> Result | None:
-        """Call others' code: whatever it raises is a result, too."""
-        try:
-            with kept_in_bounds():
-                return call()
-        except Exception as error:
-            self.failures[type(error).__name__] += 1
-            return None
 
 
 def chi2(trace: Trace, measured: str, fitted: Fitted) -> float:
@@ -124,7 +114,7 @@ def compared(methods: Sequence[Method], ours: str, branches: int, count: int) ->
             "reached": int(np.sum(above < 1)),
             "failures": dict(run.failures),
             **_errors(traces[0], run),
-            **_coverage(traces[0].sample, run.limits),
+            **coverage([trace.sample for trace in traces], run.limits),
         }
         for part, times in timed.items():
             row |= {f"{part}_{key}": x for key, x in times.against(method.name, ours).items()}
@@ -177,13 +167,13 @@ def _comparable(sample: Maxwell | None, truth: Mapping[str, float]) -> Mapping[s
     return value if value.keys() == truth.keys() else {}
 
 
-def _coverage(sample: Maxwell, limits: Sequence[Limits | None]) -> Mapping[str, object]:
-    """How many limits there are, are on both sides, and have the truth between them."""
-    truth = truths(sample)
+def coverage(samples: Sequence[Maxwell], limits: Sequence[Limits | None]) -> Mapping[str, object]:
+    """Return how many limits there are, are on both sides, and have the truth between them."""
     holds: Counter[str] = Counter()
     given: Counter[str] = Counter()
     closed = 0
-    for each in limits:
+    for sample, each in zip(samples, limits, strict=True):
+        truth = truths(sample)
         for name, (low, high) in (each or {}).items():
             if name in truth:
                 given[name] += 1

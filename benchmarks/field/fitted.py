@@ -4,13 +4,17 @@ import io
 import logging
 import signal
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
+from typing import TypeVar
 
 from benchmarks.field.elements import Maxwell
 from benchmarks.field.traces import Trace
 from biogrip.arrays import Array
+
+Result = TypeVar("Result")
 
 Limits = Mapping[str, tuple[float, float]]
 """95 % limits by parameter, named as of `Maxwell.named`, `Kelvin.named` and below."""
@@ -86,3 +90,13 @@ def kept_in_bounds() -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
         logging.disable(logging.NOTSET)
+
+
+def attempt(call: Callable[[], Result], failures: Counter[str]) -> Result | None:
+    """Call others' code: whatever it raises is a result, too, and is counted by its kind."""
+    try:
+        with kept_in_bounds():
+            return call()
+    except Exception as error:
+        failures[type(error).__name__] += 1
+        return None

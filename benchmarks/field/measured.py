@@ -10,11 +10,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 
-from benchmarks.field.fitted import TIME_LIMIT_S, kept_in_bounds
+from benchmarks.field.fitted import TIME_LIMIT_S, attempt
 from benchmarks.section import Row, Section, number
 from benchmarks.timing import Timed, clocked
 from biogrip.arrays import Array, BoolArray
@@ -27,8 +26,6 @@ from biogrip.products.files.traces import Measurements
 from biogrip.products.stages.recording import read_checked
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
-
-Result = TypeVar("Result")
 
 ROOT = Path(__file__).parents[2]
 CONFIGS = ("config/config.yaml", "config/measured.yaml")
@@ -257,23 +254,14 @@ class _Runs:
 
     def fit(self, program: Program, task: Task) -> None:
         """Fit a task, and keep what came of it."""
-        fit_s, self.answer = clocked(partial(self._attempt, partial(program.fit, task)))
+        fit_s, self.answer = clocked(partial(attempt, partial(program.fit, task), self.failures))
         self.fit_s.append(fit_s)
 
     def ask(self) -> None:
         """Have it say what it prints of the parameters."""
         said = self.answer.said if self.answer else dict
-        said_s, self.said = clocked(partial(self._attempt, said))
+        said_s, self.said = clocked(partial(attempt, said, self.failures))
         self.whole_s.append(self.fit_s[-1] + said_s)
-
-    def _attempt(self, call: Callable[[], Result]) -> Result | None:
-        """Call others' code: whatever it raises is a result, too."""
-        try:
-            with kept_in_bounds():
-                return call()
-        except Exception as error:
-            self.failures[type(error).__name__] += 1
-            return None
 
 
 def compared(programs: Sequence[Program], task: Task, rounds: int = ROUNDS) -> list[Row]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from benchmarks.field import by_biogrip, by_lmfit, by_mcreep, by_pyvisco, by_rheojax
 from benchmarks.field.by_biogrip import OURS
 from benchmarks.field.compared import compared
+from benchmarks.field.dish import dish_section
 from benchmarks.field.fitted import CREEP, TIME_LIMIT_S
 from benchmarks.field.measured import BIOGRIP, PYRHEO, measured_section
 from benchmarks.field.measured_peers import PEERS as MEASURED_BY
@@ -34,6 +35,11 @@ CONFIDENCE = 0.95
 
 # What is less is no difference: of errors by ratio, of coverage in shares.
 _ERROR, _COVERAGE = 0.95, 0.02
+
+SECTIONS: Mapping[str, Callable[[], Section]] = {
+    "dish": partial(dish_section, METHODS),
+    "measured": partial(measured_section, (BIOGRIP, *MEASURED_BY, PYRHEO)),
+}
 
 _INTRODUCTION = f"""\
 # Against what the field uses
@@ -68,19 +74,21 @@ def run(sections: Sequence[str] = ()) -> None:
     sections
         Of the report; what it has of the others stays. By default all are run.
     """
-    if unknown := set(sections) - {"measured"}:
-        raise SystemExit(f"found {min(unknown)}, allowed is measured.")
+    if unknown := set(sections) - SECTIONS.keys():
+        raise SystemExit(f"found {min(unknown)}, allowed are {', '.join(SECTIONS)}.")
     page, numbers = RESULTS / "field.md", RESULTS / "field.json"
     rows = [] if sections else _simulated()
     described = machine(PEERS)
-    measured = measured_section((BIOGRIP, *MEASURED_BY, PYRHEO))
+    ran = [SECTIONS[name]() for name in sections or SECTIONS]
     if sections:
-        text = renewed(page.read_text(encoding="utf-8"), described, [measured])
+        text = renewed(page.read_text(encoding="utf-8"), described, ran)
         found = json.loads(numbers.read_text(encoding="utf-8"))
-        found |= {"measured": measured.rows, "machine_of": {"measured": described}}
+        alone = {section.name: described for section in ran}
+        found["machine_of"] = {**found.get("machine_of", {}), **alone}
     else:
-        text = report(described, rows, measured)
-        found = {"machine": described, "field": rows, "measured": measured.rows}
+        text = report(described, rows, ran)
+        found = {"machine": described, "field": rows}
+    found |= {section.name: section.rows for section in ran}
     write_text(page, text)
     write_text(numbers, json.dumps(found, indent=1) + "\n")
     print(f"\n{text}")
@@ -95,7 +103,7 @@ def _simulated() -> list[Row]:
     return rows
 
 
-def report(described: Mapping[str, str], rows: Sequence[Row], measured: Section) -> str:
+def report(described: Mapping[str, str], rows: Sequence[Row], sections: Sequence[Section]) -> str:
     """Return everything as Markdown."""
     parts = [_INTRODUCTION, markdown([described])]
     for branches in SAMPLES:
@@ -103,7 +111,7 @@ def report(described: Mapping[str, str], rows: Sequence[Row], measured: Section)
         cells = [{head: cell(row) for head, cell in COLUMNS.items()} for row in own]
         parts += [f"## {_branches(branches).capitalize()}", markdown(cells)]
     parts += ["## Where a peer is better", _better(rows), "## Failures", _failures(rows)]
-    return "\n\n".join([*parts, written(measured)]) + "\n"
+    return "\n\n".join([*parts, *map(written, sections)]) + "\n"
 
 
 def _limits_share(row: Row) -> float | None:
