@@ -18,6 +18,7 @@ from benchmarks.optimum import optimum_section
 from benchmarks.profiles import profiles_section
 from benchmarks.scale import scale_section
 from benchmarks.section import Section, markdown, number, renewed, written
+from benchmarks.sheet import sheet_section
 from benchmarks.study import study_section
 from benchmarks.timing import clocked
 from biogrip.files import atomic_write, write_text
@@ -37,6 +38,7 @@ SECTIONS: Mapping[str, Callable[[], Section]] = {
     "limit": limit_section,
     "study": study_section,
     "scale": scale_section,
+    "sheet": sheet_section,
 }
 """By name, in the order of the report."""
 

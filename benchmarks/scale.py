@@ -59,14 +59,14 @@ class Seen:
 def scale_section() -> Section:
     """Run the study of many seeds, and plan one of many cases."""
     with tempfile.TemporaryDirectory() as name:
-        wall_s, seen = _study(Path(name), _WITHOUT | {"seeds": SEEDS})
+        wall_s, seen = run_study(Path(name), _WITHOUT | {"seeds": SEEDS})
         sizes = _sizes(Path(name) / "results")
     with tempfile.TemporaryDirectory() as name:
         cases = yaml.safe_load(CONFIG.read_text())["cases"]
         some = list(cases.values())
         many = {f"case_{index}": some[index % len(some)] for index in range(CASES)}
         overlay = _WITHOUT | {"seeds": SEEDS, "cases": many, "only": list(many)}
-        planning_s, planning = _study(Path(name), overlay, "--dry-run")
+        planning_s, planning = run_study(Path(name), overlay, "--dry-run")
     rows = [
         *({"process": kind, **vars(of_kind)} for kind, of_kind in seen.items()),
         {"process": _ALL, **vars(_together(seen.values())), "wall_s": wall_s, **sizes},
@@ -110,7 +110,10 @@ def watch_writes(command: Sequence[str], folder: Path) -> dict[str, Seen]:
     return dict(sorted(kinds.items(), key=lambda item: -item[1].processor_s))
 
 
-def _study(folder: Path, overlay: dict[str, Any], *options: str) -> tuple[float, dict[str, Seen]]:
+def run_study(
+    folder: Path, overlay: dict[str, Any], *options: str
+) -> tuple[float, dict[str, Seen]]:
+    """Run a study in a folder by Snakemake; its wall time, and what was seen of its processes."""
     config = folder / "scale.yaml"
     config.write_text(yaml.safe_dump(overlay))
     command = [sys.executable, "-m", "snakemake", f"-j{CORES}", "--quiet", "all", *options]
