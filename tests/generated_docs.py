@@ -249,7 +249,7 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
     if np.isinf(values.max()):
         return "none"
     low, high = format(values.min(), how), format(values.max(), how)
-    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+    return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
 
 
 def experiments_needed() -> str:

@@ -46,8 +46,8 @@ cases:
 OVERLAYS = [
     (file.name,)
     for file in sorted((ROOT / "config").glob("*.yaml"))
-    if file.name not in ("config.yaml", "designed.yaml")
-] + [("design.yaml", "designed.yaml")]
+    if file.name not in ("config.yaml", "designed.yaml", "soft_designed.yaml")
+] + [("design.yaml", "designed.yaml"), ("soft.yaml", "soft_designed.yaml")]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 

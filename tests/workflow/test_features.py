@@ -11,6 +11,7 @@ from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.linear import rotation, step_response
+from biogrip.study.source import overlaid, read_config
 from tests.helpers.default import study_of
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.pictures import assert_drawn, in_coarse_dots

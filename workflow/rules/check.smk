@@ -17,6 +17,9 @@ OVERLAYS = {
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     "measured": (["measured"], "all", "*"),
     "dishes": (["dishes"], "all", "*"),
+    # Errors, verdicts and robustness.
+    "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
+    "soft_design": (["soft", "soft_designed"], "designed", "designed"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 

@@ -5,9 +5,10 @@ import pytest
 from biogrip.products.tables.mechanics import MECHANICS, mechanics
 from biogrip.study.study import Study
 from tests.helpers.default import STUDY, seen, study_of
+from tests.helpers.places import ROOT
 
 
-def rows_of(study: Study = STUDY) -> list[dict[str, object]]:
+def rows_of(study: Study = STUDY) -> list[dict[str, Any]]:
     found = mechanics(study)
     names = [column.name for column in found.columns]
     return [dict(zip(names, row, strict=True)) for row in found.rows]
@@ -45,8 +46,24 @@ def test_the_papers_samples() -> None:
     assert drop["lowest_force_uN"] == pytest.approx(-0.74, abs=0.01)
     assert cell["gripper_stiffness_N_per_m"] == pytest.approx(0.105, abs=1e-3)
     # A thousand times what cells have, at the least.
-    assert isinstance(cell["apparent_modulus_kPa"], float)
     assert cell["apparent_modulus_kPa"] > 1e4
+
+
+def test_soft_samples_are_as_soft_as_cells_and_softer_than_the_gripper() -> None:
+    """A thousandth of Table 5's cell has some kPa by Hertz's contact; jaws would have to pull."""
+    study = study_of((ROOT / "config" / "soft.yaml").read_text(encoding="utf-8"))
+    soft, stiff = study.case("soft_cell").parameters, STUDY.case("endothelial_cell").parameters
+    assert {n: 1e3 * v for n, v in soft.items()} == pytest.approx(stiff)
+    for row in rows_of(study):
+        assert 0.1 < row["stiffness_over_gripper"] < 1
+        assert row["lowest_force_uN"] < 0
+    cell = rows_of(study)[0]
+    assert 0.5 < cell["apparent_modulus_kPa"] < 2
+    # The formula in the config: E sqrt(D s)/(3 (1 - nu^2)).
+    length = 1e-6 * (cell["size_um"] * cell["shortening_um"]) ** 0.5
+    stiffness = 1e3 * cell["apparent_modulus_kPa"] * length / (3 * 0.75)
+    assert 1e-6 * cell["largest_force_uN"] > stiffness * 1e-6 * cell["shortening_um"]
+    assert stiffness == pytest.approx(0.0123, rel=0.01)
 
 
 def test_the_nonlinear_model_differs_little() -> None:
