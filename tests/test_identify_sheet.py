@@ -14,7 +14,9 @@ from biogrip.cli import main
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.library import hold
+from biogrip.products.tables.contact import contacts
 from biogrip.response.linear import rotation, step_response
+from tests.helpers.default import STUDY
 from tests.helpers.problems import GRIPPER, TORQUE
 
 SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
@@ -247,3 +249,27 @@ def test_settings_of_several_rows_are_refused_together(
         "cells.tsv, line 2",
         "cells.tsv, line 3",
     ]
+
+
+def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
+    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer.
+
+    The table of contact says so of a config in which the neutral angle is taken for all sizes.
+    """
+    shutil.copy(here / "usual.csv", here / "small.csv")
+    rows = [["file", "sample.size_m"], ["usual.csv", ""], ["small.csv", "30e-6"]]
+    write(here / "cells.tsv", rows)
+    (here / "few.yaml").write_text(yaml.safe_dump({**FEW, "blocks": {}}))
+    assert identify("cells.tsv", "--config", "few.yaml") == 0
+    unsized, sized = (
+        {each["quantity"]: each["value"] for each in found(name)["quantities"]}
+        for name in ("usual.csv", "small.csv")
+    )
+    # From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm.
+    angle = np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3)
+    ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
+    for name in ("k_p", "c_p"):
+        assert unsized[name] / sized[name] == pytest.approx(ratio, rel=1e-3)
+    smallest = contacts(STUDY).rows[0]
+    assert smallest[0] == pytest.approx(30)
+    assert smallest[3] == pytest.approx(100 * (ratio - 1))

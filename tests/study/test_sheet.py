@@ -103,6 +103,7 @@ def test_without_a_column_each_file_is_a_cell(folder: Path) -> None:
         ("fixed.k_p", "2.5", {"fixed": {"k_p": 2.5}}),
         ("instrument", "creep", {"instrument": "creep"}),
         ("sample.model", "maxwell", {"sample": {"model": "maxwell"}}),
+        ("sample.size_m", "60e-6", {"sample": {"size_m": 60e-6}}),
         ("protocol", "short", {"protocol": SHORT}),
     ],
 )

@@ -23,7 +23,7 @@ BLOCKS = ("instrument", *NAMABLE)
 FIXED, FIX = "fixed", "fix"
 """The block of known parameters, and a shorter word for it, as of the option ``--fix``."""
 
-_OF_SAMPLE = ("model", "branches")
+_OF_SAMPLE = ("model", "branches", "size_m")
 _SIMULATED = ("measurement.rate_Hz", "measurement.noise", "models.target")
 # Similarity from which a name without a dot is taken for a mistyped block.
 _CLOSE = 0.85

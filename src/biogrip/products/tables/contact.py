@@ -8,6 +8,7 @@ from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import largest_load
 from biogrip.instrument import actuator
 from biogrip.instrument.contact import LARGEST_M, SMALLEST_M, contact
+from biogrip.instrument.gripper import Gripper
 from biogrip.products.tables.declared import table
 from biogrip.products.tables.layout import Cell, Column, Table
 from biogrip.products.uses import from_study
@@ -17,6 +18,7 @@ _COLUMNS = (
     Column("size_um", "Sample (um)"),
     Column("closing_mrad", "Closing rotation (mrad)"),
     Column("reference_angle_deg", "Reference angle (deg)", 4),
+    Column("off_percent", "Stiffness found is off by (%)", 2),
     Column("torque_nNm", "Torque (nN m)"),
     Column("voltage_V", "Voltage (V)"),
     Column("gripping_voltage_V", "while gripping (V)"),
@@ -32,11 +34,12 @@ def contacts(study: Study) -> Table:
         try:
             found = contact(study.gripper, study.jaw_gap_m, study.actuator, 1e-6 * size_um)
         except BiogripError as error:
-            rows.append((float(size_um), *5 * (None,), str(error)))
+            rows.append((float(size_um), *6 * (None,), str(error)))
             continue
         numbers = (
             1e3 * found.closing_rad,
             found.reference_angle_deg,
+            _off_percent(study.gripper, found.reference_angle_deg),
             1e9 * found.torque_Nm,
             found.voltage_V,
             float(actuator.voltage(study.actuator, found.torque_Nm + grip_Nm)),
@@ -44,10 +47,18 @@ def contacts(study: Study) -> Table:
         rows.append((float(size_um), *(float(number) for number in numbers), ""))
     caption = (
         "Closing the jaws from the neutral configuration onto a sample: rotation of each arm, its "
-        "angle at contact, and the torque and voltage that hold it there. Grip torques come on "
-        f"top; the last voltage is with the protocol's largest, {1e9 * grip_Nm:.3g} nN m."
+        "angle at contact, by how much stiffnesses and dampings of the linear model are off if the "
+        "neutral angle is taken for it (they go with one over the square of its sine), and the "
+        "torque and voltage that hold it there. Grip torques come on top; the last voltage "
+        f"is with the protocol's largest, {1e9 * grip_Nm:.3g} nN m."
     )
     return Table(caption, _COLUMNS, rows)
+
+
+def _off_percent(neutral: Gripper, angle_deg: float) -> float:
+    """Return the error of values that are found with the neutral angle, and not this one."""
+    sines = np.sin(np.radians([angle_deg, neutral.reference_angle_deg]))
+    return float(100 * ((sines[0] / sines[1]) ** 2 - 1))
 
 
 CONTACT = table(
