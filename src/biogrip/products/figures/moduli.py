@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from biogrip.arrays import Array, BoolArray
 from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import Network, SampleModel
-from biogrip.identifiability.moduli import complex_modulus
 from biogrip.identify.success import near_noise
 from biogrip.products.figures.declared import drawing
 from biogrip.products.figures.overview import shown_cases
@@ -127,9 +126,11 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
 
 
 def _modulus(network: Network, omega: Array) -> Array:
-    """Return complex moduli of n samples, in N/m or Pa, (n, n_omega)."""
-    storage, loss = complex_modulus(network, omega)
-    return storage + 1j * loss
+    """Return complex stiffnesses of n samples, in N/m or Pa, at s = i omega, (n, n_omega)."""
+    s = 1j * omega
+    rates = (network.k / network.c)[:, :, None]
+    branches = np.sum(network.k[:, :, None] * s / (s + rates), axis=1)
+    return network.k_p[:, None] + network.c_p[:, None] * s + branches
 
 
 def _agreed(moduli: Array) -> BoolArray:
