@@ -24,12 +24,13 @@ def test_generated_parts_are_up_to_date(document: Path) -> None:
     ],
 )
 def test_links_lead_somewhere(document: str | Path) -> None:
+    """To a file: the site has no page of a folder, and is not built where one is linked."""
     path = ROOT / document
     text = path.read_text(encoding="utf-8")
     links = re.findall(r"\]\(([^)#]*)(?:#[^)]*)?\)", text)
     # What is above the first # of a link is empty where it leads to another part of the text.
     own = [link for link in links if link and "://" not in link]
-    assert [link for link in own if not (path.parent / link).exists()] == []
+    assert [link for link in own if not (path.parent / link).is_file()] == []
 
 
 @pytest.mark.parametrize("document", GENERATED, ids=lambda path: str(path.relative_to(ROOT)))
