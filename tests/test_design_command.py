@@ -13,8 +13,8 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import within_reach
 from biogrip.design.experiment import DesignInputs
+from biogrip.design.rating import Rater, Torque
 from biogrip.design.schedule import presses
-from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
@@ -244,7 +244,7 @@ def test_after_a_trace_of_the_study_and_one_that_was_designed(
 
     Read by the protocol that it was not recorded with, the same file is refused.
     """
-    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
+    _take_one_torque(monkeypatch)
     first = write_trace(seldom_sampled(), tmp_path / "first.csv")
     second = write_trace(designed_case(folder[0]), tmp_path / "second.csv")
     over = str(folder[0] / "out.yaml")
@@ -260,7 +260,7 @@ def test_after_a_trace_with_columns_and_units_of_its_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The same rotations in another file lead to the same design; what was added is allowed for."""
-    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
+    _take_one_torque(monkeypatch)
     trace = write_trace(seldom_sampled(), tmp_path / "trace.csv")
     times, rotation = np.loadtxt(trace, delimiter=",", skiprows=1, unpack=True)
     bounds_after(tmp_path, "--after", str(trace))
@@ -313,7 +313,7 @@ def test_weights_are_options_of_a_design(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A share of the rotation that is far too small refuses the trace; one that fits does not."""
-    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
+    _take_one_torque(monkeypatch)
     trace = str(write_trace(seldom_sampled(), tmp_path / "trace.csv"))
     bounds_after(tmp_path, "--after", trace, "--noise", "3e-6", "--noise-share", "1e-4")
     tiny = ("--noise", "1e-7", "--noise-share", "1e-5")
@@ -352,9 +352,13 @@ def test_messages_on_traces_name_options_that_there_are(
 
 def one_torque(inputs: DesignInputs) -> Torque:
     """Any torque; a search takes seconds."""
-    return TorqueSearch(inputs, SHAPES["steps"]).torque(
-        np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
-    )
+    shares = np.array([0.5, 0.3, 0.6, 0.5, 1.0, 1.0, 0.6, 0.6, 0.8])
+    return Rater(inputs).torque(SHAPES["steps"].waveform(shares, inputs.limits))
+
+
+def _take_one_torque(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(within_reach, "best_torques", lambda inputs, *_: [one_torque(inputs)])
+    monkeypatch.setattr(within_reach, "climb", lambda inputs, torques, *_: list(torques))
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,9 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.experiment import DesignInputs, relative_bounds
+from biogrip.design.rating import Rater, Torque
 from biogrip.design.schedule import Plan, planned
-from biogrip.design.search import Torque, TorqueSearch, best_torques
+from biogrip.design.search import best_torques
 from biogrip.design.shapes import SHAPES
 from biogrip.design.waveform import Limits, hold
 from biogrip.errors import BiogripError
@@ -98,8 +99,8 @@ def test_contact_is_kept(shape: str) -> None:
 
 def test_stroke_limits_the_torque() -> None:
     inputs = replace(DROP, stroke_rad=1e-3)
-    search = TorqueSearch(inputs, SHAPES["steps"])
-    torque = search.torque(np.full(9, 0.5))
+    waveform = SHAPES["steps"].waveform(np.full(9, 0.5), inputs.limits)
+    torque = Rater(inputs).torque(waveform)
     plan = planned(replace(inputs, samples=50), [torque])
     turned = np.abs(_rotation(plan, DROP.parameters[0])).max()
     assert turned <= 1e-3 * 1.001

@@ -6,7 +6,7 @@ import pytest
 from biogrip.design.experiment import relative_bounds
 from biogrip.design.shapes import SHAPES
 from biogrip.design.steps import steps
-from biogrip.design.time_bins import periodic_time_bins, time_bins
+from biogrip.design.time_bins import periodic_time_bins, time_bins, with_fine_end
 from biogrip.design.views import Views
 from biogrip.design.waveform import Limits, Waveform, hold, linear, swinging
 from biogrip.experiment.protocol import Phase, load, torque_history
@@ -190,9 +190,13 @@ def test_a_train_as_it_is_meant() -> None:
     np.testing.assert_allclose(made.levels, [*levels, 0.3])
 
 
+@pytest.mark.parametrize("fine_end", [False, True])
 @pytest.mark.parametrize("slots", [2, 10, 24, 25, 26, 1000, 10**7])
-def test_cells_have_every_slot_once(slots: int) -> None:
+def test_cells_have_every_slot_once(slots: int, fine_end: bool) -> None:
     found = time_bins(slots, 1.3)
+    if fine_end:
+        found = with_fine_end(found)
+        assert found.slots[-1] == 1
     assert found.first[0] == 1
     np.testing.assert_array_equal(found.first[1:], (found.first + found.slots)[:-1])
     assert found.first[-1] + found.slots[-1] == slots

@@ -25,6 +25,10 @@ class CellResponses:
     """d phi / d log p in rad, (n, n_parameters, n_cells)."""
     capacity: Array
     """Largest number of readings in each cell, (n_cells,)."""
+    steps: IntArray
+    """Step that each cell comes after, (n_cells,)."""
+    places: IntArray
+    """Number of each cell among those of a step, (n_cells,)."""
     turned_rad: float
     """Largest rotation."""
     pull: float
@@ -34,9 +38,13 @@ class CellResponses:
 
 @dataclass(frozen=True)
 class _Part:
-    """Responses in some steps: their indices, sensitivities, and forces of each sample."""
+    """Responses in some steps: their indices, sensitivities, and forces of each sample.
+
+    Of each cell, step and number there.
+    """
 
     steps: IntArray
+    places: tuple[IntArray, IntArray]
     sensitivity: Array
     capacity: Array
     turned_rad: float
@@ -71,6 +79,8 @@ def compute_cell_responses(
     return CellResponses(
         np.concatenate([part.sensitivity for part in parts], axis=2),
         np.concatenate([part.capacity for part in parts]),
+        np.concatenate([part.places[0] for part in parts]),
+        np.concatenate([part.places[1] for part in parts]),
         max(turned, float(np.max(np.abs(moving.last_rotation)))),
         float(np.max((margin - lowest) / largest[:, None])) if views.instrument.has_jaws else 0.0,
     )
@@ -92,7 +102,10 @@ def _compute_responses(
     if times_s is not None:
         turned += _BETWEEN * float(np.ptp(view.rotation, axis=2).max()) / 2
         lowest -= _BETWEEN * np.ptp(view.force, axis=2) / 2
-    room = (np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered).astype(float).ravel()
+    capacity = (np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered).astype(float)
+    rows, places = np.nonzero(capacity)
+    room = capacity.ravel()
     sensitivity = view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
     there = room > 0
-    return _Part(steps, sensitivity[..., there], room[there], turned, largest, lowest)
+    found = sensitivity[..., there], room[there]
+    return _Part(steps, (steps[rows], places), *found, turned, largest, lowest)

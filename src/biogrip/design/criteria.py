@@ -61,14 +61,21 @@ class Criterion:
 
     def typical_bound(self, covariances: Array) -> float:
         """Return the criterion as a relative standard deviation, for comparison of designs."""
-        values = self.values(covariances)
+        return float(self.typical_bounds(covariances[None])[0])
+
+    def typical_bounds(self, covariances: Array) -> Array:
+        """Return the same of several designs, (n_designs,), whose covariances are stacked."""
+        flat = covariances.reshape(-1, *covariances.shape[2:])
+        values = self.values(flat).reshape(covariances.shape[:2])
         count = len(self.targets) if self.name == "D" else 1
         logs = values / count if self.name == "D" else np.log(values)
-        log = logs.max() if self.over == "worst" else self._mean_log(logs)
-        return float(np.exp(0.5 * log))
+        return np.exp(0.5 * (logs.max(axis=1) if self.over == "worst" else self._mean_logs(logs)))
 
     def _mean_log(self, logs: Array) -> float:
-        return float(logs.mean() if self.name == "D" else np.log(np.exp(logs).mean()))
+        return float(self._mean_logs(logs[None])[0])
+
+    def _mean_logs(self, logs: Array) -> Array:
+        return logs.mean(axis=1) if self.name == "D" else np.log(np.exp(logs).mean(axis=1))
 
     def weights(self, covariances: Array, sharpness: float) -> tuple[Array, Array]:
         """Return the derivatives of the criterion by samples and by elements of covariances.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from biogrip.arrays import Array
-from biogrip.design.criteria import Criterion
+from biogrip.design.criteria import Criterion, inverted
 from biogrip.design.waveform import Limits
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import SampleModel
@@ -74,6 +74,12 @@ class DesignInputs:
             inertia=self.instrument.has_jaws,
         )
         return rows[:, 1:] / self.noise_rad
+
+    def typical_bound(self, information: Array) -> float:
+        """Return the criterion of information, including `before`, as a relative bound."""
+        targets = list(self.criterion.targets)
+        covariances = inverted(information)[:, targets][:, :, targets]
+        return self.criterion.typical_bound(covariances)
 
     def bounds(self, information: Array) -> Array:
         """Return `relative_bounds` without the prior on parameters that are out of reach.

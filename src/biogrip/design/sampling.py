@@ -20,6 +20,7 @@ References
    Statistical Decision Theory and Related Topics III, vol. 2 (1982), 485-495.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,8 +32,38 @@ from biogrip.design.criteria import Criterion, inverted
 _MIXED = 15
 # Power p of the p-norm that replaces a maximum: at first, its growth per round, in the end.
 _BLUNT, _SHARPER, _SHARP = 10.0, 1.5, 1000.0
+# Where a search goes on from a sampling that was nearly as good.
+_KNOWN = 100.0
 # A filling with less than this share of a mixture is dropped.
 _DROPPED = 1e-9
+# Fillings of which a search goes on: those with the largest shares, above the least.
+_LEFT, _LEAST = 12, 1e-4
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """A mixture of fillings: readings in each cell as a weighted mean."""
+
+    fillings: Array
+    """Readings in each cell, not integer, (n_fillings, n_cells)."""
+    shares: Array
+    """Weights whose sum is one, (n_fillings,)."""
+
+    @property
+    def main(self) -> "Mixture":
+        """The fillings of the largest shares, ten or so."""
+        kept = np.argsort(-self.shares, kind="stable")[:_LEFT]
+        kept = kept[self.shares[kept] > _LEAST]
+        return Mixture(self.fillings[kept], self.shares[kept] / self.shares[kept].sum())
+
+    def within(self, capacity: Array, room: float) -> "Mixture":
+        """Return the mixture with every filling cut to a capacity and filled up evenly."""
+        fillings = np.minimum(self.fillings, capacity)
+        free = capacity - fillings
+        missing = np.maximum(room - fillings.sum(axis=1), 0.0)
+        there = free.sum(axis=1)
+        fillings += free * (missing / np.where(there > 0, there, 1.0))[:, None]
+        return Mixture(fillings, self.shares)
 
 
 @dataclass(frozen=True)
@@ -46,6 +77,8 @@ class Optimum:
     n_asked)."""
     gap: float
     """Share by which the typical relative bound may exceed that of the best sampling."""
+    mixture: Mixture
+    """The same readings as a mixture, of which a similar problem is solved faster."""
 
 
 def best_sampling(
@@ -57,6 +90,8 @@ def best_sampling(
     gap: float,
     most: int,
     before: Array | float = 0.0,
+    start: Mixture | None = None,
+    to_beat: float = np.inf,
 ) -> Optimum:
     """Distribute readings over cells such that a criterion is minimal.
 
@@ -76,26 +111,32 @@ def best_sampling(
         Largest number of fillings.
     before : (n or 1, n_parameters, n_parameters)
         Information from earlier experiments.
+    start
+        Mixture of fillings of these cells to go on from; by default readings are even.
+    to_beat
+        Typical relative bound at which to stop when the best sampling cannot have it.
     """
     room = min(float(samples), float(capacity.sum()))
-    first = _even(capacity, room)
-    fillings, shares = [first], np.ones(1)
-    known = _information(rows, first)[None]
+    even = Mixture(_even(capacity, room)[None], np.ones(1))
+    mixture = start.within(capacity, room) if start else even
+    fillings, shares = list(mixture.fillings), mixture.shares
+    known = np.stack([_information(rows, filling) for filling in fillings])
+    blunt = _KNOWN if start else _BLUNT
     best: Optimum | None = None
     for round_ in range(most):
-        sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
+        sharpness = min(_SHARP, blunt * _SHARPER**round_)
         information = np.tensordot(shares, known, 1)
         inverse = inverted(information + before)
         covariances, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
-        worth = np.einsum("n,npq,npc,nqc->c", of_samples, sensitivity, rows, rows, optimize=True)
+        worth = of_samples @ np.einsum("npc,npc->nc", sensitivity @ rows, rows)
         filling = _filled(worth, capacity, room)
         reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
         gain = float(worth @ filling) - reached
         missing = _gap(criterion, covariances, gain, sharpness)
         if best is None or missing < best.gap:
-            mean_samples = np.tensordot(shares, np.array(fillings), 1)
-            best = Optimum(mean_samples, covariances, missing)
-        if missing < gap:
+            mixture = Mixture(np.array(fillings), shares)
+            best = Optimum(shares @ mixture.fillings, covariances, missing, mixture)
+        if missing < gap or criterion.typical_bound(covariances) > to_beat * (1 + missing):
             break
         fillings.append(filling)
         known = np.concatenate((known, _information(rows, filling)[None]))
@@ -106,6 +147,45 @@ def best_sampling(
         known, shares = known[kept], shares[kept] / shares[kept].sum()
     assert best is not None
     return best
+
+
+def least_bound(
+    rows: Mapping[float, Sequence[Array]],
+    capacity: Array,
+    samples: Array,
+    total: int,
+    criterion: Criterion,
+    before: Array | float = 0.0,
+) -> float:
+    """Return a typical relative bound that no sampling falls below.
+
+    Parameters
+    ----------
+    rows : dict of float to sequences of (n, n_parameters, n_cells)
+        Sensitivities at instants of each cell, by the share of its slots that each instant stands
+        for; the first are those that `samples` was computed with.
+    capacity : (n_cells,)
+        Largest number of readings in each cell.
+    samples : (n_cells,)
+        A nearly optimal sampling, the nearer, the closer this is.
+    total
+        Number of readings.
+    criterion, before
+        As in `best_sampling`.
+    """
+    every = [(share, each) for share, several in rows.items() for each in several]
+    information = _information(every[0][1], samples)
+    covariances, of_samples, sensitivity = _covariances(
+        inverted(information + before), criterion, _SHARP
+    )
+    worth = np.concatenate(
+        [of_samples @ np.einsum("npc,npc->nc", sensitivity @ each, each) for _, each in every]
+    )
+    room = np.concatenate([share * capacity for share, _ in every])
+    filling = _filled(worth, room, min(float(total), float(capacity.sum())))
+    reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
+    missing = _gap(criterion, covariances, float(worth @ filling) - reached, _SHARP)
+    return criterion.typical_bound(covariances) / (1 + missing)
 
 
 def _even(capacity: Array, room: float) -> Array:
@@ -174,13 +254,17 @@ def _mixed(
 
     def worth_of(inverse: Array) -> Array:
         _, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
-        return np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
+        # Of singular information, rounding errors may have any sign.
+        return np.maximum(np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known), 0.0)
 
     power = 1.0 if criterion.name == "D" else 0.5
     inverse, value = at(shares)
     worth = worth_of(inverse)
     for _ in range(_MIXED):
-        tried = shares * (worth / worth.max()) ** power
+        largest = worth.max()
+        if not largest > 0:
+            break
+        tried = shares * (worth / largest) ** power
         tried /= tried.sum()
         inverse, new_value = at(tried)
         if new_value <= value:

@@ -1,18 +1,19 @@
 """Experiment plan from the best torque: values that can be set, and readings in bursts."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.design.bursts import make_bursts, whole
+from biogrip.design.exchange import exchanged
 from biogrip.design.experiment import DesignInputs, compute_information
 from biogrip.design.few_bins import in_few_bins
-from biogrip.design.sampling import best_sampling
-from biogrip.design.search import Torque
+from biogrip.design.rating import Torque
+from biogrip.design.sampling import best_sampling, least_bound
 from biogrip.design.set_values import set_values
-from biogrip.design.time_bins import TimeBins, periodic_time_bins, time_bins
+from biogrip.design.time_bins import TimeBins, periodic_time_bins, time_bins, with_fine_end
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import Network
@@ -20,7 +21,11 @@ from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 
-_GROWTH, _GAP, _FILLINGS = 1.12, 0.005, 200
+_GROWTH, _GAP, _FILLINGS = 1.03, 0.001, 300
+# Shares by which steps are made smaller, until the jaws press at all instants.
+_SMALLER = (0.0, 1e-3, 2e-3, 5e-3, 1e-2)
+# Torques that are sampled finely, of which the best is taken.
+_COMPARED = 3
 # Under sinusoids: parts of a period, and growth of the number of periods of a cell.
 _PARTS, _PERIODS = 24, 1.4
 # Instants after a step at which the force is computed, and rounding relative to the largest.
@@ -41,8 +46,7 @@ class Plan:
     """Fisher information of the log-parameters of the plausible samples, including that of earlier
     experiments, (n, n_parameters, n_parameters)."""
     gap: float
-    """Share by which the typical relative bound may exceed that of the best sampling of this
-    torque."""
+    """Share by which the typical relative bound may exceed that of any sampling of this torque."""
 
     @property
     def torque(self) -> TorqueHistory:
@@ -70,23 +74,45 @@ class SamplingProblem:
 
 
 def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
-    """Find the best sampling of the first torque with which the jaws press throughout.
+    """Find the best sampling of the first torques with which the jaws press, and the best of them.
 
-    The torques are those of `best_torques`, which checks contact at fewer instants.
+    The torques are sorted, from a search that checks contact at fewer instants, and has fewer cells
+    of time.
 
     Raises
     ------
     BiogripError
         If with all of them the jaws would have to pull.
     """
+    found: list[Plan] = []
     for torque in torques:
-        phases = set_values(inputs, torque)
-        if presses(inputs, phases):
-            return _sampled(inputs, phases)
+        if phases := _pressing(inputs, torque):
+            found.append(_sampled(inputs, phases))
+            if len(found) == _COMPARED:
+                break
+    if found:
+        return min(found, key=lambda plan: inputs.typical_bound(plan.information))
     raise BiogripError(
         "design: with all torques that were found the jaws would have to pull at some instant; "
         "allowed are more torques to be tried (`candidates`)."
     )
+
+
+def _pressing(inputs: DesignInputs, torque: Torque) -> tuple[Phase, ...]:
+    """Return what to set, its steps a little smaller where the jaws would pull; else nothing."""
+    waveform = torque.waveform
+    for smaller in _SMALLER:
+        levels, ends = (
+            1.0 - (1.0 - smaller) * (1.0 - part) for part in (waveform.levels, waveform.ends)
+        )
+        phases = set_values(
+            inputs, Torque(replace(waveform, levels=levels, ends=ends), torque.largest_Nm)
+        )
+        if presses(inputs, phases):
+            return phases
+        if not waveform.only_steps:
+            break
+    return ()
 
 
 def presses(inputs: DesignInputs, phases: Sequence[Phase]) -> bool:
@@ -98,18 +124,25 @@ def presses(inputs: DesignInputs, phases: Sequence[Phase]) -> bool:
     return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
 
 
-def sampling_problem(inputs: DesignInputs, phases: tuple[Phase, ...]) -> SamplingProblem:
-    """Divide the time of an experiment into cells, and compute the sensitivities there."""
+def sampling_problem(
+    inputs: DesignInputs, phases: tuple[Phase, ...], at: str = "middle"
+) -> SamplingProblem:
+    """Divide the time of an experiment into cells, and compute the sensitivities there.
+
+    They are computed in the `middle` of each cell, or in the slot where it `begins` or `finishes`.
+    """
     slots = [round(phase.duration_s * inputs.fastest_Hz) for phase in phases]
     each = tuple(
         _time_bins(count, phase, inputs.fastest_Hz)
         for count, phase in zip(slots, phases, strict=True)
     )
     starts = np.cumsum([0, *slots[:-1]])
-    middle = np.concatenate([start + own.middle for start, own in zip(starts, each, strict=True)])
-    order = np.argsort(middle, kind="stable")
-    sensitivity = np.empty((*inputs.parameters.shape, len(middle)))
-    times_s = middle[order] / inputs.fastest_Hz
+    slot = np.concatenate(
+        [start + getattr(own, at) for start, own in zip(starts, each, strict=True)]
+    )
+    order = np.argsort(slot, kind="stable")
+    sensitivity = np.empty((*inputs.parameters.shape, len(slot)))
+    times_s = slot[order] / inputs.fastest_Hz
     sensitivity[..., order] = inputs.sensitivities(inputs.history(phases), times_s)
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
     return SamplingProblem(each, starts, sensitivity, capacity)
@@ -120,14 +153,14 @@ def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
         return periodic_time_bins(
             slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS
         )
-    return time_bins(slots, _GROWTH)
+    return with_fine_end(time_bins(slots, _GROWTH))
 
 
 def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
     problem = sampling_problem(inputs, phases)
-    sensitivity, capacity = problem.sensitivity, problem.capacity
+    rows, capacity = problem.sensitivity, problem.capacity
     best = best_sampling(
-        sensitivity,
+        rows,
         capacity,
         inputs.samples,
         inputs.criterion,
@@ -135,13 +168,22 @@ def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
         most=_FILLINGS,
         before=inputs.before,
     )
-    few = in_few_bins(sensitivity, best.samples, capacity, _late(problem.each), inputs.before)
-    counts = whole(few, capacity)
+    few = in_few_bins(rows, best.samples, capacity, _late(problem.each), inputs.before)
+    counts = exchanged(rows, whole(few, capacity), few, capacity, inputs.criterion, inputs.before)
     bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
     history = inputs.history(phases)
-    rows = inputs.sensitivities(history, Sampling(bursts=bursts).over(history.end_s))
-    information = compute_information(rows) + inputs.before
-    return Plan(phases, bursts, information, best.gap)
+    read = inputs.sensitivities(history, Sampling(bursts=bursts).over(history.end_s))
+    information = compute_information(read) + inputs.before
+    edges = [sampling_problem(inputs, phases, edge).sensitivity for edge in ("begins", "finishes")]
+    least = least_bound(
+        {0.5: [rows], 0.25: edges},
+        capacity,
+        best.samples,
+        inputs.samples,
+        inputs.criterion,
+        inputs.before,
+    )
+    return Plan(phases, bursts, information, max(inputs.typical_bound(information) / least - 1, 0))
 
 
 def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from biogrip.design.experiment import DesignInputs
-from biogrip.design.search import Torque
+from biogrip.design.rating import Torque
 from biogrip.experiment.protocol import Phase, load
 
 _DIGITS = 4

@@ -18,8 +18,11 @@ class Shape:
     """Function that converts them to a torque."""
 
 
+STEPS = "steps"
+"""Name of trains of steps."""
+
 SHAPES: Mapping[str, Shape] = {
-    "steps": Shape(steps.SHARES, steps.steps),
+    STEPS: Shape(steps.SHARES, steps.steps),
     "ramps": Shape(ramps.SHARES, ramps.ramps),
     "sinusoids": Shape(sinusoids.SHARES, sinusoids.sinusoids),
 }

@@ -34,10 +34,19 @@ class TimeBins:
         return self.slots * self.repeats
 
     @property
+    def begins(self) -> IntArray:
+        """First slot of the middle repetition, (n_cells,)."""
+        return self.first + self.stride * ((self.repeats - 1) // 2)
+
+    @property
+    def finishes(self) -> IntArray:
+        """Last slot of the middle repetition, (n_cells,)."""
+        return self.begins + self.slots - 1
+
+    @property
     def middle(self) -> Array:
         """Geometric mean of first and last slot, in the middle repetition, (n_cells,)."""
-        first = self.first + self.stride * ((self.repeats - 1) // 2)
-        return np.sqrt(first * (first + self.slots - 1.0))
+        return np.sqrt(self.begins * (self.begins + self.slots - 1.0))
 
 
 def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins:
@@ -51,6 +60,17 @@ def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins
     first = np.array(firsts, dtype=np.intp)
     lasting = np.diff(np.append(first, slots))
     return TimeBins(first, lasting, np.ones_like(first))
+
+
+def with_fine_end(bins: TimeBins) -> TimeBins:
+    """Halve the last cell again and again towards its last slot, where readings are often best."""
+    begins, left = int(bins.first[-1]), int(bins.slots[-1])
+    first = bins.first[:-1].tolist()
+    end = begins + left
+    while left > 0:
+        first.append(end - left)
+        left //= 2
+    return TimeBins(np.array(first), np.diff([*first, end]), np.ones(len(first), dtype=np.intp))
 
 
 def periodic_time_bins(slots: int, period: int, parts: int, growth: float) -> TimeBins:

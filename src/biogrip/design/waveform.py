@@ -47,6 +47,11 @@ class Waveform:
         return self.amplitudes > 0
 
     @property
+    def only_steps(self) -> bool:
+        """True if the torque only changes at steps."""
+        return bool(np.all(self.levels == self.ends)) and not self.swings.any()
+
+    @property
     def highest(self) -> float:
         """Largest torque of all."""
         return float(np.max(np.maximum(self.levels, self.ends) + self.amplitudes))

@@ -11,10 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from biogrip.design.climb import climb
 from biogrip.design.criteria import inverted
 from biogrip.design.experiment import NO_BOUND, DesignInputs, relative_bounds
 from biogrip.design.schedule import Plan, planned
 from biogrip.design.search import best_torques
+from biogrip.design.shapes import STEPS
 from biogrip.errors import BiogripError
 
 
@@ -23,11 +25,16 @@ def plan_within_reach(
     tried: int,
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
+    *,
+    neighbours: int = 0,
 ) -> tuple[DesignInputs, Plan]:
     """Design an experiment, removing parameters from the criterion that no torque determines.
 
-    Arguments are those of `best_torques`. Returns the design problem with the remaining parameters,
-    and the experiment, in which all parameters asked for have a bound.
+    From what the search finds it climbs, as many neighbours of trains of steps being rated as asked
+    for. The other arguments are those of `best_torques`.
+
+    Returns the design problem with the remaining parameters, and the experiment, in which all
+    parameters asked for have a bound.
 
     Raises
     ------
@@ -35,11 +42,21 @@ def plan_within_reach(
         If no torque keeps contact, or none determines any parameter asked for.
     """
     while True:
-        plan = planned(inputs, best_torques(inputs, tried, rng, progress))
+        torques = best_torques(inputs, tried, rng, progress)
+        plan = planned(inputs, torques)
         bounds = relative_bounds(plan.information)[:, inputs.criterion.targets]
         if bounds.max() <= NO_BOUND:
-            return inputs, plan
+            break
         inputs = _without_worst(inputs, plan)
+    if neighbours and STEPS in inputs.shapes:
+        trains = [each for each in torques if each.waveform.only_steps]
+
+        def count_on(count: int, lowest: float) -> None:
+            progress(tried + count, lowest)
+
+        climbed = planned(inputs, climb(inputs, trains, neighbours, rng, count_on))
+        plan = min(plan, climbed, key=lambda each: inputs.typical_bound(each.information))
+    return inputs, plan
 
 
 def _without_worst(inputs: DesignInputs, plan: Plan) -> DesignInputs:

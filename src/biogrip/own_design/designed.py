@@ -17,6 +17,9 @@ from biogrip.instrument.instrument import Instrument
 from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.study import Case
 
+# Neighbours of trains of steps that are rated, for each torque that the search tries.
+_NEIGHBOURS = 4
+
 
 @dataclass(frozen=True)
 class Designed:
@@ -60,7 +63,11 @@ def designed(
     assert block is not None
     rng = stream(study_seed, case.name, 0, "design")
     inputs, plan = plan_within_reach(
-        make_design_inputs(case, earlier), block.candidates, rng, progress
+        make_design_inputs(case, earlier),
+        block.candidates,
+        rng,
+        progress,
+        neighbours=_NEIGHBOURS * block.candidates,
     )
     history = inputs.history(case.phases)
     sensitivity = inputs.sensitivities(history, case.sampling.over(history.end_s))
