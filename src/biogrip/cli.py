@@ -260,7 +260,7 @@ def _design_parser(stages: Any) -> None:
     design = stages.add_parser("design", help=text, description=text)
     design.set_defaults(command=_design, noise_model=None)
     design.examples = _examples(
-        "design my_design.yaml",
+        "design my_design.yaml --export generator",
         "design my_design.yaml --after first.csv --output second.yaml",
         cost="The search takes most, and grows with most_steps.",
     )
@@ -290,6 +290,13 @@ def _design_parser(stages: Any) -> None:
         type=Path,
         default=Path("designed.yaml"),
         help="config for a study, YAML; a page is written beside it [%(default)s]",
+    )
+    design.add_argument(
+        "--export",
+        type=Path,
+        metavar="FOLDER",
+        help="write CASE_protocol.csv, volts for a generator, and CASE_readings.csv, instants for "
+        "a camera, too",
     )
     design.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
@@ -469,6 +476,7 @@ def _design(options: argparse.Namespace) -> None:
         options.output,
         after=options.after,
         read_as=_read_as(options),
+        export=options.export,
         force=options.force,
     )
 

@@ -9,6 +9,7 @@ from biogrip.files import refuse_inputs, write_text
 from biogrip.own_design.as_config import as_config
 from biogrip.own_design.designed import designed, in_words, percent
 from biogrip.own_design.earlier import Recorded, estimate_from_recordings
+from biogrip.own_design.export import check_export, check_limits, export_paths, write_export
 from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.progress import Progress
@@ -25,6 +26,7 @@ def design(
     *,
     after: Sequence[Sequence[Path]],
     read_as: ReadAs,
+    export: Path | None,
     force: bool,
 ) -> None:
     """Design the experiments of cases, write them as a config and as a page, and print them.
@@ -42,13 +44,16 @@ def design(
         another config, YAML files to merge over that of `configs`.
     read_as
         Options for reading these files.
+    export
+        Folder for what a generator and a camera take, made where it is not there.
     force
         If true, replace even files that biogrip did not write.
 
     Raises
     ------
     BiogripError
-        If an option, config or trace cannot be used, or no design is found.
+        If an option, config or trace cannot be used, or no design is found, or one to export
+        exceeds a limit of the config.
     """
     files = [default_config(), *configs]
     study = load_study(read_configs(files), files, for_workflow=False)
@@ -60,9 +65,14 @@ def design(
         raise BiogripError("--after: allowed with one case only; choose it with --case.")
     if read_as != ReadAs() and not after:
         raise BiogripError("found options of a trace, allowed are these with --after only.")
-    refuse_inputs([output, page], [*configs, *chain.from_iterable(after)])
+    exported = export_paths(export, chosen) if export else []
+    if output in exported:
+        raise BiogripError(f"{output}: is a file of --export, too; allowed is another name.")
+    refuse_inputs([output, page, *exported], [*configs, *chain.from_iterable(after)])
     for path in (output, page):
         check_output(path, force=force)
+    if export:
+        check_export(export, exported, force=force)
     found = []
     with Progress("designs", len(chosen), live=True) as progress:
         for case in chosen:
@@ -75,14 +85,19 @@ def design(
                 progress.doing(f"{title}: {count} candidates tried, bound {percent(bound)}")
 
             found.append(designed(case, study.study_seed, tried, earlier))
+            if export:
+                check_limits(found[-1])
             progress.done()
     # Imported lazily: Matplotlib takes a second.
     from biogrip.own_design.page import write_page
 
     write_text(output, as_config(found))
     write_page(found, page)
+    for each in found:
+        if export:
+            write_export(each, export)
     print(visible_lines("\n".join(map(in_words, found))))
-    print(visible_lines(f"Written to {output}, {page}."))
+    print(visible_lines(f"Written to {', '.join(map(str, (output, page, *exported)))}."))
 
 
 def _recorded(files: Sequence[Path], own: Sequence[Path], name: str) -> Recorded:
