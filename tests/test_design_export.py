@@ -20,6 +20,7 @@ from biogrip.design.schedule import Plan
 from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.protocol import Load, Phase, load, torque_at
+from biogrip.experiment.sampling import Burst
 from biogrip.own_design.breakpoints import FINENESS, breakpoints
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
@@ -204,6 +205,24 @@ def test_lines_deviate_by_no_more_than_is_said(held: Load, *, root: bool) -> Non
     assert np.abs(deviation).max() <= 8.0 * FINENESS * (1 + 1e-3)
     if held.value_Nm == 8.0 or held.value_Nm == 0.0:
         assert values.min() == 0.0
+
+
+def test_a_ramp_to_zero_is_one_that_a_study_takes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of rates and durations with which rounding would leave a torque below zero."""
+    down = load(44.07, 6.75e-10, 0.0)
+    assert down.at(44.07) < 0
+
+    def to_zero(inputs: DesignInputs, *_: Any) -> tuple[DesignInputs, Plan]:
+        plan = Plan((Phase(44.07, down, down),), (Burst(1.0, 10.0, 400),), np.eye(4)[None], 0.0)
+        return inputs, plan
+
+    monkeypatch.setattr("biogrip.own_design.designed.plan_within_reach", to_zero)
+    assert command(tmp_path, DROP) == 0
+    assert case_in(tmp_path).phases[0].left.value_Nm == 6.75e-10
+    _, rows = read(tmp_path / "generator" / "liquid_drop_2_protocol.csv")
+    assert rows[-1].tolist() == [44.07, 0.0]
 
 
 @pytest.mark.usefixtures("any_torque")

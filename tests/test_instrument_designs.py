@@ -21,10 +21,12 @@ from biogrip.experiment.sample_model import in_pascals
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, identify_sample, judge, set_up, simulate
 from biogrip.products.files.identifications import columns
+from biogrip.study.design_inputs import plausible
 from tests.helpers.default import study_of
 from tests.test_instruments import OF_A_GRIPPER
 
 LASTS_S, READINGS = 30.0, 90
+RANGES = {"k_alpha": [500.0, 4000.0], "alpha": [0.2, 0.5]}
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,13 @@ ASKS = {
     "stress": Ask("zener_maxwell", SOLID, 1.0, 20.0, "sinusoids"),
     "force": Ask("maxwell", {"k": 0.02, "c": 0.1}, 1e-6, 2e-10, "ramps"),
 }
+# Of samples within RANGES.
+RANGED = {
+    "strain": Ask(
+        "fractional_zener", {"k": 800.0, "k_p": 100.0, "k_alpha": 2e3, "alpha": 0.4}, 40.0, 2e-4
+    ),
+    "stress": Ask("springpot", {"k_alpha": 1e3, "alpha": 0.4}, 0.5, 2.0),
+}
 
 
 @dataclass(frozen=True)
@@ -74,12 +83,9 @@ class Found:
     """What the command said and wrote."""
 
     reading: str
+    ask: Ask
     said: str
     folder: Path
-
-    @property
-    def ask(self) -> Ask:
-        return ASKS[self.reading]
 
     @property
     def written(self) -> dict[str, Any]:
@@ -116,13 +122,16 @@ class Found:
         return [(float(one.replace("none", "inf")), float(other)) for one, other in rows]
 
 
-def commanded(folder: Path, reading: str, *options: str, **more: Any) -> Found:
-    (folder / "asked.yaml").write_text(yaml.safe_dump(ASKS[reading].config(reading, **more)))
+def commanded(
+    folder: Path, reading: str, *options: str, ask: Ask | None = None, **more: Any
+) -> Found:
+    ask = ask or ASKS[reading]
+    (folder / "asked.yaml").write_text(yaml.safe_dump(ask.config(reading, **more)))
     said = StringIO()
     command = ["design", str(folder / "asked.yaml"), "--output", str(folder / "out.yaml")]
     with redirect_stdout(said):
         assert main([*command, "--force", *options]) == 0
-    return Found(reading, said.getvalue(), folder)
+    return Found(reading, ask, said.getvalue(), folder)
 
 
 @pytest.fixture(scope="module", params=ASKS)
@@ -130,15 +139,16 @@ def found(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return commanded(tmp_path_factory.mktemp("design"), request.param)
 
 
-def bounds(reading: str, phases: tuple[Phase, ...], times: Array) -> Array:
+def bounds(
+    found: Found, phases: tuple[Phase, ...], times: Array, truth: dict[str, float] | None = None
+) -> Array:
     """Compute bounds in percent from differences of simulated traces."""
-    ask = ASKS[reading]
-    experiment = set_up(INSTRUMENTS[reading], phases, Sample(ask.model))
+    ask, truth = found.ask, truth or found.ask.truth
+    experiment = set_up(INSTRUMENTS[found.reading], phases, Sample(ask.model))
     rows = []
-    for name, value in ask.truth.items():
+    for name, value in truth.items():
         either = [
-            simulate(experiment, {**ask.truth, name: value * np.exp(h)}, times)
-            for h in (1e-3, -1e-3)
+            simulate(experiment, {**truth, name: value * np.exp(h)}, times) for h in (1e-3, -1e-3)
         ]
         rows.append((either[0] - either[1]) / 2e-3 / ask.noise)
     information = np.array(rows) @ np.array(rows).T
@@ -146,14 +156,14 @@ def bounds(reading: str, phases: tuple[Phase, ...], times: Array) -> Array:
 
 
 def test_bounds_are_those_of_simulated_traces_and_beat_a_hold(found: Found) -> None:
-    designed = bounds(found.reading, found.phases, found.times_s)
+    designed = bounds(found, found.phases, found.times_s)
     assert len(found.times_s) == READINGS
     # In print they have two digits.
     np.testing.assert_allclose([own for _, own in found.promised], designed, rtol=0.06)
     assert designed.max() < 20
     plain = (hold(LASTS_S, found.ask.largest),)
     even = np.arange(1, READINGS + 1) * LASTS_S / READINGS
-    configured = bounds(found.reading, plain, even)
+    configured = bounds(found, plain, even)
     assert designed.max() < configured.max()
     np.testing.assert_allclose([one for one, _ in found.promised], configured, rtol=0.06)
 
@@ -208,6 +218,30 @@ def test_intervals_from_traces_of_it_hold_the_truth(found: Found) -> None:
                 held[name] += finding.low <= found.ask.truth[name] <= finding.high
     fewest = int(binom.ppf(1e-3 / len(held), 50, 0.95))
     assert min(held.values()) >= fewest
+
+
+@pytest.mark.parametrize("reading", RANGED)
+def test_of_plausible_fractional_samples_the_worst_is_said(reading: str, tmp_path: Path) -> None:
+    """With names of several lengths one below the other."""
+    ask = RANGED[reading]
+    found = commanded(tmp_path, reading, ask=ask, ranges=RANGES, plausible_samples=3)
+    case = study_of((tmp_path / "asked.yaml").read_text()).cases["cell"]
+    drawn = plausible(case, case.design)
+    assert len(drawn) == 3
+    names = list(ask.truth)
+    for name, (low, high) in RANGES.items():
+        own = drawn[:, names.index(name)]
+        assert low < own.min() < own.max() < high
+    even = np.arange(1, READINGS + 1) * LASTS_S / READINGS
+    experiments = ((hold(LASTS_S, ask.largest),), even), (found.phases, found.times_s)
+    worst = [
+        np.max([bounds(found, *each, dict(zip(names, one, strict=True))) for one in drawn], axis=0)
+        for each in experiments
+    ]
+    np.testing.assert_allclose(np.transpose(found.promised), worst, rtol=0.06)
+    assert worst[1].max() < 0.7 * worst[0].max()
+    rows = [line for line in found.said.splitlines() if " | " in line][1:]
+    assert len({line.index("|") for line in rows}) == 1
 
 
 def test_after_a_trace_the_next_experiment_tells_more(tmp_path: Path) -> None:

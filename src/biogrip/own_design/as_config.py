@@ -44,7 +44,9 @@ def _keys(phase: Phase, base: str) -> Iterator[tuple[str, float]]:
     yield "duration_s", phase.duration_s
     yield base, phase.left.value_Nm
     if phase.left.slope_Nm_per_s:
-        yield ramp, float(f"{phase.left.at(phase.duration_s):.12g}")
+        end = float(phase.left.at(phase.duration_s))
+        # A ramp to zero ends there but for rounding, which may have the other sign.
+        yield ramp, float(f"{end:.12g}") if abs(end) > 1e-12 * phase.left.value_Nm else 0.0
     for harmonic in phase.left.harmonics:
         yield swing, harmonic.amplitude_Nm
         yield "frequency_Hz", float(f"{harmonic.frequency_Hz:.12g}")

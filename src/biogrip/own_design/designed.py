@@ -87,8 +87,9 @@ def in_words(found: Designed) -> str:
     worst = [np.max(bounds, axis=0) for bounds in (found.before, found.after)]
     several = f", worst of {len(found.after)} plausible samples" if len(found.after) > 1 else ""
     lines.append(f"  bound (1 standard deviation{several}): as configured | designed")
+    width = max(map(len, model.names)) + 13
     for name, before, after in zip(model.names, *worst, strict=True):
-        lines.append(f"  {name:4} {percent(before):>12} | {percent(after)}")
+        lines.append(f"  {name} {percent(before):>{width - len(name)}} | {percent(after)}")
     if found.inputs.out_of_reach:
         lines.append(f"  {left_out(found.inputs)}")
     controlled = found.inputs.instrument.controlled.name
