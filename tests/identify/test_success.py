@@ -8,9 +8,9 @@ from biogrip.identify.success import near_noise, near_noise_words, typical
 
 
 def found(misfit: list[float], noise: list[float | None]) -> pd.DataFrame:
-    return pd.DataFrame(
-        {"seed": range(len(misfit)), "misfit_rad": misfit, "noise_rms_rad": noise}
-    ).astype({"noise_rms_rad": float})
+    return pd.DataFrame({"seed": range(len(misfit)), "misfit": misfit, "noise_rms": noise}).astype(
+        {"noise_rms": float}
+    )
 
 
 def test_the_typical_run_is_that_of_median_excess_and_not_of_the_quietest_trace() -> None:

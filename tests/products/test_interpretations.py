@@ -61,12 +61,12 @@ def test_a_reading_that_changes_nothing_finds_what_the_study_finds(folder: Path)
     ours = read_identifications(path)
     rows = INTERPRETATIONS.read(folder / INTERPRETATIONS.path.format(**CASE))
     same = rows[rows["interpretation"] == "printed"].reset_index(drop=True)
-    for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit_rad"):
+    for column in ("k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m", "misfit"):
         np.testing.assert_array_equal(same[column], ours[column])
-    np.testing.assert_array_equal(same["noise_rms_rad"], ours["noise_rms_rad"])
+    np.testing.assert_array_equal(same["noise_rms"], ours["noise_rms"])
     for name in ("three", "uniform"):
         others = rows[rows["interpretation"] == name].reset_index(drop=True)
-        assert not np.array_equal(others["misfit_rad"], same["misfit_rad"]), name
+        assert not np.array_equal(others["misfit"], same["misfit"]), name
 
 
 def test_the_table_has_a_row_for_each_case_and_reading(folder: Path) -> None:

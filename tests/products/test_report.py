@@ -353,7 +353,7 @@ def test_choices_are_followed(opened: Opened, finished: Path) -> None:
     assert np.allclose(drawn[0], trace, rtol=0, atol=np.max(np.abs(trace)) / 2**16)
     left = page.evaluate("Array.from(document.getElementById('plot-residual').data[0].y)")
     assert np.allclose(np.array(drawn[0]) - np.array(drawn[2]), left, rtol=0, atol=1e-9)
-    misfit = page.evaluate("biogrip.cases[1].methods[1].fits.find(f => f.seed === 2).misfit_rad")
+    misfit = page.evaluate("biogrip.cases[1].methods[1].fits.find(f => f.seed === 2).misfit")
     assert np.sqrt(np.mean(np.square(left))) == pytest.approx(misfit, rel=1e-3)
     assert opened.problems == []
 
@@ -369,7 +369,7 @@ def test_a_sample_of_one_s_own_is_judged_at_once(opened: Opened) -> None:
                 const logs = biogrip.inference.logsOf(item.layout, item.truth);
                 const respond = x => Array.from(biogrip.mechanics.rotation(item.gripper,
                     biogrip.inference.sampleOf(item.layout, x), item.torque, item.times));
-                return biogrip.inference.deviations(item.layout, logs, respond, item.noise_rad);
+                return biogrip.inference.deviations(item.layout, logs, respond, item.noise);
                 })()"""
             )
         )

@@ -96,7 +96,7 @@ def test_a_case_has_its_results(study: Path, name: str) -> None:
     assert len(found) == 2
     if name in NOISY:
         # Misfits end near the 1 % noise, not near the signal, a hundred times that.
-        assert np.all(found["misfit_rad"] < 8 * found["noise_rms_rad"])
+        assert np.all(found["misfit"] < 8 * found["noise_rms"])
 
 
 def test_without_noise_all_is_determined_and_drawn(study: Path) -> None:

@@ -32,7 +32,7 @@ def test_a_recorded_trace_gets_what_a_simulated_one_gets(recorded: Path) -> None
     assert page.count("data:image/png;base64,") == 3
     identified = pd.read_csv(results / "identifications" / "my_trace.csv")
     assert len(identified) == 1
-    assert identified["noise_rms_rad"].isna().all()
+    assert identified["noise_rms"].isna().all()
     k = next(item for item in found["quantities"] if item["quantity"] == "k")
     assert k["low"] < identified["k_N_per_m"][0] < k["high"]
 

@@ -23,7 +23,7 @@ from tests.helpers.runs import SMALL, TINY, replaced, results_of, snakemake, tab
 
 COLUMNS = (
     *("case", "method", "seed", "k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"),
-    *("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"),
+    *("misfit", "noise_rms", "generations", "evaluations", "stop_reason"),
 )
 CASES = ("endothelial_cell", "liquid_drop_2")
 METHODS = ("genetic", "least_squares", "differential_evolution")
@@ -43,9 +43,9 @@ def test_results_have_the_names_and_columns_they_promise(finished: Path) -> None
         assert found["method"].unique().tolist() == list(METHODS)
         assert found["seed"].tolist() == [0, 1, 2, 3] * len(METHODS)
         history = pd.read_parquet(results / "histories" / f"{case}.parquet")
-        ends = history.groupby(["method", "seed"], sort=False)["best_misfit_rad"].last()
+        ends = history.groupby(["method", "seed"], sort=False)["best_misfit"].last()
         last = ends.to_numpy()
-        np.testing.assert_allclose(last, found["misfit_rad"], rtol=1e-6)
+        np.testing.assert_allclose(last, found["misfit"], rtol=1e-6)
         for suffix in (".csv", ".md", ".tex", ".html"):
             table = (results / "tables" / f"errors_{case}{suffix}").read_text()
             shown = table.replace("\\_", "_")
@@ -93,9 +93,9 @@ def test_measurements_are_target_and_noise_and_can_be_opened(finished: Path) -> 
     traces = sorted((finished / "results" / "measurements" / CASES[0]).glob("*.parquet"))
     assert [path.stem for path in traces] == ["seeds_0-1", "seeds_2-3"]
     recorded = pq.read_table(traces[0]).to_pandas()
-    assert list(recorded.columns) == ["time_s", "target_rad", "seed_0", "seed_1"]
-    noise = recorded[["seed_0", "seed_1"]].sub(recorded["target_rad"], axis=0)
-    level = noise.std() / recorded["target_rad"].max()
+    assert list(recorded.columns) == ["time_s", "target", "seed_0", "seed_1"]
+    noise = recorded[["seed_0", "seed_1"]].sub(recorded["target"], axis=0)
+    level = noise.std() / recorded["target"].max()
     # 401 samples: 3.5 % of the standard deviation, four times that is allowed.
     assert np.all(np.abs(level / 0.1 - 1) < 0.14)
 
@@ -112,10 +112,10 @@ def test_last_row_is_the_identification_that_its_own_trace_gives(
     response = step_response(gripper, generalized_maxwell(sample))
     fitted = rotation(response, steps, trace["time_s"].to_numpy())[0]
     assert np.sqrt(np.mean((fitted - trace["seed_3"]) ** 2)) == pytest.approx(
-        found["misfit_rad"], rel=1e-6
+        found["misfit"], rel=1e-6
     )
-    noise = trace["seed_3"] - trace["target_rad"]
-    assert np.sqrt(np.mean(noise**2)) == pytest.approx(found["noise_rms_rad"], rel=1e-6)
+    noise = trace["seed_3"] - trace["target"]
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(found["noise_rms"], rel=1e-6)
 
 
 @pytest.mark.parametrize("batch_size", [1, 3])

@@ -14,8 +14,8 @@ def typical(found: pd.DataFrame) -> pd.Series:
     or absent, the identification of median misfit is returned. Of an even number, it is
     the better of the two in the middle.
     """
-    noise = found["noise_rms_rad"].where(found["noise_rms_rad"] > 0).fillna(1.0)
-    ranked = (found["misfit_rad"] / noise).sort_values(kind="stable").index
+    noise = found["noise_rms"].where(found["noise_rms"] > 0).fillna(1.0)
+    ranked = (found["misfit"] / noise).sort_values(kind="stable").index
     return found.loc[ranked[(len(ranked) - 1) // 2]]
 
 
@@ -32,9 +32,9 @@ def chi_square_increase(found: pd.DataFrame, samples: int) -> Array:
     samples
         Number of readings in a trace.
     """
-    misfit = found["misfit_rad"]
+    misfit = found["misfit"]
     lowest = misfit.groupby(found["seed"]).transform("min")
-    lowest = np.fmin(lowest, found["noise_rms_rad"].where(found["noise_rms_rad"] > 0))
+    lowest = np.fmin(lowest, found["noise_rms"].where(found["noise_rms"] > 0))
     increase: Array = samples * ((misfit / lowest) ** 2 - 1).to_numpy(float)
     return increase
 
@@ -46,7 +46,7 @@ def near_noise(found: pd.DataFrame, tolerance: float) -> NDArray[np.bool_]:
     a misfit 2 % above the noise increases chi^2 of 4001 readings by 162; see
     `chi_square_increase`.
     """
-    misfit, noise = (found[name].to_numpy(float) for name in ("misfit_rad", "noise_rms_rad"))
+    misfit, noise = (found[name].to_numpy(float) for name in ("misfit", "noise_rms"))
     reached: NDArray[np.bool_] = misfit <= (1 + tolerance) * noise
     return reached
 

@@ -35,7 +35,7 @@ def files(tmp_path: Path) -> dict[str, Any]:
     nothing = np.zeros_like(time_s)
     write_target(tmp_path / "target.csv", time_s, nothing, rotation, nothing)
     names = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
-    head = ["case", "method", "seed", *names, "misfit_rad", "noise_rms_rad", "generations"]
+    head = ["case", "method", "seed", *names, "misfit", "noise_rms", "generations"]
     rows = [
         [CASE, "genetic", seed, k, 1e-4, 9.9, 0.1, 1e-4, 1e-4, 7, 100, "stalled"]
         for seed, k in enumerate((9.0, 1e-6, 10.0))

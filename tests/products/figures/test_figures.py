@@ -89,13 +89,13 @@ def test_no_more_seeds_are_drawn_than_can_be_seen(
     others_before = np.flatnonzero(numbers != shown)[: (seeds - 1) // 2]
     misfit = np.where(np.isin(numbers, others_before), 1.0, 1.5)
     misfit[shown] = 1.2
-    found = pd.DataFrame({"seed": numbers, "misfit_rad": misfit, "noise_rms_rad": 1.0})
+    found = pd.DataFrame({"seed": numbers, "misfit": misfit, "noise_rms": 1.0})
     for column in ("case", "generations", "evaluations", "stop_reason"):
         found[column] = 1
     found["method"] = "genetic"
     found.to_csv(tmp_path / "found.csv", index=False)
     history = {"seed": np.repeat(numbers, 2), "generation": np.tile([0, 1], seeds)}
-    history["best_misfit_rad"] = np.repeat(misfit, 2)
+    history["best_misfit"] = np.repeat(misfit, 2)
     pd.DataFrame(history).assign(method="genetic").to_parquet(tmp_path / "history.parquet")
     study = seen(shown_method=METHODS["genetic"], near_noise_tolerance=0.02)
     case = seen(title="A cell", mutation_start=20, study=study)

@@ -104,7 +104,7 @@ def drawn_valley(
     rows = {f"{name}_Ns_per_m": values for name, values in fits.items()}
     frame = pd.DataFrame(rows).assign(case="x", method="least_squares")
     frame["seed"] = range(len(frame))
-    for column in ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason"):
+    for column in ("misfit", "noise_rms", "generations", "evaluations", "stop_reason"):
         frame[column] = 1
     frame.to_csv(folder / "found.csv", index=False)
     paper = seen(identified=known.get("paper", {}))

@@ -77,7 +77,7 @@ def identifications(tmp_path: Path) -> Path:
         rows.append([CASE, "genetic", seed, k, 1e-4, 10.0, 1e-3, misfit, noise, 7, 100, "stalled"])
     path = tmp_path / f"{CASE}.csv"
     names = ["k_N_per_m", "k_p_N_per_m", "c_Ns_per_m", "c_p_Ns_per_m"]
-    leading = ["case", "method", "seed", *names, "misfit_rad", "noise_rms_rad", "generations"]
+    leading = ["case", "method", "seed", *names, "misfit", "noise_rms", "generations"]
     pd.DataFrame(rows, columns=[*leading, "evaluations", "stop_reason"]).to_csv(path, index=False)
     return path
 

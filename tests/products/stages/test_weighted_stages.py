@@ -35,5 +35,5 @@ def test_all_stages_weight_the_readings(tmp_path: Path) -> None:
     outputs = [tmp_path / name for name in ("p.csv", "h.parquet", "t.csv")]
     identification.identify(case, "least_squares", range(1), traces, [], *outputs)
     (found,) = pd.read_csv(outputs[0]).itertuples()
-    assert found.misfit_rad == pytest.approx(judged["misfit_rad"], rel=1e-4)
+    assert found.misfit == pytest.approx(judged["misfit"], rel=1e-4)
     assert found.k_N_per_m == pytest.approx(judged["quantities"][0]["value"], rel=1e-3)

@@ -85,7 +85,7 @@ def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> 
     """Every seed has k_p from the start and k from generation 30; a third stop before, with c."""
     rows = [
         {
-            **{"seed": seed, "generation": generation, "best_misfit_rad": 1.0},
+            **{"seed": seed, "generation": generation, "best_misfit": 1.0},
             **{"k": 8.0 if generation == 30 else 8e3, "k_p": 3.0},
             **{"c": 100.0 if seed % 3 == 0 else 1.0, "c_p": 7.0},
         }
@@ -100,7 +100,7 @@ def test_orders_of_magnitude_at_generation_20_are_those_of_that_generation() -> 
 def test_the_last_improvement_is_the_last_fall_of_the_best_misfit() -> None:
     misfits = {0: [5.0, 4.0, 4.0, 3.0, 3.0], 1: [5.0, 5.0, 5.0], 2: [9.0, 1.0, 1.0]}
     rows = [
-        {"seed": seed, "generation": generation, "best_misfit_rad": misfit, "k": 1.0}
+        {"seed": seed, "generation": generation, "best_misfit": misfit, "k": 1.0}
         for seed, each in misfits.items()
         for generation, misfit in enumerate(each)
     ]
@@ -111,7 +111,7 @@ def test_the_last_improvement_is_the_last_fall_of_the_best_misfit() -> None:
 def identified(table: int, **columns: Any) -> Results:
     count = len(next(iter(columns.values())))
     rows = [
-        {"seed": seed, "generation": 1, "best_misfit_rad": 1.0}
+        {"seed": seed, "generation": 1, "best_misfit": 1.0}
         | TRUE
         | {name: each[seed] for name, each in columns.items()}
         for seed in range(count)

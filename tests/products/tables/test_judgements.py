@@ -75,7 +75,7 @@ def test_models_are_chosen_by_their_criteria(tmp_path: Path) -> None:
             ("maxwell", 2, float(np.exp(-gain / (2 * n)))),
         ):
             fits.append(["drop", model, seed, count, n, misfit])
-    names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
+    names = ["case", "model", "seed", "parameters", "samples", "misfit"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
     tried = {name: Sample(name) for name in ("damper", "maxwell")}
     drop = seen(recorded=False, sample=Sample("maxwell"), models=tried)
@@ -99,7 +99,7 @@ cases:
     assert tried == ("damper", "generalized_maxwell", "generalized_maxwell_2")
     path = tmp_path / "fits.csv"
     fits = [["two", name, 0, 4, 1000, 1.0] for name in tried]
-    names = ["case", "model", "seed", "parameters", "samples", "misfit_rad"]
+    names = ["case", "model", "seed", "parameters", "samples", "misfit"]
     pd.DataFrame(fits, columns=names).to_csv(path, index=False)
     found = rows(models(seen(cases={"two": two}), [path]))
     marked = [row["model"] for row in found if "made the traces" in row["model"]]

@@ -23,16 +23,16 @@ _TICKS = (0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000)
 def draw(case: Case, identifications: Path, histories: Path) -> Figure:
     """Draw each seed's excess of the misfit over its noise, highlighting the typical seed."""
     found = read_identifications(identifications, case.study.shown_method.name)
-    noise = found.set_index("seed")["noise_rms_rad"]
+    noise = found.set_index("seed")["noise_rms"]
     noisy = bool((noise > 0).all())
-    unit = noise if noisy else pd.Series(found["misfit_rad"].min(), index=noise.index)
+    unit = noise if noisy else pd.Series(found["misfit"].min(), index=noise.index)
     shown = int(typical(found)["seed"])
     history = read_history(histories, case.study.shown_method.name, shown)
     reached = near_noise(found, case.study.near_noise_tolerance)
     drawn = figure(COLUMN_IN, 2.5)
     axes = drawn.subplots()
     for seed, rows in history.groupby("seed"):
-        excess = 100 * (rows["best_misfit_rad"] / unit[seed] - 1)
+        excess = 100 * (rows["best_misfit"] / unit[seed] - 1)
         style: dict[str, Any] = {"color": ALL_SEEDS, "linewidth": 0.4, "alpha": 0.7}
         if seed == shown:
             style = {"color": FITTED, "linewidth": 1.5, "zorder": 3}

@@ -96,7 +96,7 @@ def typical_in_words(found: pd.DataFrame) -> str:
 
 
 def read_history(
-    path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit_rad",)
+    path: Path, method: str, shown: int, values: Sequence[str] = ("best_misfit",)
 ) -> pd.DataFrame:
     """Read one method's histories of the seeds drawn individually and of the one shown, Parquet."""
     return read_histories(path, method, values, lambda seed: (seed < SHOWN_SEEDS) | (seed == shown))

@@ -35,7 +35,7 @@ TIMINGS = RowFile(
 """Processor time of each seed, in a file of its own since times are not reproducible."""
 
 LEADING = ("case", "method", "seed")
-TRAILING = ("misfit_rad", "noise_rms_rad", "generations", "evaluations", "stop_reason")
+TRAILING = ("misfit", "noise_rms", "generations", "evaluations", "stop_reason")
 
 
 def parameters_in_file(model: SampleModel) -> tuple[Parameter, ...]:
@@ -67,7 +67,7 @@ class Record:
     seed: int
     """Seed of the trace."""
     answer: Identification
-    noise_rms_rad: float | None
+    noise_rms: float | None
     """RMS of the noise in the trace; None for a recorded trace."""
     cpu_s: float
     """Processor time in seconds; the mean over seeds that are identified together."""
@@ -143,7 +143,7 @@ def _row(record: Record) -> tuple[str | int, ...]:
         record.seed,
         *(f"{values.get(p.name, 0.0):.6g}" for p in parameters_in_file(record.model)),
         f"{answer.misfit_rad:.6e}",
-        "" if record.noise_rms_rad is None else f"{record.noise_rms_rad:.6e}",
+        "" if record.noise_rms is None else f"{record.noise_rms:.6e}",
         answer.generations,
         answer.evaluations,
         answer.stop_reason,
@@ -166,8 +166,8 @@ def _history(record: Record) -> Table:
             "seed": np.full(generations, record.seed, dtype=np.int64),
             "generation": np.arange(generations, dtype=np.int64),
             "evaluations": history.evaluations,
-            "best_misfit_rad": significant(history.best_misfit, _DIGITS),
-            "median_misfit_rad": significant(history.median_misfit, _DIGITS),
+            "best_misfit": significant(history.best_misfit, _DIGITS),
+            "median_misfit": significant(history.median_misfit, _DIGITS),
             **{
                 p.column: significant(
                     np.broadcast_to(values.get(p.name, 0.0), generations), _DIGITS

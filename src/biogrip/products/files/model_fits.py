@@ -4,7 +4,7 @@ from biogrip.products.files.rows import RowFile
 
 MODEL_FITS = RowFile(
     "fits of models",
-    ("case", "model", "seed", "parameters", "samples", "misfit_rad"),
+    ("case", "model", "seed", "parameters", "samples", "misfit"),
     "results/selection/{case}.csv",
     "results/selection/{case}/{batch}.csv",
 )

@@ -30,8 +30,8 @@ _WITHOUT_JAWS = {
 
 # Prefix of a seed's column.
 _SEED = "seed_"
-# Columns that are there if they are known.
-_KNOWN = ("target_rad", "sd_rad")
+# Columns that are there if they are known, with the fields that they are of.
+_KNOWN = {"target": "target_rad", "sd": "sd_rad"}
 _READ_AT_ONCE = 50
 _DIGITS = 9
 _WRITTEN = f"{{:.{_DIGITS - 1}e}}"
@@ -136,10 +136,10 @@ def _target_columns(path: Path) -> Array:
 
 
 def write_measurements(path: Path, measurements: Measurements) -> None:
-    """Write noisy traces as Parquet: time_s, target_rad and sd_rad if known, then seed_0, ..."""
+    """Write noisy traces as Parquet: time_s, target and sd if known, then seed_0, ..."""
     columns = {"time_s": measurements.time_s}
-    for name in _KNOWN:
-        if (known := getattr(measurements, name)) is not None:
+    for name, field in _KNOWN.items():
+        if (known := getattr(measurements, field)) is not None:
             columns[name] = known
     columns |= {f"{_SEED}{seed}": trace for seed, trace in measurements.rotation_rad.items()}
     table = table_of(columns, len(measurements.time_s))
@@ -170,7 +170,7 @@ def each_trace(path: Path) -> Iterator[Array]:
         yield from read_measurements(path, seeds[some]).rotation_rad.values()
 
 
-def write_single_trace(path: Path, time_s: Array, rotation_rad: Array) -> None:
+def write_single_trace(path: Path, time_s: Array, readings: Array, column: str) -> None:
     """Write one noisy trace as CSV in the format of recorded traces."""
-    samples = zip(time_s, rotation_rad, strict=True)
-    write_rows(path, ("time_s", "rotation_rad"), ((f"{t:.10g}", f"{x:.6e}") for t, x in samples))
+    samples = zip(time_s, readings, strict=True)
+    write_rows(path, ("time_s", column), ((f"{t:.10g}", f"{x:.6e}") for t, x in samples))

@@ -29,8 +29,12 @@ EXPECTED = "results/identifiability/expected/{case}.json"
 
 
 def diagnosis_data(diagnosis: "Diagnosis", notes: Sequence[Note] = ()) -> dict[str, Any]:
-    """Return a diagnosis and further notes as plain data in SI units, rounded."""
-    return rounded_numbers(exact_data(diagnosis, notes))
+    """Return a diagnosis and further notes as plain data in SI units, rounded.
+
+    In a study the case says what is read, and no name has its unit.
+    """
+    data = rounded_numbers(exact_data(diagnosis, notes))
+    return {key.removesuffix("_rad"): value for key, value in data.items()}
 
 
 def exact_data(

@@ -19,8 +19,8 @@
     const single = ({ step, counts }) => Array.from(new Int16Array(bytes(counts)), (count) => count * step);
     const times = Array.from(new Float64Array(bytes(given.time_s)));
     return {
-      ...given, times, target: given.target_rad && single(given.target_rad),
-      trace: (index) => single(given.traces_rad[index]),
+      ...given, times, target: given.target && single(given.target),
+      trace: (index) => single(given.traces[index]),
       layout: {
         elements: given.elements.map((e) => e.at),
         low: given.elements.map((e) => e.low), high: given.elements.map((e) => e.high),
@@ -97,7 +97,7 @@
     const note = item.nonlinear ? " The study's model is nonlinear here; the page draws the linear one." : "";
     element("fit-words").textContent = !item.closed_form
       ? `${item.grips ? "Arms or torques differ, arms ring, or readings have weights" : "Creep and relaxation"}: the page does not compute that, and shows traces only.`
-      : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit_rad)} ${item.unit}.${note}` : "";
+      : fit ? `${method.title}, seed ${seed}: ${fit.words}; misfit ${short(fit.misfit)} ${item.unit}.${note}` : "";
     element("plot-profile").dataset.ready = "";
     clearTimeout(showTrace.later);
     showTrace.later = setTimeout(() => { if (fit && item.closed_form) showProfile(item, trace, fit); }, 30);
@@ -185,7 +185,7 @@
     tried.logs = inference.logsOf(item.layout, sample);
     tried.torque = 1;
     tried.moved = false;
-    tried.noise = Math.max(item.noise_rad || item.methods[0].fits[0].misfit_rad, 1e-9);
+    tried.noise = Math.max(item.noise || item.methods[0].fits[0].misfit, 1e-9);
     sliders();
     showTried();
   }

@@ -113,11 +113,11 @@ def _case(
         "end_s": torque.end_s,
         "offset": problem.offset,
         "drift": problem.drift,
-        "noise_rad": sigma,
+        "noise": sigma,
         "time_s": _packed(time_s[::stride], "<f8"),
-        "target_rad": None if target is None else _stepped(target[::stride]),
+        "target": None if target is None else _stepped(target[::stride]),
         "seeds": seeds,
-        "traces_rad": [_stepped(traces[seed][::stride]) for seed in seeds],
+        "traces": [_stepped(traces[seed][::stride]) for seed in seeds],
         "methods": [_method(method, model, files, seeds) for method in methods],
         "threshold": verdicts["threshold"],
         "verdicts": {item["quantity"]: item["verdict"] for item in verdicts["quantities"]},
@@ -174,7 +174,7 @@ def _method(
                 "seed": int(row["seed"]),
                 "sample": _network(model, {p.name: row[p.column] for p in model.parameters}),
                 "words": _words(model, row),
-                "misfit_rad": rounded(float(row["misfit_rad"])),
+                "misfit": rounded(float(row["misfit"])),
                 "history": _history(by_seed.get(row["seed"])),
             }
             for row in rows
@@ -191,7 +191,7 @@ def _history(rows: "pd.DataFrame | None") -> list[list[Any]]:
     """Return generations and the lowest misfit in each."""
     if rows is None or len(rows) < 2:
         return []
-    best = [rounded(float(misfit)) for misfit in rows["best_misfit_rad"]]
+    best = [rounded(float(misfit)) for misfit in rows["best_misfit"]]
     return [[int(generation) for generation in rows["generation"]], best]
 
 

@@ -9,19 +9,22 @@ from biogrip.products.files.traces import (
     write_single_trace,
 )
 from biogrip.products.product import Product, Reads
+from biogrip.products.uses import from_case
+from biogrip.study.study import Case
 
 
-def export(settings: None, seed: int, measurements: Path, trace: Path) -> None:
+def export(case: Case, seed: int, measurements: Path, trace: Path) -> None:
     """Write the trace of one seed as CSV, from measurements in Parquet."""
     recorded = read_measurements(measurements, [seed])
-    write_single_trace(trace, recorded.time_s, recorded.rotation_rad[seed])
+    column = case.instrument.read.column
+    write_single_trace(trace, recorded.time_s, recorded.rotation_rad[seed], column)
 
 
 SINGLE_TRACE = Product(
     "single_trace",
     {"trace": SINGLE_TRACES},
     export,
-    lambda study, job: None,
+    from_case("instrument"),
     lambda plan: [],
     message="Writing trace {seed} of {case} as CSV",
     reads={

@@ -161,7 +161,7 @@ def _succeeded(sweep: SweepContent, point: Case, time_s: Array, found: pd.DataFr
     """
     if point.noise.absent:
         resolution = _resolution_rad(point.problem, sweep.parameters, time_s)
-        found = found.assign(noise_rms_rad=resolution)
+        found = found.assign(noise_rms=resolution)
     return near_noise(found, sweep.study.near_noise_tolerance)
 
 

@@ -45,7 +45,7 @@ class Runs:
     @property
     def last_improvement(self) -> "pd.Series[float]":
         """Generation in which the best misfit fell for the last time, by seed."""
-        falls = self.history.groupby("seed")["best_misfit_rad"].diff() < 0
+        falls = self.history.groupby("seed")["best_misfit"].diff() < 0
         return self.history["generation"].where(falls, 0).groupby(self.history["seed"]).max()
 
     def column(self, name: str) -> str:
@@ -124,6 +124,6 @@ def read_results(
 
 
 def _runs(name: str, truth: Truth, identified: Path, history: Path) -> Runs:
-    columns = ["best_misfit_rad", *(p.column for p in truth.model.parameters)]
+    columns = ["best_misfit", *(p.column for p in truth.model.parameters)]
     found = read_identifications(identified, "genetic")
     return Runs(name, truth, found, read_histories(history, "genetic", columns))

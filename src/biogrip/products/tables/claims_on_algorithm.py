@@ -63,7 +63,7 @@ def judge_stationary(results: Results) -> Judged:
     """Judge whether runs come to rest before the last generation allowed."""
     stalled = [results.runs_of(n).found["stop_reason"] == "stalled" for n in _TABLES]
     falls = [
-        results.runs_of(n).history.groupby("seed")["best_misfit_rad"].diff().fillna(0) <= 0
+        results.runs_of(n).history.groupby("seed")["best_misfit"].diff().fillna(0) <= 0
         for n in _TABLES
     ]
     share = float(np.mean(pd.concat(stalled)))

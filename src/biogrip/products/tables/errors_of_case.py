@@ -53,7 +53,7 @@ def errors_of_case(case: Case, identifications: Path) -> Table:
     truth = case.truth
     found = read_identifications(identifications, case.study.shown)
     shown = found.index.get_loc(typical(found).name)
-    known = bool(found["noise_rms_rad"].notna().all())
+    known = bool(found["noise_rms"].notna().all())
     reached = near_noise(found, case.study.near_noise_tolerance)
     share = float(np.mean(reached)) if known else None
     rows = []

@@ -27,9 +27,7 @@ _COLUMNS = (
 def models(study: Study, fits: list[Path]) -> Table:
     """Count over seeds which model has the lowest AIC and BIC, see `aic_and_bic`."""
     found = pd.concat([MODEL_FITS.read(path) for path in fits])
-    found["aic"], found["bic"] = aic_and_bic(
-        found["misfit_rad"], found["samples"], found["parameters"]
-    )
+    found["aic"], found["bic"] = aic_and_bic(found["misfit"], found["samples"], found["parameters"])
     rows: list[tuple[Cell, ...]] = []
     for case, made in study.cases.items():
         maker = None if made.recorded else made.sample.candidate
