@@ -47,7 +47,11 @@ OVERLAYS = [
     (file.name,)
     for file in sorted((ROOT / "config").glob("*.yaml"))
     if file.name not in ("config.yaml", "designed.yaml", "soft_designed.yaml")
-] + [("design.yaml", "designed.yaml"), ("soft.yaml", "soft_designed.yaml")]
+] + [
+    ("design.yaml", "designed.yaml"),
+    ("soft.yaml", "soft_designed.yaml"),
+    ("measured.yaml", "moduli.yaml"),
+]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 

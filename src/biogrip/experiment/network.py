@@ -33,5 +33,18 @@ def columns_of(parameters: ArrayLike) -> Array:
     return np.where(rigid, _RIGID, columns) if np.any(rigid) else columns
 
 
+def complex_modulus(network: Network, omega: Array) -> tuple[Array, Array]:
+    """Return storage and loss moduli of n samples, in N/m or Pa, each (n, n_omega).
+
+    Angular frequencies are those of all samples, (n_omega,), or of each, (n, n_omega). The formulas
+    hold for parameters with a small imaginary part, too.
+    """
+    rates, across = (network.k / network.c)[:, :, None], omega[..., None, :]
+    share = network.k[:, :, None] / (across**2 + rates**2)
+    storage = network.k_p[:, None] + np.sum(share * across**2, axis=1)
+    loss = network.c_p[:, None] * omega + np.sum(share * across * rates, axis=1)
+    return storage, loss
+
+
 MOST_BRANCHES = 8
 """Most branches for which polynomials are used; springpots have more of them."""

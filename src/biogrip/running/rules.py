@@ -29,6 +29,7 @@ GROUPS = {
     "designs": "designed*",
     "sequences": "sequential*",
     "posteriors": "posterior*",
+    "moduli": "modulus_bands*",
 }
 """Patterns of results that a rule asks for together, see `pathlib.PurePath.match`."""
 

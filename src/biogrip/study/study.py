@@ -88,6 +88,8 @@ class Case:
     """Settings of posterior sampling, if the posterior is sampled."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     """Seeds of the coverage test that are multiples of this get verdicts, too."""
+    profiles_moduli = _of_case(lambda case: case.block.identifiability.moduli)
+    """True if the limits of moduli over frequency are computed."""
 
     @property
     def title(self) -> str:
@@ -427,6 +429,11 @@ class Study:
     def sampled(self) -> list[str]:
         """Names of cases whose posterior is sampled."""
         return [name for name, case in self.cases.items() if case.posterior is not None]
+
+    @property
+    def with_moduli(self) -> list[str]:
+        """Names of cases whose moduli over frequency get limits."""
+        return [name for name, case in self.cases.items() if case.profiles_moduli]
 
     @property
     def published(self) -> list[str]:

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from biogrip.arrays import Array, BoolArray
+from biogrip.experiment.network import complex_modulus
 from biogrip.experiment.noise import standard_deviation
 from biogrip.experiment.sample import Network, SampleModel
 from biogrip.identify.success import near_noise
@@ -126,11 +127,9 @@ def _sensitivities(axes: Axes, model: SampleModel, time_s: Array, relative: Arra
 
 
 def _modulus(network: Network, omega: Array) -> Array:
-    """Return complex stiffnesses of n samples, in N/m or Pa, at s = i omega, (n, n_omega)."""
-    s = 1j * omega
-    rates = (network.k / network.c)[:, :, None]
-    branches = np.sum(network.k[:, :, None] * s / (s + rates), axis=1)
-    return network.k_p[:, None] + network.c_p[:, None] * s + branches
+    """Return complex moduli of n samples, in N/m or Pa, (n, n_omega)."""
+    storage, loss = complex_modulus(network, omega)
+    return storage + 1j * loss
 
 
 def _agreed(moduli: Array) -> BoolArray:
