@@ -12,9 +12,9 @@ from benchmarks.identification import identification_section
 from benchmarks.limit import limit_section
 from benchmarks.local_fits import local_fits_section
 from benchmarks.machine import machine
+from benchmarks.metaheuristics import metaheuristics_section
 from benchmarks.misfit import misfit_section
 from benchmarks.nonlinear import nonlinear_section
-from benchmarks.optimum import optimum_section
 from benchmarks.profiles import profiles_section
 from benchmarks.scale import scale_section
 from benchmarks.section import Section, markdown, number, renewed, written
@@ -33,7 +33,7 @@ SECTIONS: Mapping[str, Callable[[], Section]] = {
     "local_fits": local_fits_section,
     "profiles": profiles_section,
     "sampling": sampling_section,
-    "optimum": optimum_section,
+    "metaheuristics": metaheuristics_section,
     "growth": growth_section,
     "limit": limit_section,
     "study": study_section,

@@ -72,19 +72,3 @@ def clocked(call: Callable[[], Result]) -> tuple[float, Result]:
     start = time.perf_counter()
     result = call()
     return time.perf_counter() - start, result
-
-
-def time_to_success(run_s: float, share: float) -> float:
-    """Time after which repeated runs have succeeded with 99 % probability, t_99.
-
-    Parameters
-    ----------
-    run_s
-        Time of a run.
-    share
-        Share of runs that succeed; with none the answer is infinite.
-    """
-    if share <= 0:
-        return math.inf
-    runs = math.log(0.01) / math.log1p(-share) if share < 1 else 0.0
-    return run_s * max(1.0, runs)

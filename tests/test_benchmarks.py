@@ -1,6 +1,5 @@
 """What of the benchmarks can be checked without a clock."""
 
-import math
 import subprocess
 import sys
 import time
@@ -14,6 +13,7 @@ import pytest
 import yaml
 
 from benchmarks.batch import in_batch
+from benchmarks.budget import Search, Spent, evaluations_99
 from benchmarks.limit import watch_writes, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, in_blocks, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
@@ -23,7 +23,7 @@ from benchmarks.section import Section, number, renewed
 from benchmarks.setup import CONFIG, Problem, evolve, problem
 from benchmarks.starts import fitted, started
 from benchmarks.study import by_rule, in_order, processor_s
-from benchmarks.timing import Timed, alternate, time_to_success
+from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array, IntArray
 from biogrip.design.criteria import Criterion
 from biogrip.design.sampling import best_sampling
@@ -181,12 +181,30 @@ def test_traces_side_by_side_reach_what_they_reach_alone(noisy: Problem) -> None
     assert in_batch(problems, settings) == [answer.misfit_rad for answer in alone]
 
 
-@pytest.mark.parametrize(
-    ("share", "expected"),
-    [(0.0, math.inf), (0.5, 2 * math.log(0.01) / math.log(0.5)), (0.995, 2.0), (1.0, 2.0)],
-)
-def test_time_to_success(share: float, expected: float) -> None:
-    assert time_to_success(2.0, share) == pytest.approx(expected)
+def test_evaluations_until_99_percent_are_there() -> None:
+    """The 99th of 100 if so many are; else as many budgets as leave 1 % without success."""
+    assert evaluations_99(range(1, 100), 100, 200) == 99
+    assert evaluations_99(range(1, 101), 100, 200) == 99
+    half = evaluations_99([3] * 50, 100, 200)
+    assert half is not None
+    assert 0.5 ** (half / 200) == pytest.approx(0.01)
+    assert evaluations_99([], 100, 200) is None
+
+
+def test_a_search_knows_when_it_has_reached_what(noisy: Problem) -> None:
+    """Within a batch, and not beyond the budget."""
+    posed = noisy.case_problem()
+    parameters = np.vstack((noisy.population(3), noisy.truth, noisy.population(1)))
+    misfits = noisy.misfit()(parameters)
+    aims = {"easy": float(misfits[:3].max()), "hard": 1.0001 * float(misfits[3])}
+    search, late = (Search(posed, 1.0, budget, aims) for budget in (4, 3))
+    for each in (search, late):
+        with pytest.raises(Spent):
+            each.misfit(np.log(parameters))
+        assert each.evaluations == len(parameters)
+    assert search.reached == {"easy": 1 + int(np.argmax(misfits <= aims["easy"])), "hard": 4}
+    assert search.parameters == pytest.approx(noisy.truth)
+    assert set(late.reached) == {"easy"}
 
 
 @pytest.mark.parametrize(
@@ -291,14 +309,41 @@ class TestPeers:
         assert not any(new[:3])
         assert new[3]
 
-    def test_methods_from_elsewhere_fit_better_than_the_truth(self, task: "Task") -> None:
-        from benchmarks.optimum import METHODS
+    def test_metaheuristics_have_one_budget(self) -> None:
+        """Each counts as many evaluations as its misfit made, and stops with the budget."""
+        pytest.importorskip("pymoo")
+        pytest.importorskip("pypesto")
+        from benchmarks.identification import Counted
+        from benchmarks.metaheuristics import PEERS, default_study, methods_of, searches_of
 
-        p = problem(case="liquid_drop_1")
-        misfit = p.misfit()
-        for method in METHODS.values():
-            found = method(p, np.random.default_rng(0))
-            assert misfit(found[None])[0] < 1.001 * misfit(p.truth[None])[0]
+        case, budget = default_study().cases["liquid_drop_2"], 1200
+        (start,) = searches_of(case, [0], budget)
+        for title, _, method in methods_of(case):
+            search = start()
+            counted = Counted(search.problem.misfit)
+            search.problem = replace(search.problem, misfit=counted)
+            method([search], [np.random.default_rng(0)])
+            assert search.over
+            assert all(reached <= budget for reached in search.reached.values())
+            assert title not in PEERS or search.evaluations < 2 * budget
+            if title in PEERS and "least squares" not in title:
+                assert search.evaluations == counted.evaluations
+            found = search.problem.misfit(search.parameters[None])[0]
+            assert found == pytest.approx(search.lowest_rad, rel=1e-6)
+
+    def test_metaheuristics_repeat_themselves(self) -> None:
+        """The same runs from the same streams, and the study's traces."""
+        pytest.importorskip("pymoo")
+        pytest.importorskip("pypesto")
+        from benchmarks.metaheuristics import runs_of, section_of
+
+        first, again = (runs_of("liquid_drop_1", range(2), 1200) for _ in range(2))
+        for run in (*first, *again):
+            del run["seconds"]
+        assert first == again
+        rows = section_of([run | {"seconds": 1.0} for run in first]).rows
+        assert {row["seeds"] for row in rows} == {2}
+        assert len({row["method"] for row in rows}) == len(rows) == len(first) / 2
 
     def test_local_fits_reach_the_same_optima(self) -> None:
         pytest.importorskip("lmfit")
