@@ -95,7 +95,7 @@ def compared(problem: tuple[SamplingProblem, int], rounds: int) -> list[Row]:
             return found
 
         ways: Mapping[str, Callable[[], Array]] = {
-            OURS: partial(ours, 5e-3),
+            OURS: partial(ours, 1e-3),
             CLOSER: partial(ours, 1e-4),
             CLARABEL: peer,
         }

@@ -7,6 +7,7 @@ from typing import Any
 
 from benchmarks import identification, misfit
 from benchmarks.designed_sampling import sampling_section
+from benchmarks.designs import designs_section
 from benchmarks.growth import growth_section
 from benchmarks.identification import identification_section
 from benchmarks.limit import limit_section
@@ -33,6 +34,7 @@ SECTIONS: Mapping[str, Callable[[], Section]] = {
     "local_fits": local_fits_section,
     "profiles": profiles_section,
     "sampling": sampling_section,
+    "designs": designs_section,
     "metaheuristics": metaheuristics_section,
     "growth": growth_section,
     "limit": limit_section,

@@ -14,6 +14,10 @@ import yaml
 
 from benchmarks.batch import in_batch
 from benchmarks.budget import Search, Spent, evaluations_99
+from benchmarks.designs import CYCLES, TRAINS
+from benchmarks.designs import FAMILY as NOT_CLIMBED
+from benchmarks.designs import OURS as CLIMBED
+from benchmarks.designs import compared as compared_designs
 from benchmarks.limit import watch_writes, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, in_blocks, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
@@ -32,6 +36,7 @@ from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
+from tests.design.test_plan import DROP
 
 if TYPE_CHECKING:
     from benchmarks.genetic_peers import Task
@@ -229,6 +234,16 @@ def test_the_gap_of_a_sampling(criterion: str, weights: tuple[int, int, int]) ->
     full = feasible(np.full(21, 30.0), capacity, 100)
     assert full.sum() == pytest.approx(100)
     assert full.max() <= 12
+
+
+def test_random_designs_are_rated_as_designs_are() -> None:
+    """Two of four ways search, two draw; none has more than the design that is climbed to."""
+    rows = compared_designs("drop", DROP, 1, 128, 60)
+    assert [row["way"] for row in rows] == [CLIMBED, NOT_CLIMBED, TRAINS, CYCLES]
+    assert [row["torques"] for row in rows[:2]] == [188, 128]
+    assert rows[0]["times_ours"] == 1
+    assert all(row["times_ours"] == row["bound"] / rows[0]["bound"] >= 1 for row in rows)
+    assert all(row["processor_s"] >= rows[0]["processor_s"] for row in rows[2:])
 
 
 def test_a_section_takes_its_place_in_the_report() -> None:

@@ -99,7 +99,8 @@ class DesignSettings(Block):
     plausible_samples: Annotated[int, Field(ge=2, le=256)] = 8
     """Plausible samples, spread evenly over these ranges. By default 8."""
     candidates: Annotated[int, Field(ge=128, le=1_000_000)] = 2000
-    """Torques that the search tries, about, as many of each shape. By default 2000."""
+    """Torques that the search tries, about, as many of each shape. By default 2000. Trains of steps
+    are then climbed from, by four times as many neighbours."""
     sequence: SequenceSettings | None = None
 
     @property

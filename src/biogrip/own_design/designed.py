@@ -17,8 +17,8 @@ from biogrip.instrument.instrument import Instrument
 from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.study import Case
 
-# Neighbours of trains of steps that are rated, for each torque that the search tries.
-_NEIGHBOURS = 4
+NEIGHBOURS = 4
+"""Neighbours of trains of steps that are rated, for each torque that the search tries."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def designed(
         block.candidates,
         rng,
         progress,
-        neighbours=_NEIGHBOURS * block.candidates,
+        neighbours=NEIGHBOURS * block.candidates,
     )
     history = inputs.history(case.phases)
     sensitivity = inputs.sensitivities(history, case.sampling.over(history.end_s))
