@@ -16,8 +16,8 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.design import within_reach
 from biogrip.design.experiment import DesignInputs
+from biogrip.design.rating import Rater, Torque
 from biogrip.design.schedule import Plan
-from biogrip.design.search import Torque, TorqueSearch
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.protocol import Load, Phase, load, torque_at
 from biogrip.experiment.sampling import Burst
@@ -115,9 +115,11 @@ def any_torque(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def some(inputs: DesignInputs, *_: Any) -> list[Torque]:
         (shape,) = inputs.shapes
-        return [TorqueSearch(inputs, SHAPES[shape]).torque(np.array(SHARES[shape]))]
+        waveform = SHAPES[shape].waveform(np.array(SHARES[shape]), inputs.limits)
+        return [Rater(inputs).torque(waveform)]
 
     monkeypatch.setattr(within_reach, "best_torques", some)
+    monkeypatch.setattr(within_reach, "climb", lambda inputs, torques, *_: list(torques))
 
 
 def check_held(case: Case, columns: list[str], rows: Array) -> None:
@@ -214,7 +216,7 @@ def test_a_ramp_to_zero_is_one_that_a_study_takes(
     down = load(44.07, 6.75e-10, 0.0)
     assert down.at(44.07) < 0
 
-    def to_zero(inputs: DesignInputs, *_: Any) -> tuple[DesignInputs, Plan]:
+    def to_zero(inputs: DesignInputs, *_: Any, **_more: Any) -> tuple[DesignInputs, Plan]:
         plan = Plan((Phase(44.07, down, down),), (Burst(1.0, 10.0, 400),), np.eye(4)[None], 0.0)
         return inputs, plan
 
@@ -261,7 +263,7 @@ def test_more_than_the_config_allows_is_refused(
     """As of a search that went too far; nothing is written."""
     usual = within_reach.plan_within_reach
 
-    def too_far(*given: Any) -> tuple[DesignInputs, Plan]:
+    def too_far(*given: Any, **_more: Any) -> tuple[DesignInputs, Plan]:
         inputs, plan = usual(*given)
         one = load(1.0, 1.01 * inputs.largest_Nm)
         return inputs, replace(plan, phases=(*plan.phases[:-1], Phase(1.0, one, one)))
@@ -279,10 +281,12 @@ def test_more_than_the_stroke_is_refused(
     """Of either arm, of which a soft one turns further than the search looks at."""
 
     def whatever(inputs: DesignInputs, *_: Any) -> list[Torque]:
-        found = TorqueSearch(inputs, SHAPES["steps"]).torque(np.array(SHARES["steps"]))
+        waveform = SHAPES["steps"].waveform(np.array(SHARES["steps"]), inputs.limits)
+        found = Rater(inputs).torque(waveform)
         return [replace(found, largest_Nm=inputs.largest_Nm)]
 
     monkeypatch.setattr(within_reach, "best_torques", whatever)
+    monkeypatch.setattr(within_reach, "climb", lambda inputs, torques, *_: list(torques))
     # The soft arm turns by 11 mrad, the other one by less than 10.
     config = {**DROP, "gripper": {arm: {"stiffness_Nm_per_rad": 2.0e-7}}}
     assert command(tmp_path, {**config, "actuator": {"stroke_deg": math.degrees(0.012)}}) == 0
