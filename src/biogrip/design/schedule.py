@@ -21,11 +21,11 @@ from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 
-_GROWTH, _GAP, _FILLINGS = 1.03, 0.001, 300
+_GROWTH, _RINGING, _GAP, _FILLINGS = 1.03, 1.01, 0.001, 300
 # Shares by which steps are made smaller, until the jaws press at all instants.
 _SMALLER = (0.0, 1e-3, 2e-3, 5e-3, 1e-2)
 # Torques that are sampled finely, of which the best is taken.
-_COMPARED = 3
+_COMPARED = 2
 # Under sinusoids: parts of a period, and growth of the number of periods of a cell.
 _PARTS, _PERIODS = 24, 1.4
 # Instants after a step at which the force is computed, and rounding relative to the largest.
@@ -153,7 +153,7 @@ def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
         return periodic_time_bins(
             slots, round(fastest_Hz / harmonic.frequency_Hz), _PARTS, _PERIODS
         )
-    return with_fine_end(time_bins(slots, _GROWTH))
+    return with_fine_end(time_bins(slots, _GROWTH, ringing=_RINGING))
 
 
 def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:

@@ -13,6 +13,8 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 
 _SINGLE = 24
+# Slots after a step until arms are at rest: of a soft sample and a fast camera.
+_RINGING = 3000
 
 
 @dataclass(frozen=True)
@@ -49,13 +51,19 @@ class TimeBins:
         return np.sqrt(self.begins * (self.begins + self.slots - 1.0))
 
 
-def time_bins(slots: int, growth: float, longest: int | None = None) -> TimeBins:
-    """Divide the slots up to the next step into cells that grow by a factor, up to a longest."""
+def time_bins(
+    slots: int, growth: float, longest: int | None = None, *, ringing: float | None = None
+) -> TimeBins:
+    """Divide the slots up to the next step into cells that grow by a factor, up to a longest.
+
+    While arms may ring they grow by another factor if one is given.
+    """
     firsts = list(range(1, min(_SINGLE, slots)))
     place = float(_SINGLE)
     while place < slots:
         firsts.append(int(place))
-        further = place * growth if longest is None else min(place * growth, place + longest)
+        factor = ringing if ringing is not None and place < _RINGING else growth
+        further = place * factor if longest is None else min(place * factor, place + longest)
         place = max(further, place + 1.0)
     first = np.array(firsts, dtype=np.intp)
     lasting = np.diff(np.append(first, slots))
