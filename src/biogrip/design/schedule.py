@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from biogrip.arrays import Array, IntArray
+from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.design.bursts import make_bursts, whole
 from biogrip.design.exchange import exchanged
 from biogrip.design.experiment import DesignInputs, compute_information
@@ -87,7 +87,7 @@ def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
     found: list[Plan] = []
     for torque in torques:
         if phases := _pressing(inputs, torque):
-            found.append(_sampled(inputs, phases))
+            found.append(sampled(inputs, phases))
             if len(found) == _COMPARED:
                 break
     if found:
@@ -117,11 +117,17 @@ def _pressing(inputs: DesignInputs, torque: Torque) -> tuple[Phase, ...]:
 
 def presses(inputs: DesignInputs, phases: Sequence[Phase]) -> bool:
     """Return True if the jaws, if any, press all plausible samples at all instants checked."""
+    return bool(presses_each(inputs, phases).all())
+
+
+def presses_each(inputs: DesignInputs, phases: Sequence[Phase]) -> BoolArray:
+    """Return True for each plausible sample that the jaws, if any, press so, (n,)."""
     if not inputs.instrument.has_jaws:
-        return True
+        return np.ones(len(inputs.parameters), dtype=bool)
     network = inputs.model.network(inputs.parameters)
     _, force = forces(inputs.gripper, network, phases)
-    return bool(np.all(force.min(axis=1) >= -_NOTHING * force.max(axis=1)))
+    pressed: BoolArray = force.min(axis=1) >= -_NOTHING * force.max(axis=1)
+    return pressed
 
 
 def sampling_problem(
@@ -156,7 +162,8 @@ def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
     return with_fine_end(time_bins(slots, _GROWTH, ringing=_RINGING))
 
 
-def _sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
+def sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
+    """Find the best sampling of what is held, and round it to readings that can be taken."""
     problem = sampling_problem(inputs, phases)
     rows, capacity = problem.sensitivity, problem.capacity
     best = best_sampling(

@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import Field
 
 from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.design.price import PriceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.instrument.instrument import Instrument
 from biogrip.keys import Block, Distinct, OneOf, Problem
@@ -102,6 +103,7 @@ class DesignSettings(Block):
     """Torques that the search tries, about, as many of each shape. By default 2000. Trains of steps
     are then climbed from, by four times as many neighbours."""
     sequence: SequenceSettings | None = None
+    price: PriceSettings | None = None
 
     @property
     def unit_s(self) -> float:
@@ -144,9 +146,10 @@ class DesignSettings(Block):
                 text = f"found {' and '.join(given) or 'neither'}, allowed is one of "
                 text += f"{' and '.join(keys[:ours])}, or with another instrument of "
                 yield (), f"{text}{', '.join(keys[ours:])}."
-        if self.sequence and not self.ranges:
-            text = "found no design.ranges, which cells are drawn from; allowed is one at least."
-            yield ("sequence",), text
+        for key in ("sequence", "price"):
+            if getattr(self, key) and not self.ranges:
+                text = "found no design.ranges, which cells are drawn from; allowed is one at "
+                yield (key,), f"{text}least."
         if self.unit_s * self.fastest_Hz < _FEWEST:
             text = f"found {self.shortest_step_s}, allowed is at least two samples long, "
             yield ("shortest_step_s",), f"{text}{_FEWEST / self.fastest_Hz:g} s."

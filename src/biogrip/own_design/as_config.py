@@ -1,6 +1,8 @@
 """Designs as a YAML config to merge over the study's."""
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import zip_longest
 
 from biogrip import __version__
 from biogrip.experiment.protocol import Phase
@@ -18,6 +20,16 @@ def as_config(designs: Iterable[Designed]) -> str:
     for found in designs:
         lines += _case(found)
     return "\n".join(lines) + "\n"
+
+
+def of_sets(designs: Iterable[Designed]) -> list[list[Designed]]:
+    """Return the first experiment of each chosen set, the second, and so on."""
+    plans = [
+        [replace(found, plan=plan) for plan in found.several.plans_of(found.several.chosen)]
+        for found in designs
+        if found.several and found.several.chosen
+    ]
+    return [[one for one in row if one] for row in zip_longest(*plans)]
 
 
 def _case(found: Designed) -> Iterator[str]:

@@ -1,12 +1,14 @@
 """The command ``biogrip design``."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
-from biogrip.own_design.as_config import as_config
+from biogrip.own_design.as_config import as_config, of_sets
+from biogrip.own_design.at_a_price import several_of
 from biogrip.own_design.designed import designed, in_words, percent
 from biogrip.own_design.earlier import Recorded, estimate_from_recordings
 from biogrip.own_design.export import check_export, check_limits, export_paths, write_export
@@ -14,6 +16,7 @@ from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.progress import Progress
 from biogrip.study.defaults import default_config
+from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from biogrip.terminal import visible_lines
@@ -38,7 +41,8 @@ def design(
     names
         Names of cases; by default all that have such a block.
     output
-        YAML file to write; the page is beside it.
+        YAML file to write; the page is beside it, and so are `_1`, `_2` ... of the experiments of a
+        chosen set.
     after
         Earlier traces of the sample in experimental order: each a CSV file and, if recorded under
         another config, YAML files to merge over that of `configs`.
@@ -63,13 +67,19 @@ def design(
         raise BiogripError(f"{output}: allowed is the name of a YAML file; the page is beside it.")
     if after and len(chosen) > 1:
         raise BiogripError("--after: allowed with one case only; choose it with --case.")
+    if after and any(case.block.design and case.block.design.price for case in chosen):
+        text = "design.price: is for cells of which there is no trace yet; leave it out with "
+        raise BiogripError(f"{text}--after.")
     if read_as != ReadAs() and not after:
         raise BiogripError("found options of a trace, allowed are these with --after only.")
     exported = export_paths(export, chosen) if export else []
     if output in exported:
         raise BiogripError(f"{output}: is a file of --export, too; allowed is another name.")
-    refuse_inputs([output, page, *exported], [*configs, *chain.from_iterable(after)])
-    for path in (output, page):
+    numbered = [
+        output.with_stem(f"{output.stem}_{number}") for number in range(1, _most(chosen) + 1)
+    ]
+    refuse_inputs([output, page, *numbered, *exported], [*configs, *chain.from_iterable(after)])
+    for path in (output, page, *numbered):
         check_output(path, force=force)
     if export:
         check_export(export, exported, force=force)
@@ -84,7 +94,13 @@ def design(
             def tried(count: int, bound: float, title: str = case.title) -> None:
                 progress.doing(f"{title}: {count} candidates tried, bound {percent(bound)}")
 
-            found.append(designed(case, study.study_seed, tried, earlier))
+            one = designed(case, study.study_seed, tried, earlier)
+
+            def grouped(count: int, many: int, title: str = case.title) -> None:
+                progress.doing(f"{title}: {count} of {many} groups of experiments designed")
+
+            several = several_of(case, make_design_inputs(case), study.study_seed, grouped)
+            found.append(replace(one, several=several))
             if export:
                 check_limits(found[-1])
             progress.done()
@@ -92,12 +108,22 @@ def design(
     from biogrip.own_design.page import write_page
 
     write_text(output, as_config(found))
+    written = [output, page, *exported]
+    for path, own in zip(numbered, of_sets(found), strict=False):
+        write_text(path, as_config(own))
+        written.append(path)
     write_page(found, page)
     for each in found:
         if export:
             write_export(each, export)
     print(visible_lines("\n".join(map(in_words, found))))
-    print(visible_lines(f"Written to {', '.join(map(str, (output, page, *exported)))}."))
+    print(visible_lines(f"Written to {', '.join(map(str, written))}."))
+
+
+def _most(chosen: Sequence[Case]) -> int:
+    """Return the largest number of different experiments with a cell, if they have a price."""
+    blocks = [case.block.design for case in chosen]
+    return max(block.price.experiments if block and block.price else 0 for block in blocks)
 
 
 def _recorded(files: Sequence[Path], own: Sequence[Path], name: str) -> Recorded:

@@ -10,10 +10,12 @@ from biogrip.arrays import Array
 from biogrip.design.earlier_traces import Earlier
 from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
 from biogrip.design.schedule import Plan, forces
+from biogrip.design.several import Several
 from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.protocol import Phase, largest_load
 from biogrip.experiment.random_streams import stream
 from biogrip.instrument.instrument import Instrument
+from biogrip.own_design.at_a_price import aim, in_lines
 from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.study import Case
 
@@ -40,6 +42,8 @@ class Designed:
     """Times of the jaw force, (n_times,); none without jaws."""
     force_N: Array
     """Jaw force under the plan, (n, n_times)."""
+    several: Several | None = None
+    """Several experiments with each cell of a population, if they have a price."""
 
 
 def designed(
@@ -94,7 +98,17 @@ def in_words(found: Designed) -> str:
         lines.append(f"  {left_out(found.inputs)}")
     controlled = found.inputs.instrument.controlled.name
     best = f"  no other sampling of this {controlled} is better by more than {100 * plan.gap:.2g} %"
-    return "\n".join([*lines, f"{best}{_pressed(found)}"])
+    lines.append(f"{best}{_pressed(found)}")
+    if found.several:
+        lines += [f"  {line}" for line in in_lines(found.several, aim_of(found))]
+    return "\n".join(lines)
+
+
+def aim_of(found: Designed) -> str:
+    """Return what is asked of several experiments, in words."""
+    assert found.several is not None
+    targets = make_design_inputs(found.case).criterion.targets
+    return aim(found.case, found.several, [found.inputs.model.names[index] for index in targets])
 
 
 def _pressed(found: Designed) -> str:

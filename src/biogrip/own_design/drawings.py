@@ -2,17 +2,25 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from biogrip.design.several import Several
 from biogrip.digits import counted, with_unit
 from biogrip.experiment.protocol import Phase
+from biogrip.own_design.at_a_price import WAYS, points
 from biogrip.own_design.designed import Designed, kind, shown_unit
 from biogrip.products.figures.style import BLACK, BLUE, GREEN, ORANGE, PAGE_IN, PURPLE, SKY, figure
 
 _COLOURS = (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK)
+_WAYS: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "marker": "o", "drawstyle": "steps-post"},
+    {"color": PURPLE, "marker": "^", "drawstyle": "steps-post", "ls": "-."},
+    {"color": ORANGE, "marker": "D", "ls": "--"},
+)
 _AFTER = 120
 # Most periods that are drawn one by one.
 _MOST_DRAWN = 40
@@ -99,6 +107,20 @@ def draw_sensitivities(found: Designed) -> Figure:
     return drawn
 
 
+def draw_price(several: Several) -> Figure:
+    """Draw the share of cells that are known over what experiments with each cost."""
+    drawn = figure(PAGE_IN, 3.2)
+    axes = drawn.subplots()
+    for name, way, style in zip(WAYS, points(several), _WAYS, strict=True):
+        cost, share = zip(*way, strict=True) if way else ((), ())
+        axes.plot(cost, 100 * np.array(share), label=name, ms=3.5, **style)
+    axes.axhline(100 * several.settings.share, color=BLACK, lw=0.6, ls=":")
+    axes.set(xlabel="cost of the experiments with a cell", ylabel="cells known (%)", ylim=(0, 103))
+    axes.set_xlim(left=0)
+    axes.legend(loc="lower right")
+    return drawn
+
+
 def _period_s(phase: Phase) -> float | None:
     """Return the period of a sinusoid that lasts at least one."""
     for harmonic in phase.left.harmonics:
@@ -120,3 +142,9 @@ def drawings(found: Designed) -> Iterator[tuple[str, Figure]]:
         "most readings (ticks); in the last period of a sinusoid",
         draw_sensitivities(found),
     )
+    if found.several:
+        yield (
+            "Share of cells with all quantities as well as asked for (dotted: of how many), over "
+            "what experiments with a cell cost",
+            draw_price(found.several),
+        )

@@ -9,13 +9,23 @@ import jinja2
 import numpy as np
 
 from biogrip import __version__
+from biogrip.design.schedule import Plan
+from biogrip.design.several import Several
 from biogrip.digits import with_unit
 from biogrip.experiment.protocol import Harmonic, Phase
 from biogrip.files import write_text
 from biogrip.instrument.actuator import CombDrive, voltage
 from biogrip.instrument.instrument import Instrument
+from biogrip.own_design.at_a_price import (
+    WAYS,
+    costs,
+    in_print,
+    price_in_words,
+    set_in_words,
+)
 from biogrip.own_design.designed import (
     Designed,
+    aim_of,
     in_numbers,
     kind,
     left_out,
@@ -98,8 +108,6 @@ def _describe(found: Designed) -> dict[str, Any]:
     plan, inputs, instrument = found.plan, found.inputs, found.inputs.instrument
     with styled():
         figures = [(title, figure_address(drawn)) for title, drawn in drawings(found)]
-    kinds = {kind(phase) for phase in plan.phases}
-    shown = [column for column in _columns(instrument) if column.only in (None, *kinds)]
     return {
         "title": found.case.title,
         "names": inputs.model.names,
@@ -127,6 +135,18 @@ def _describe(found: Designed) -> dict[str, Any]:
         ),
         "readings": len(plan.time_s),
         "end_s": f"{plan.torque.end_s:g}",
+        "to_set": _to_set(found, plan),
+        "several": _several(found, found.several) if found.several else None,
+        "shown": _SHOWN,
+    }
+
+
+def _to_set(found: Designed, plan: Plan) -> dict[str, Any]:
+    """Describe what to set for an experiment."""
+    kinds = {kind(phase) for phase in plan.phases}
+    columns = _columns(found.inputs.instrument)
+    shown = [column for column in columns if column.only in (None, *kinds)]
+    return {
         "in_numbers": in_numbers(plan.phases),
         "follows_root": kinds != {"step"},
         "columns": [column.head for column in shown],
@@ -137,5 +157,22 @@ def _describe(found: Designed) -> dict[str, Any]:
             (f"{burst.from_s:.6g}", f"{burst.rate_Hz:.6g}", str(burst.samples))
             for burst in plan.bursts
         ],
-        "shown": _SHOWN,
+    }
+
+
+def _several(found: Designed, several: Several) -> dict[str, Any]:
+    """Describe several experiments with each cell."""
+    chosen = several.chosen
+    titles = set_in_words(several, chosen) if chosen else []
+    plans = several.plans_of(chosen) if chosen else []
+    return {
+        "price": price_in_words(several.settings),
+        "aim": aim_of(found),
+        "offers": len(several.offers),
+        "ways": WAYS,
+        "rows": [(f"{100 * share:g}", *map(in_print, row)) for share, row in costs(several)],
+        "chosen": [
+            {"title": title, **_to_set(found, plan)}
+            for title, plan in zip(titles, plans, strict=True)
+        ],
     }
