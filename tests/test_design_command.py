@@ -16,6 +16,7 @@ from biogrip.design.experiment import DesignInputs
 from biogrip.design.rating import Rater, Torque
 from biogrip.design.schedule import presses
 from biogrip.design.shapes import SHAPES
+from biogrip.experiment.noise_parts import AR1
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
@@ -23,6 +24,7 @@ from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
 from biogrip.own_design.earlier import Recorded, estimate_from_recordings
 from biogrip.own_traces.read_as import ReadAs
+from biogrip.response.sensitivity import linear_responses
 from biogrip.response.simulation import simulated_rotation
 from biogrip.study.design_inputs import make_design_inputs, plausible, plausible_ends
 from biogrip.study.load import load_study, read_configs
@@ -120,6 +122,51 @@ def test_a_study_takes_other_shapes_with_the_bounds_that_were_promised(
         assert all((f"<th>{column}</th>" in page) == (name == shape) for column in columns)
     largest = max(float(volts) for volts in re.findall(r"<td>[\d.]+ to ([\d.]+)</td>", page))
     assert largest <= float(voltage(case.actuator, 8e-9)) + 1e-3
+
+
+MEMORY = "noise: {ar1: {share: 0.5, time_s: 0.01}, drift: false}, "
+
+
+def test_noise_with_memory_is_said_and_its_bounds_are_those_promised(tmp_path: Path) -> None:
+    """By a dense covariance matrix of the readings that a study takes from the file."""
+    asked = ASKED.replace("readings: 400", f"{MEMORY}readings: 400")
+    (tmp_path / "asked.yaml").write_text(asked)
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path) == 0
+    words = "AR(1) of 0.01 s (50 %), white (50 %) noise of 3 µrad, offset fitted along."
+    unknown = "how much better other readings of this torque may be is not known, as the noise has"
+    assert words in said.getvalue()
+    assert f"  {unknown} memory; the jaws press" in said.getvalue()
+    page = (tmp_path / "out.html").read_text()
+    assert words in page
+    assert f"H{unknown[1:]} memory." in page
+    case = designed_case(tmp_path)
+    assert case.noise.ar1 == AR1(0.5, 0.01)
+    measurement = case.block.measurement
+    assert measurement.coloured
+    assert measurement.fits_offset
+    assert not measurement.fits_drift
+    times = case.sampling.over(case.problem.torque.end_s)
+    values = np.array([[case.parameters[name] for name in case.problem.searched.names]])
+    rows = linear_responses(
+        case.gripper, case.problem.searched, case.problem.torque, times, values, inertia=True
+    )[0, 1:]
+    covariance = 0.5 * (np.eye(400) + np.exp(-np.abs(times[:, None] - times) / 0.01)) * 9e-12
+    rows = np.vstack((rows, 1e-6 * np.ones(400)))
+    inverse = np.linalg.inv(rows @ np.linalg.solve(covariance, rows.T))
+    for name, variance in zip(case.problem.searched.names, np.diag(inverse), strict=False):
+        promised = re.search(rf"^  {name} .*\| (\S+) %$", said.getvalue(), re.MULTILINE)
+        assert promised
+        assert float(promised[1]) == pytest.approx(100 * variance**0.5, rel=0.06)
+
+
+def test_earlier_traces_are_taken_for_white(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "asked.yaml").write_text(ASKED.replace("readings", f"{MEMORY}readings"))
+    assert design(tmp_path, "--after", str(tmp_path / "trace.csv")) == 1
+    assert "--after: takes noise for white; allowed is a block `design`" in capsys.readouterr().err
 
 
 def test_seeds_on_it_come_as_close_as_promised(folder: tuple[Path, str]) -> None:
@@ -375,6 +422,30 @@ def _take_one_torque(monkeypatch: pytest.MonkeyPatch) -> None:
         ),
         (ASKED.replace("candidates: 128", "ranges: {c: [2.0, 1.0]}"), [], "the lower one first"),
         (ASKED.replace("candidates: 128", "shapes: [step]"), [], "Did you mean 'steps'"),
+        (
+            ASKED.replace(
+                "candidates: 128", "noise: {flicker: {share: 0.1}}, readings: 60000"
+            ).replace("readings: 400, ", ""),
+            [],
+            "found 60000, allowed are at most 50000 with noise that has memory",
+        ),
+        (
+            ASKED.replace(
+                "candidates: 128",
+                "noise: {ar1: {share: 0.7, time_s: 1.0}, flicker: {share: 0.7}}",
+            ),
+            [],
+            "found 1.4 with that of ar1, allowed is at most 1 together",
+        ),
+        (
+            ASKED.replace(
+                "candidates: 128",
+                "noise: {flicker: {share: 0.7}}, ranges: {k: [1, 2]}, "
+                "sequence: {cells: 2, experiments: 2}",
+            ),
+            [],
+            "takes noise for white; leave it out with noise that has memory",
+        ),
         (
             ASKED.replace("candidates: 128", "shapes: [ramps], shortest_step_s: 20.0"),
             [],

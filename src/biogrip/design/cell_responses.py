@@ -29,6 +29,10 @@ class CellResponses:
     """Step that each cell comes after, (n_cells,)."""
     places: IntArray
     """Number of each cell among those of a step, (n_cells,)."""
+    middle_s: Array
+    """Middle of each cell, (n_cells,)."""
+    lasting_s: Array
+    """Length of each, over all its repetitions, (n_cells,)."""
     turned_rad: float
     """Largest rotation."""
     pull: float
@@ -45,6 +49,8 @@ class _Part:
 
     steps: IntArray
     places: tuple[IntArray, IntArray]
+    after_s: Array
+    lasting_s: Array
     sensitivity: Array
     capacity: Array
     turned_rad: float
@@ -61,26 +67,29 @@ def compute_cell_responses(
     """
     moving = views.under(waveform)
     slots = np.round(waveform.durations_s * fastest_Hz).astype(np.intp)
+    starts_s = np.append(0.0, np.cumsum(waveform.durations_s))
     parts = []
     if not waveform.swings.all():
         steady = np.flatnonzero(~waveform.swings)
-        parts.append(_compute_responses(moving, steady, time_bins, slots[steady, None]))
+        parts.append(_compute_responses(moving, steady, time_bins, slots[steady, None], fastest_Hz))
     for k in np.flatnonzero(waveform.swings):
         period = round(waveform.periods_s[k] * fastest_Hz)
         own = periodic_time_bins(int(slots[k]), period, _PARTS, _PERIODS)
-        times = own.middle / fastest_Hz
-        parts.append(_compute_responses(moving, np.array([k]), own, slots[[k], None], times))
+        parts.append(_compute_responses(moving, np.array([k]), own, slots[[k], None], fastest_Hz))
     largest = np.max([part.largest_N for part in parts], axis=0)
     steps = np.concatenate([part.steps for part in parts])
     lowest = np.concatenate([part.lowest_N for part in parts], axis=1)
     lowest = np.minimum(lowest, moving.last_force[:, steps])
     margin = np.where(steps > 0, _MARGIN, 0.0) * largest[:, None]
     turned = max(part.turned_rad for part in parts)
+    of_cells = np.concatenate([part.places[0] for part in parts])
     return CellResponses(
         np.concatenate([part.sensitivity for part in parts], axis=2),
         np.concatenate([part.capacity for part in parts]),
-        np.concatenate([part.places[0] for part in parts]),
+        of_cells,
         np.concatenate([part.places[1] for part in parts]),
+        starts_s[of_cells] + np.concatenate([part.after_s for part in parts]),
+        np.concatenate([part.lasting_s for part in parts]),
         max(turned, float(np.max(np.abs(moving.last_rotation)))),
         float(np.max((margin - lowest) / largest[:, None])) if views.instrument.has_jaws else 0.0,
     )
@@ -91,15 +100,17 @@ def _compute_responses(
     steps: IntArray,
     time_bins: TimeBins,
     slots: IntArray,
-    times_s: Array | None = None,
+    fastest_Hz: float,
 ) -> _Part:
-    """Compute responses in steps with given numbers of slots; in sinusoids if times are given."""
-    view = moving.respond(steps, times_s)
+    """Compute responses in steps with given numbers of slots; in a sinusoid if cells repeat."""
+    swings = time_bins.stride > 0
+    after_s = time_bins.middle / fastest_Hz
+    view = moving.respond(steps, after_s if swings else None)
     covered = time_bins.middle < slots
     turned = float(np.max(np.abs(view.rotation), where=covered, initial=0.0))
     largest = np.max(view.force, axis=(1, 2), where=covered, initial=0.0)
     lowest = np.min(view.force, axis=2, where=covered, initial=np.inf)
-    if times_s is not None:
+    if swings:
         turned += _BETWEEN * float(np.ptp(view.rotation, axis=2).max()) / 2
         lowest -= _BETWEEN * np.ptp(view.force, axis=2) / 2
     capacity = (np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered).astype(float)
@@ -108,4 +119,6 @@ def _compute_responses(
     sensitivity = view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
     there = room > 0
     found = sensitivity[..., there], room[there]
-    return _Part(steps, (steps[rows], places), *found, turned, largest, lowest)
+    longest = np.maximum(time_bins.stride * time_bins.repeats, time_bins.slots) / fastest_Hz
+    at = (steps[rows], places), after_s[places], longest[places]
+    return _Part(steps, *at, *found, turned, largest, lowest)

@@ -39,7 +39,7 @@ class Criterion:
         """Return the criterion of every sample, (n,), from covariances (n, n_asked, n_asked)."""
         if self.name == "D":
             return np.linalg.slogdet(covariances)[1]
-        diagonals = np.diagonal(covariances, axis1=1, axis2=2)
+        diagonals = _variances(covariances)
         if self.name == "A":
             return diagonals.mean(axis=1)
         if self.name == "largest":
@@ -52,7 +52,7 @@ class Criterion:
             values = self.values(covariances)
             logs = values / len(self.targets) if self.name == "D" else np.log(values)
         elif self.name == "largest":
-            logs = _power_mean(np.diagonal(covariances, axis1=1, axis2=2), sharpness)
+            logs = _power_mean(_variances(covariances), sharpness)
         else:
             logs = _power_mean(_eigenvalues(covariances), sharpness)
         if self.over == "mean":
@@ -99,7 +99,7 @@ class Criterion:
         elif self.name == "A":
             z = np.broadcast_to(np.eye(len(self.targets)) / len(self.targets), covariances.shape)
         elif self.name == "largest":
-            shares = _singled_out(np.diagonal(covariances, axis1=1, axis2=2), sharpness)
+            shares = _singled_out(_variances(covariances), sharpness)
             z = shares[:, :, None] * np.eye(len(self.targets))
         else:
             vectors = np.linalg.eigh(covariances)[1]
@@ -111,6 +111,11 @@ class Criterion:
         # The values of D are logarithms already.
         scale = values if self.name != "D" else np.exp(values / len(self.targets))
         return _singled_out(scale[None], sharpness)[0], z
+
+
+def _variances(covariances: Array) -> Array:
+    """Return the diagonals; of singular information rounding may have made them negative."""
+    return np.abs(np.diagonal(covariances, axis1=1, axis2=2))
 
 
 def _eigenvalues(covariances: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion, inverted
+from biogrip.design.noise import WHITE, DesignNoise
 from biogrip.design.waveform import Limits
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import SampleModel
@@ -58,6 +59,8 @@ class DesignInputs:
     """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
     instrument: Instrument = GRIPPER
     """What is held and read."""
+    noise: DesignNoise = WHITE
+    """What of the noise is not white, and what is fitted along."""
 
     def history(self, phases: tuple[Phase, ...]) -> TorqueHistory:
         """Return what phases hold against time."""
@@ -74,6 +77,29 @@ class DesignInputs:
             inertia=self.instrument.has_jaws,
         )
         return rows[:, 1:] / self.noise_rad
+
+    def along(self, time_s: Array) -> Array:
+        """Return what is fitted along at some times, (n_functions, n_times)."""
+        return self.noise.along(time_s, self.limits.longest_s)
+
+    @property
+    def processes(self) -> tuple[Array, Array]:
+        """Shares and rates in 1/s of the noise's parts with memory, (n_parts,)."""
+        return self.noise.processes(1 / self.fastest_Hz, self.limits.longest_s)
+
+    @property
+    def before_along(self) -> Array:
+        """Information from earlier experiments, and none on what is fitted along."""
+        more = self.noise.fits_offset + self.noise.fits_drift
+        return np.pad(self.before, [(0, 0)] * (self.before.ndim - 2) + [(0, more)] * 2)
+
+    def information(self, torque: TorqueHistory, time_s: Array) -> Array:
+        """Compute the Fisher information of readings, including `before`, with the noise's memory.
+
+        Of the log-parameters, (n, n_parameters, n_parameters).
+        """
+        read = self.noise.whiten(time_s, self.sensitivities(torque, time_s))
+        return compute_information(read) + self.before
 
     def typical_bound(self, information: Array) -> float:
         """Return the criterion of information, including `before`, as a relative bound."""

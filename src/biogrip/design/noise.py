@@ -9,8 +9,10 @@ that are whitened and rid of offset and drift, in linear time (`biogrip.response
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import numpy as np
+
 from biogrip.arrays import Array
-from biogrip.experiment.noise_parts import AR1, Flicker
+from biogrip.experiment.noise_parts import AR1, Flicker, flicker_rates
 from biogrip.keys import Block, Problem
 from biogrip.response.nuisance import nuisance_basis, without
 from biogrip.response.whitening import NoiseModel, Whitening
@@ -65,6 +67,26 @@ class DesignNoise(Block):
             self.ar1.time_s if self.ar1 else 1.0,
             self.flicker.share if self.flicker else 0.0,
         )
+
+    def processes(self, shortest_s: float, longest_s: float) -> tuple[Array, Array]:
+        """Return shares in the variance and rates in 1/s of its parts with memory, (n_parts,).
+
+        Those of 1/f noise cover the times between two limits.
+        """
+        shares, rates = [np.zeros(0)], [np.zeros(0)]
+        if self.ar1:
+            shares.append(np.array([self.ar1.share]))
+            rates.append(np.array([1 / self.ar1.time_s]))
+        if self.flicker:
+            rates.append(flicker_rates(np.array([0.0, shortest_s, longest_s])))
+            shares.append(np.full(len(rates[-1]), self.flicker.share / len(rates[-1])))
+        return np.concatenate(shares), np.concatenate(rates)
+
+    def along(self, time_s: Array, longest_s: float) -> Array:
+        """Return what is fitted along at some times, (n_functions, n_times)."""
+        functions = [np.ones_like(time_s)] * self.fits_offset
+        functions += [time_s / longest_s] * self.fits_drift
+        return np.array(functions).reshape(-1, len(time_s))
 
     def whiten(self, time_s: Array, sensitivity: Array) -> Array:
         """Whiten sensitivities, (..., n_times), and rid them of offset and drift.

@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from biogrip.arrays import Array
 from biogrip.design.cell_responses import CellResponses, compute_cell_responses
 from biogrip.design.experiment import DesignInputs
 from biogrip.design.sampling import Mixture, Optimum, best_sampling
+from biogrip.design.spread_readings import effective_capacity
 from biogrip.design.time_bins import time_bins
 from biogrip.design.views import Views
 from biogrip.design.waveform import Waveform
@@ -77,13 +79,13 @@ class Rater:
             return Rated(LOST * (1 + responses.pull))
         scale = self._scaled(waveform, responses).largest_Nm / waveform.highest / inputs.noise_rad
         best = best_sampling(
-            scale * responses.sensitivity,
-            responses.capacity,
+            np.append(scale * responses.sensitivity, self._along(responses), axis=1),
+            self._capacity(responses),
             inputs.samples,
             inputs.criterion,
             gap=gap,
             most=most,
-            before=inputs.before,
+            before=inputs.before_along,
             start=start(responses) if start else None,
             to_beat=to_beat,
         )
@@ -91,6 +93,17 @@ class Rater:
         if bound <= 0:
             return Rated(LOST)
         return Rated(round(float(np.log(bound)), _DECIMALS), best, responses)
+
+    def _along(self, responses: CellResponses) -> Array:
+        """Return what is fitted along in cells, (n, n_functions, n_cells)."""
+        along = self._inputs.along(responses.middle_s)
+        return np.broadcast_to(along, (len(responses.sensitivity), *along.shape))
+
+    def _capacity(self, responses: CellResponses) -> Array:
+        """Return how many independent readings each cell has room for, (n_cells,)."""
+        if not self._inputs.noise.has_memory:
+            return responses.capacity
+        return effective_capacity(responses.capacity, responses.lasting_s, *self._inputs.processes)
 
     def _compute_responses(self, waveform: Waveform) -> CellResponses:
         return compute_cell_responses(

@@ -117,7 +117,7 @@ def best_sampling(
         Typical relative bound at which to stop when the best sampling cannot have it.
     """
     room = min(float(samples), float(capacity.sum()))
-    even = Mixture(_even(capacity, room)[None], np.ones(1))
+    even = Mixture(fill_evenly(capacity, room)[None], np.ones(1))
     mixture = start.within(capacity, room) if start else even
     fillings, shares = list(mixture.fillings), mixture.shares
     known = np.stack([_information(rows, filling) for filling in fillings])
@@ -127,12 +127,12 @@ def best_sampling(
         sharpness = min(_SHARP, blunt * _SHARPER**round_)
         information = np.tensordot(shares, known, 1)
         inverse = inverted(information + before)
-        covariances, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
+        covariances, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
         worth = of_samples @ np.einsum("npc,npc->nc", sensitivity @ rows, rows)
-        filling = _filled(worth, capacity, room)
+        filling = fill(worth, capacity, room)
         reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
         gain = float(worth @ filling) - reached
-        missing = _gap(criterion, covariances, gain, sharpness)
+        missing = gap_of(criterion, covariances, gain, sharpness)
         if best is None or missing < best.gap:
             mixture = Mixture(np.array(fillings), shares)
             best = Optimum(shares @ mixture.fillings, covariances, missing, mixture)
@@ -175,20 +175,20 @@ def least_bound(
     """
     every = [(share, each) for share, several in rows.items() for each in several]
     information = _information(every[0][1], samples)
-    covariances, of_samples, sensitivity = _covariances(
+    covariances, of_samples, sensitivity = compute_covariances(
         inverted(information + before), criterion, _SHARP
     )
     worth = np.concatenate(
         [of_samples @ np.einsum("npc,npc->nc", sensitivity @ each, each) for _, each in every]
     )
     room = np.concatenate([share * capacity for share, _ in every])
-    filling = _filled(worth, room, min(float(total), float(capacity.sum())))
+    filling = fill(worth, room, min(float(total), float(capacity.sum())))
     reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
-    missing = _gap(criterion, covariances, float(worth @ filling) - reached, _SHARP)
+    missing = gap_of(criterion, covariances, float(worth @ filling) - reached, _SHARP)
     return criterion.typical_bound(covariances) / (1 + missing)
 
 
-def _even(capacity: Array, room: float) -> Array:
+def fill_evenly(capacity: Array, room: float) -> Array:
     """Distribute readings evenly over cells, within their capacity."""
     level = room / np.count_nonzero(capacity)
     for _ in range(20):
@@ -200,7 +200,7 @@ def _even(capacity: Array, room: float) -> Array:
     return np.minimum(capacity, level)
 
 
-def _filled(worth: Array, capacity: Array, room: float) -> Array:
+def fill(worth: Array, capacity: Array, room: float) -> Array:
     """Fill the cells of largest worth."""
     order = np.argsort(-worth, kind="stable")
     before = np.cumsum(capacity[order]) - capacity[order]
@@ -214,7 +214,7 @@ def _information(rows: Array, samples: Array) -> Array:
     return (rows * samples) @ rows.swapaxes(1, 2)
 
 
-def _covariances(
+def compute_covariances(
     inverse: Array, criterion: Criterion, sharpness: float
 ) -> tuple[Array, Array, Array]:
     """Return covariances of the parameters asked for, weights of samples, and of information."""
@@ -224,7 +224,7 @@ def _covariances(
     return covariances, of_samples, columns @ z @ columns.swapaxes(1, 2)
 
 
-def _gap(criterion: Criterion, covariances: Array, gain: float, sharpness: float) -> float:
+def gap_of(criterion: Criterion, covariances: Array, gain: float, sharpness: float) -> float:
     """Return the share by which the typical relative bound may exceed the best one.
 
     With weights pi and Z, sum pi tr(Z C) is convex, and nowhere larger than the criterion.
@@ -253,7 +253,7 @@ def _mixed(
         return inverse, criterion.smooth(covariances, sharpness)
 
     def worth_of(inverse: Array) -> Array:
-        _, of_samples, sensitivity = _covariances(inverse, criterion, sharpness)
+        _, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
         # Of singular information, rounding errors may have any sign.
         return np.maximum(np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known), 0.0)
 

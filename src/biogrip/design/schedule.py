@@ -8,11 +8,12 @@ import numpy as np
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.design.bursts import make_bursts, whole
 from biogrip.design.exchange import exchanged
-from biogrip.design.experiment import DesignInputs, compute_information
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.few_bins import in_few_bins
 from biogrip.design.rating import Torque
-from biogrip.design.sampling import best_sampling, least_bound
+from biogrip.design.sampling import Optimum, best_sampling, least_bound
 from biogrip.design.set_values import set_values
+from biogrip.design.spread_readings import CellNoise, spread_readings, whole_along
 from biogrip.design.time_bins import TimeBins, periodic_time_bins, time_bins, with_fine_end
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
@@ -46,7 +47,8 @@ class Plan:
     """Fisher information of the log-parameters of the plausible samples, including that of earlier
     experiments, (n, n_parameters, n_parameters)."""
     gap: float
-    """Share by which the typical relative bound may exceed that of any sampling of this torque."""
+    """Share by which the typical relative bound may exceed that of any sampling of this torque; NaN
+    where the noise has memory, for then it is not known."""
 
     @property
     def torque(self) -> TorqueHistory:
@@ -68,9 +70,14 @@ class SamplingProblem:
     starts: IntArray
     """Slots at which steps begin, (n_steps,)."""
     sensitivity: Array
-    """Sensitivities to the log-parameters in units of the noise, (n, n_parameters, n_cells)."""
+    """Sensitivities to the log-parameters in units of the noise, and what is fitted along, (n,
+    n_parameters + n_functions, n_cells)."""
     capacity: Array
     """Largest number of readings in each cell, (n_cells,)."""
+    middle_s: Array
+    """Middle of the first repetition of each cell, (n_cells,)."""
+    lasting_s: Array
+    """Length of each, (n_cells,)."""
 
 
 def planned(inputs: DesignInputs, torques: Sequence[Torque]) -> Plan:
@@ -150,8 +157,19 @@ def sampling_problem(
     sensitivity = np.empty((*inputs.parameters.shape, len(slot)))
     times_s = slot[order] / inputs.fastest_Hz
     sensitivity[..., order] = inputs.sensitivities(inputs.history(phases), times_s)
+    along = inputs.along(slot / inputs.fastest_Hz)
+    along = np.broadcast_to(along, (len(sensitivity), *along.shape))
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
-    return SamplingProblem(each, starts, sensitivity, capacity)
+    lasting = np.concatenate([own.slots for own in each])
+    first = np.concatenate([start + own.first for start, own in zip(starts, each, strict=True)])
+    return SamplingProblem(
+        each,
+        starts,
+        np.append(sensitivity, along, axis=1),
+        capacity,
+        (first + (lasting - 1) / 2) / inputs.fastest_Hz,
+        lasting / inputs.fastest_Hz,
+    )
 
 
 def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
@@ -165,32 +183,73 @@ def _time_bins(slots: int, phase: Phase, fastest_Hz: float) -> TimeBins:
 def sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
     """Find the best sampling of what is held, and round it to readings that can be taken."""
     problem = sampling_problem(inputs, phases)
-    rows, capacity = problem.sensitivity, problem.capacity
     best = best_sampling(
-        rows,
-        capacity,
+        problem.sensitivity,
+        problem.capacity,
         inputs.samples,
         inputs.criterion,
         gap=_GAP,
         most=_FILLINGS,
-        before=inputs.before,
+        before=inputs.before_along,
     )
-    few = in_few_bins(rows, best.samples, capacity, _late(problem.each), inputs.before)
-    counts = exchanged(rows, whole(few, capacity), few, capacity, inputs.criterion, inputs.before)
+    plan = _in_bursts(inputs, phases, problem, _in_few(inputs, problem, best.samples))
+    if not inputs.noise.has_memory:
+        bound = inputs.typical_bound(plan.information)
+        return replace(plan, gap=max(bound / _least_bound(inputs, phases, problem, best) - 1, 0.0))
+    if any(own.stride for own in problem.each):
+        return plan
+    spread = _in_bursts(inputs, phases, problem, _spread(inputs, problem))
+    return min(plan, spread, key=lambda each: inputs.typical_bound(each.information))
+
+
+def _in_bursts(
+    inputs: DesignInputs, phases: tuple[Phase, ...], problem: SamplingProblem, counts: IntArray
+) -> Plan:
     bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
     history = inputs.history(phases)
-    read = inputs.sensitivities(history, Sampling(bursts=bursts).over(history.end_s))
-    information = compute_information(read) + inputs.before
+    return Plan(
+        phases,
+        bursts,
+        inputs.information(history, Sampling(bursts=bursts).over(history.end_s)),
+        np.nan,
+    )
+
+
+def _in_few(inputs: DesignInputs, problem: SamplingProblem, samples: Array) -> IntArray:
+    """Round a sampling that is best with independent readings, with few bursts."""
+    rows, capacity, before = problem.sensitivity, problem.capacity, inputs.before_along
+    few = in_few_bins(rows, samples, capacity, _late(problem.each), before)
+    return exchanged(rows, whole(few, capacity), few, capacity, inputs.criterion, before)
+
+
+def _least_bound(
+    inputs: DesignInputs, phases: tuple[Phase, ...], problem: SamplingProblem, best: Optimum
+) -> float:
+    """Return a typical relative bound that no sampling of independent readings falls below."""
     edges = [sampling_problem(inputs, phases, edge).sensitivity for edge in ("begins", "finishes")]
-    least = least_bound(
-        {0.5: [rows], 0.25: edges},
-        capacity,
+    return least_bound(
+        {0.5: [problem.sensitivity], 0.25: edges},
+        problem.capacity,
         best.samples,
         inputs.samples,
         inputs.criterion,
-        inputs.before,
+        inputs.before_along,
     )
-    return Plan(phases, bursts, information, max(inputs.typical_bound(information) / least - 1, 0))
+
+
+def _spread(inputs: DesignInputs, problem: SamplingProblem) -> IntArray:
+    """Return numbers of readings in cells that allow for the noise's memory."""
+    noise = CellNoise(problem.middle_s, problem.lasting_s, *inputs.processes)
+    return whole_along(
+        spread_readings(
+            problem.sensitivity,
+            noise,
+            problem.capacity,
+            inputs.samples,
+            inputs.criterion,
+            inputs.before_along,
+        )
+    )
 
 
 def forces(gripper: Gripper, network: Network, phases: Sequence[Phase]) -> tuple[Array, Array]:

@@ -7,10 +7,12 @@ from typing import Annotated
 from pydantic import Field
 
 from biogrip.design.criteria import CRITERIA, OVER
+from biogrip.design.noise import DesignNoise
 from biogrip.design.price import PriceSettings
 from biogrip.design.shapes import SHAPES
 from biogrip.instrument.instrument import Instrument
 from biogrip.keys import Block, Distinct, OneOf, Problem
+from biogrip.response.whitening import MOST_SAMPLES
 
 NOISES = ("noise_rad", "noise_m", "noise_strain", "noise_N", "noise_Pa")
 _VOLTAGE = "largest_voltage_V"
@@ -63,6 +65,7 @@ class DesignSettings(Block):
     """The same of a force, where the instrument is `relaxation`."""
     noise_Pa: _Size = None
     """The same of a stress, likewise."""
+    noise: DesignNoise | None = None
     largest_torque_Nm: Annotated[float | None, Field(gt=0, le=1.0)] = None
     """Largest torque, as an increment on what closes the jaws onto the sample."""
     largest_voltage_V: Annotated[float | None, Field(gt=0, le=1e4)] = None
@@ -113,7 +116,7 @@ class DesignSettings(Block):
         return max(_SHORTEST_S, _READINGS / self.fastest_Hz)
 
     @property
-    def noise(self) -> float:
+    def noise_level(self) -> float:
         """Standard deviation of the noise, in the unit of what is read."""
         return next(value for key in NOISES if (value := getattr(self, key)) is not None)
 
@@ -158,6 +161,15 @@ class DesignSettings(Block):
         if shortest_s > self.longest_s:
             text = f"found {self.longest_s}, allowed is at least {words}, {shortest_s:g} s"
             yield ("longest_s",), f"{text}{self._instead(self.longest_s / fewest)}."
+        if self.noise and self.noise.has_memory:
+            if self.sequence:
+                yield (
+                    ("sequence",),
+                    "takes noise for white; leave it out with noise that has memory.",
+                )
+            if self.readings > MOST_SAMPLES:
+                text = f"found {self.readings}, allowed are at most {MOST_SAMPLES} with noise that "
+                yield ("readings",), f"{text}has memory."
         for name, (low, high) in (self.ranges or {}).items():
             if not low <= high:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."

@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import zip_longest
 
 from biogrip import __version__
+from biogrip.design.noise import WHITE, DesignNoise
 from biogrip.experiment.protocol import Phase
 from biogrip.own_design.designed import Designed
 from biogrip.own_traces.outputs import WRITTEN_BY
@@ -43,11 +44,32 @@ def _case(found: Designed) -> Iterator[str]:
     yield "    measurement:"
     instrument = found.case.instrument
     note = "" if instrument.has_jaws else f" # of the {instrument.read.column}"
-    yield f"      noise: {{ kind: gaussian, level_rad: {_number(found.inputs.noise_rad)} }}{note}"
+    parts = "".join(f", {part}" for part in _parts(found.inputs.noise))
+    level = _number(found.inputs.noise_rad)
+    yield f"      noise: {{ kind: gaussian, level_rad: {level}{parts} }}{note}"
+    yield from _assumed(found.inputs.noise)
     yield "      bursts:"
     for burst in found.plan.bursts:
         start, rate = _number(burst.from_s), _number(burst.rate_Hz)
         yield f"        - {{ from_s: {start}, rate_Hz: {rate}, samples: {burst.samples} }}"
+
+
+def _parts(noise: DesignNoise) -> Iterator[str]:
+    """Yield keys of noise with memory."""
+    if noise.ar1:
+        share, time = _number(noise.ar1.share), _number(noise.ar1.time_s)
+        yield f"ar1: {{ share: {share}, time_s: {time} }}"
+    if noise.flicker:
+        yield f"flicker: {{ share: {_number(noise.flicker.share)} }}"
+
+
+def _assumed(noise: DesignNoise) -> Iterator[str]:
+    """Yield what an identification has to allow for, to come as close as the bounds say."""
+    if noise.has_memory:
+        yield "      noise_model: coloured"
+    if noise != WHITE:
+        yield f"      offset: {str(noise.fits_offset).lower()}"
+        yield f"      drift: {str(noise.fits_drift).lower()}"
 
 
 def _keys(phase: Phase, base: str) -> Iterator[tuple[str, float]]:

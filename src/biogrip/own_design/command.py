@@ -70,6 +70,12 @@ def design(
     if after and any(case.block.design and case.block.design.price for case in chosen):
         text = "design.price: is for cells of which there is no trace yet; leave it out with "
         raise BiogripError(f"{text}--after.")
+    for case in chosen if after else []:
+        if case.block.design and case.block.design.noise and case.block.design.noise.has_memory:
+            raise BiogripError(
+                "--after: takes noise for white; allowed is a block `design` whose noise has no "
+                "ar1 and no flicker."
+            )
     if read_as != ReadAs() and not after:
         raise BiogripError("found options of a trace, allowed are these with --after only.")
     exported = export_paths(export, chosen) if export else []

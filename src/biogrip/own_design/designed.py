@@ -8,7 +8,7 @@ import numpy as np
 
 from biogrip.arrays import Array
 from biogrip.design.earlier_traces import Earlier
-from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
+from biogrip.design.experiment import NO_BOUND, DesignInputs
 from biogrip.design.schedule import Plan, forces
 from biogrip.design.several import Several
 from biogrip.design.within_reach import plan_within_reach
@@ -74,8 +74,7 @@ def designed(
         neighbours=NEIGHBOURS * block.candidates,
     )
     history = inputs.history(case.phases)
-    sensitivity = inputs.sensitivities(history, case.sampling.over(history.end_s))
-    before = inputs.bounds(compute_information(sensitivity) + inputs.before)
+    before = inputs.bounds(inputs.information(history, case.sampling.over(history.end_s)))
     network = inputs.model.network(inputs.parameters)
     time_s, force_N = np.zeros(0), np.zeros((len(inputs.parameters), 0))
     if inputs.instrument.has_jaws:
@@ -86,7 +85,7 @@ def designed(
 
 def in_words(found: Designed) -> str:
     """Return a design in words: settings, and bounds before and after."""
-    plan, model = found.plan, found.inputs.model
+    model = found.inputs.model
     lines = [f"{found.case.title}: {_setting(found)}."]
     worst = [np.max(bounds, axis=0) for bounds in (found.before, found.after)]
     several = f", worst of {len(found.after)} plausible samples" if len(found.after) > 1 else ""
@@ -96,9 +95,7 @@ def in_words(found: Designed) -> str:
         lines.append(f"  {name} {percent(before):>{width - len(name)}} | {percent(after)}")
     if found.inputs.out_of_reach:
         lines.append(f"  {left_out(found.inputs)}")
-    controlled = found.inputs.instrument.controlled.name
-    best = f"  no other sampling of this {controlled} is better by more than {100 * plan.gap:.2g} %"
-    lines.append(f"{best}{_pressed(found)}")
+    lines.append(f"  {best_in_words(found)}{_pressed(found)}")
     if found.several:
         lines += [f"  {line}" for line in in_lines(found.several, aim_of(found))]
     return "\n".join(lines)
@@ -109,6 +106,33 @@ def aim_of(found: Designed) -> str:
     assert found.several is not None
     targets = make_design_inputs(found.case).criterion.targets
     return aim(found.case, found.several, [found.inputs.model.names[index] for index in targets])
+
+
+def best_in_words(found: Designed) -> str:
+    """Return how far the readings may be from the best ones of what is held, without a period."""
+    controlled, gap = found.inputs.instrument.controlled.name, found.plan.gap
+    if np.isnan(gap):
+        text = f"how much better other readings of this {controlled} may be is not known, as the "
+        return f"{text}noise has memory"
+    return f"no other sampling of this {controlled} is better by more than {100 * gap:.2g} %"
+
+
+def noise_in_words(inputs: DesignInputs) -> str:
+    """Return the noise that all bounds are of, such as ``white noise of 3 µrad``."""
+    noise, instrument = inputs.noise, inputs.instrument
+    parts = []
+    if noise.ar1:
+        parts.append(f"AR(1) of {noise.ar1.time_s:g} s ({100 * noise.ar1.share:g} %)")
+    if noise.flicker:
+        parts.append(f"1/f ({100 * noise.flicker.share:g} %)")
+    if noise.white_share > 0:
+        parts.append(f"white ({100 * noise.white_share:g} %)" if parts else "white")
+    level = f"{inputs.noise_rad:.3g} {instrument.read.unit}".rstrip()
+    if instrument.has_jaws:
+        level = f"{1e6 * inputs.noise_rad:.3g} µrad"
+    along = ["offset"] * noise.fits_offset + ["drift"] * noise.fits_drift
+    fitted = f", {' and '.join(along)} fitted along" if along else ""
+    return f"{', '.join(parts)} noise of {level}{fitted}"
 
 
 def _pressed(found: Designed) -> str:
@@ -136,7 +160,8 @@ def _setting(found: Designed) -> str:
     unit = unit or found.inputs.instrument.controlled.name
     return (
         f"{in_numbers(plan.phases)} of up to {largest} {unit} "
-        f"over {plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts"
+        f"over {plan.torque.end_s:g} s, {len(plan.time_s)} samples in {len(plan.bursts)} bursts; "
+        f"{noise_in_words(found.inputs)}"
     )
 
 

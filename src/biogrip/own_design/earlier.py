@@ -53,7 +53,7 @@ def estimate_from_recordings(
     if read_as.fit_start:
         raise BiogripError("--start: found fit, allowed with --after is a time.")
     _check_reading(read_as, case.instrument)
-    given = [_make_problem(each, read_as, block.noise) for each in traces]
+    given = [_make_problem(each, read_as, block.noise_level) for each in traces]
     problems, levels = [problem for problem, _ in given], [level for _, level in given]
     samples = [problem.residuals.samples for problem in problems]
     rng = stream(study_seed, case.name, 0, "after")

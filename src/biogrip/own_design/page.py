@@ -26,9 +26,11 @@ from biogrip.own_design.at_a_price import (
 from biogrip.own_design.designed import (
     Designed,
     aim_of,
+    best_in_words,
     in_numbers,
     kind,
     left_out,
+    noise_in_words,
     percent,
     shown_unit,
 )
@@ -124,15 +126,10 @@ def _describe(found: Designed) -> dict[str, Any]:
         ],
         "left_out": left_out(inputs) if inputs.out_of_reach else "",
         "figures": figures,
-        "gap": f"{100 * plan.gap:.2g}",
+        "best": best_in_words(found).capitalize(),
         "has_jaws": instrument.has_jaws,
-        "controlled": instrument.controlled.name,
         "force_uN": f"{1e6 * found.force_N.max(initial=0.0):.3g}",
-        "noise": (
-            f"{1e6 * inputs.noise_rad:.3g} µrad"
-            if instrument.has_jaws
-            else f"{inputs.noise_rad:.3g} {instrument.read.unit}".rstrip()
-        ),
+        "noise": noise_in_words(inputs),
         "readings": len(plan.time_s),
         "end_s": f"{plan.torque.end_s:g}",
         "to_set": _to_set(found, plan),

@@ -4,6 +4,7 @@ import numpy as np
 
 from biogrip.arrays import Array, parts
 from biogrip.design.experiment import Experiment, compute_information, relative_bounds
+from biogrip.design.noise import WHITE
 from biogrip.experiment.protocol import torque_history
 from biogrip.response.ringing import ringing_responses
 from biogrip.study.study import Case, Study
@@ -15,7 +16,7 @@ WELL = 0.1
 _AT_ONCE = 20
 
 
-USED = "gripper searched parameters design.noise experiment study.experiment"
+USED = "gripper searched parameters design.noise design.noise_level experiment study.experiment"
 """Settings that the bounds of a case in its own experiment and in that of the study depend on."""
 
 
@@ -35,9 +36,10 @@ def bounds(case: Case, experiment: Experiment, parameters: Array) -> Array:
     phases, sampling = experiment
     torque = torque_history(phases)
     times = sampling.over(torque.end_s)
+    noise = case.design.noise or WHITE
     found = []
     for some in parts(len(parameters), _AT_ONCE):
         rows = ringing_responses(case.gripper, case.searched, torque, times, parameters[some])
-        information = compute_information(rows[:, 1:])
-        found.append(relative_bounds(information / case.design.noise**2))
+        read = noise.whiten(times, rows[:, 1:] / case.design.noise_level)
+        found.append(relative_bounds(compute_information(read)))
     return np.concatenate(found)

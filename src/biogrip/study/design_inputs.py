@@ -8,6 +8,7 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion
 from biogrip.design.earlier_traces import Earlier
 from biogrip.design.experiment import DesignInputs
+from biogrip.design.noise import WHITE
 from biogrip.design.settings import DesignSettings
 from biogrip.design.waveform import Limits
 from biogrip.errors import BiogripError
@@ -33,7 +34,7 @@ def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInpu
         gripper=case.gripper,
         model=model,
         parameters=earlier.parameters if earlier else plausible(case, block),
-        noise_rad=block.noise,
+        noise_rad=block.noise_level,
         samples=block.readings,
         fastest_Hz=block.fastest_Hz,
         limits=Limits(
@@ -49,6 +50,7 @@ def make_design_inputs(case: Case, earlier: Earlier | None = None) -> DesignInpu
         ),
         before=earlier.information if earlier else np.zeros((1, *2 * (len(model.names),))),
         instrument=case.instrument,
+        noise=block.noise or WHITE,
     )
 
 

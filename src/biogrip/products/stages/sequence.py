@@ -69,7 +69,7 @@ def cells_of(case: Case) -> int:
 
 
 def _problem(case: Case) -> CaseProblem:
-    return replace(case.problem, noise_rad=case.design.noise)
+    return replace(case.problem, noise_rad=case.design.noise_level)
 
 
 _CASE = using(

@@ -53,7 +53,7 @@ def designed(study: Study, expected: list[Path], intervals: list[Path]) -> Table
         least_N = _least_force(case)
         for index, parameter in enumerate(case.searched.parameters):
             truth = case.parameters[parameter.name]
-            head = (name, parameter.name, parameter.unit, truth, 1e6 * case.design.noise)
+            head = (name, parameter.name, parameter.unit, truth, 1e6 * case.design.noise_level)
             both = (_percent(before[index]), _percent(after[index]))
             verdict = verdicts[parameter.name]["verdict"]
             observed = _of_seeds(found, parameter.name, truth, float(after[index]))
