@@ -42,5 +42,11 @@ def test_repeating_one_experiment_is_a_set_too() -> None:
         index="least_percent", columns="way", values="cost"
     )
     assert (least["designed at once"] <= least["one repeated"]).all()
+    at_once, repeated = (
+        table[(table["way"] == way) & table["least_percent"].isna()]
+        for way in ("designed at once", "one repeated")
+    )
+    for cost, share in zip(repeated["cost"], repeated["share_percent"], strict=True):
+        assert at_once[at_once["share_percent"] >= share]["cost"].min() <= cost
     assert least["designed at once"].is_monotonic_increasing
     assert len(table[table["way"] == DESIGNED_AFTER]) == 4

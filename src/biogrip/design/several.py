@@ -18,7 +18,7 @@ from biogrip.design.experiment import DesignInputs, compute_information
 from biogrip.design.price import PriceSettings
 from biogrip.design.schedule import Plan, planned, presses_each, sampled
 from biogrip.design.search import best_torques
-from biogrip.design.sets import ExperimentSet, SetProblem, enough, front, repeated
+from biogrip.design.sets import ExperimentSet, SetProblem, enough, front, nothing_beats, repeated
 from biogrip.design.waveform import Limits
 from biogrip.errors import BiogripError
 from biogrip.identify.answer import silent
@@ -158,8 +158,10 @@ def choose_several(
     chosen = problem.cheapest(enough(settings.share, len(cells)))
     first = _first(problem, chosen or _most(problem))
     rounds = _one_by_one(problem, population, offers, first, ends, between)
-    at_once = front(problem, [settings.share])
-    return Several(settings, offers, at_once, chosen, repeated(problem), rounds)
+    alone = repeated(problem)
+    # One repeated is a set too, with shares between those of the front.
+    at_once = nothing_beats([*front(problem, [settings.share]), *alone])
+    return Several(settings, offers, at_once, chosen, alone, rounds)
 
 
 def _grid(inputs: DesignInputs) -> Iterator[Limits]:
