@@ -40,6 +40,7 @@ SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
 SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
+MEMORY = PUBLISHED / "design_memory" / "tables" / "design_memory.csv"
 CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
 _CASES = {
@@ -282,6 +283,21 @@ def bounds_by_shape() -> str:
     )
 
 
+def bounds_by_memory() -> str:
+    """Worst bounds of the published designs by the memory of the noise."""
+    table = pd.read_csv(MEMORY).query("not along")
+    worst = table.groupby(["memory_s", "readings", "case"])["bound_percent"].max()
+    return _table(
+        {"memory": f"{memory:g} s" if memory else "none"}
+        | {
+            f"{name}, {readings} (%)": _bound(worst[memory, readings, case])
+            for case, name in _CASES.items()
+            for readings in ("published", "spread")
+        }
+        for memory in table["memory_s"].unique()
+    )
+
+
 def _bound(percent: float) -> str:
     return "none" if math.isnan(percent) else f"{float(f'{percent:.2g}'):g}"
 
@@ -454,7 +470,11 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
         "populations": simulated_populations,
         "ranks": unequal_dishes,
     },
-    ROOT / "docs" / "design.md": {"sequential": experiments_needed, "shapes": bounds_by_shape},
+    ROOT / "docs" / "design.md": {
+        "sequential": experiments_needed,
+        "shapes": bounds_by_shape,
+        "memory": bounds_by_memory,
+    },
     ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }
