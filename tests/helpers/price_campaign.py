@@ -57,7 +57,7 @@ def known_to(plans: list[Plan], counts: list[int], number: int) -> bool:
         clean = simulated_rotation(
             problem.gripper, network, problem.torque, plan.time_s, nonlinear=False
         )
-        noises.append(case.design.noise / sqrt(count))
+        noises.append(case.design.noise_level / sqrt(count))
         trace = clean[0] + noises[-1] * rng.standard_normal(len(plan.time_s))
         problems.append(problem.of(plan.time_s, trace, noise_rad=noises[-1]))
     joint = joint_problem(problems, noises)
@@ -158,7 +158,7 @@ def main() -> None:
 
 
 def _problem(case: Case, plan: Plan) -> CaseProblem:
-    return replace(case.problem, noise_rad=case.design.noise, phases=plan.phases)
+    return replace(case.problem, noise_rad=case.design.noise_level, phases=plan.phases)
 
 
 def _case() -> Case:
