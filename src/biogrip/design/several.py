@@ -227,9 +227,11 @@ def _offers(index: int) -> list[Offer]:
 def _information(population: DesignInputs, plan: Plan) -> Array:
     """Compute the information of an experiment, (n_cells, n_parameters, n_parameters)."""
     history, time_s = population.history(plan.phases), plan.time_s
-    return np.concatenate(
-        [compute_information(some.sensitivities(history, time_s)) for some in _in_parts(population)]
-    )
+    read = [
+        some.noise.whiten(time_s, some.sensitivities(history, time_s))
+        for some in _in_parts(population)
+    ]
+    return np.concatenate([compute_information(each) for each in read])
 
 
 def _pressed(population: DesignInputs, plan: Plan) -> BoolArray:
