@@ -17,7 +17,7 @@ from biogrip.identify.genetic_settings import GeneticSettings
 from biogrip.identify.genome import GeneRange, Genome, make_genome
 from biogrip.identify.problem import Problem as Posed
 from biogrip.identify.problem import make_problem
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import Misfit, combine_misfits, make_misfit
@@ -74,7 +74,7 @@ class Problem:
         """Return the study's misfit of a population against the trace."""
         given = self.steps, self.time_s, self.trace_rad
         condensed = self.condensed(nonlinear=nonlinear)
-        residuals = Residuals(self.gripper, self.model, *given, condensed)
+        residuals = Residuals(self.gripper, self.model, *given, condensed, instrument=GRIPPER)
         return make_misfit(residuals, self.gripper, *given)
 
     def condensed(self, *, nonlinear: bool = False) -> Condensed:
@@ -92,6 +92,7 @@ class Problem:
             self.trace_rad,
             self.ranges,
             condensed or self.condensed(),
+            instrument=GRIPPER,
         )
 
     def population(self, count: int = POPULATION) -> Array:

@@ -5,6 +5,7 @@ import pytest
 
 from biogrip.digits import counted, rounded
 from biogrip.identifiability.whiteness import doubts_about_noise
+from biogrip.instrument.gripper import GRIPPER
 from biogrip.products.files.traces import Measurements
 from biogrip.products.stages.recording import notes_on_recording
 
@@ -22,7 +23,7 @@ def test_notes_on_one_of_something_are_sentences() -> None:
     assert note == "Left out for want of a number: 1 row of 801."
     residual = np.random.default_rng(3).standard_normal(60)
     residual[30] = 30.0
-    said = " ".join(doubts_about_noise(residual, np.ones(60)))
+    said = " ".join(doubts_about_noise(residual, np.ones(60), instrument=GRIPPER))
     assert "from the samples around: 1 outlier, as of Gaussian noise only once in" in said
 
 

@@ -19,6 +19,7 @@ from biogrip.experiment.protocol import largest_load
 from biogrip.experiment.sample import MODELS
 from biogrip.identify.answer import silent
 from biogrip.instrument.gripper import Arm, Gripper
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.linear import rotation, step_response
 
@@ -38,6 +39,7 @@ DROP = DesignInputs(
     stroke_rad=0.0785,
     criterion=Criterion("largest", "worst", (0, 1, 2, 3)),
     before=np.zeros((4, 4)),
+    instrument=INSTRUMENTS["rotation"],
 )
 
 

@@ -11,7 +11,7 @@ from biogrip.design.views import Views
 from biogrip.design.waveform import Limits, Waveform, hold, linear, swinging
 from biogrip.experiment.protocol import Phase, load, torque_history
 from biogrip.experiment.sample import MODELS
-from biogrip.instrument.gripper import NO_ARMS, Gripper
+from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
 from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.jaw_force import jaw_force
 from biogrip.response.ringing import ringing_responses
@@ -45,7 +45,7 @@ def test_against_responses(request: pytest.FixtureRequest, arms: str, name: str)
     gripper: Gripper = request.getfixturevalue(arms)
     waveform = WAVEFORMS[name]
     elapsed = np.geomspace(1e-6, 0.015, 30)
-    moving = Views(gripper, MODEL, SAMPLES, elapsed).under(waveform)
+    moving = Views(gripper, MODEL, SAMPLES, elapsed, GRIPPER).under(waveform)
     view = moving.respond(np.arange(4))
     own = moving.respond(np.array([2]), elapsed[::3])
     np.testing.assert_allclose(own.force[:, 0], view.force[:, 2, ::3], rtol=1e-12)
@@ -167,7 +167,7 @@ def test_triangles_as_they_are_meant() -> None:
 
 def test_a_short_ramp_is_a_step_and_a_small_sinusoid_a_hold(gripper: Gripper) -> None:
     elapsed = np.geomspace(1e-4, 0.4, 20)
-    views = Views(gripper, MODEL, SAMPLES, elapsed)
+    views = Views(gripper, MODEL, SAMPLES, elapsed, GRIPPER)
     step = views.under(hold(np.array([1.0, 1.0]), np.array([0.0, 1.0]))).respond(np.array([1]))
     ramped = linear(np.array([1.0, 1e-9, 1.0]), np.array([0.0, 0, 1.0]), np.array([0.0, 1.0, 1.0]))
     swung = swinging(np.ones(2), np.array([0.0, 1.0]), np.array([0.0, 1e-9]), np.full(2, 1e-3))

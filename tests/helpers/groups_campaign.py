@@ -25,6 +25,7 @@ from biogrip.identifiability.likelihood import MISSED, Likelihood, make_likeliho
 from biogrip.identifiability.profiles import Profile, compute_profiles
 from biogrip.identifiability.quantities import Quantity, parameters_and_sum
 from biogrip.identify.problem import make_problem
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.products.stages.full_judgements import refitted
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.places import ROOT
@@ -113,6 +114,7 @@ def dishes(pairs: Sequence[int], setting: Setting, cells: int = CELLS) -> list[l
                     add_noise(clean, NOISE, rng),
                     RANGES,
                     condensed,
+                    instrument=INSTRUMENTS["rotation"],
                 )
                 for clean in responses
             ]

@@ -25,6 +25,7 @@ from biogrip.identify.multi_start import identify_from
 from biogrip.identify.noise_growth import compute_growth
 from biogrip.identify.problem import Problem
 from biogrip.identify.trace_fit import trace_fit
+from biogrip.instrument.gripper import GRIPPER
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
 from tests.helpers.groups_campaign import write
@@ -133,7 +134,7 @@ def seen(kind: Kind, seed: int) -> Seen:
     fall = compute_fall(len(time_s), ignored.misfit_rad, find(more).misfit_rad)
     residual = plain.residuals.left(ignored.best)
     growth = compute_growth(residual, plain.residuals.rotation(ignored.best))
-    doubts = list(doubts_about_noise(residual, growth))
+    doubts = list(doubts_about_noise(residual, growth, instrument=GRIPPER))
     assumed = replace(case_problem, coloured=True, offset=True, drift=True)
     if kind.gripper:
         known = {

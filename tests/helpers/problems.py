@@ -14,6 +14,7 @@ from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import identifier
 from biogrip.identify.problem import Problem, make_problem
 from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.condensed import Condensed
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nuisance import nuisance_basis
@@ -77,7 +78,15 @@ def problem_alone(
     """The problem of a trace that shares its rows with no other; assumed is as `condensed_of`'s."""
     condensed = condensed_of(torque, time_s, **assumed)
     return make_problem(
-        gripper, model, torque, time_s, rotation_rad, STUDY.ranges, condensed, noise_rad=noise_rad
+        gripper,
+        model,
+        torque,
+        time_s,
+        rotation_rad,
+        STUDY.ranges,
+        condensed,
+        noise_rad=noise_rad,
+        instrument=INSTRUMENTS["rotation"],
     )
 
 
@@ -111,7 +120,17 @@ def case_problem(
     noise = Noise("gaussian", level, "peak")
     traces = [add_noise(response, noise, np.random.default_rng([n, 7])) for n in range(count)]
     return [
-        make_problem(GRIPPER, model, TORQUE, times, trace, RANGES, condensed) for trace in traces
+        make_problem(
+            GRIPPER,
+            model,
+            TORQUE,
+            times,
+            trace,
+            RANGES,
+            condensed,
+            instrument=INSTRUMENTS["rotation"],
+        )
+        for trace in traces
     ]
 
 

@@ -11,6 +11,7 @@ from biogrip.experiment.protocol import torque_history
 from biogrip.identifiability.diagnosis import diagnose
 from biogrip.identifiability.fit_status import DOUBT, DOUBTFUL, REJECTED, REJECTION, compute_status
 from biogrip.identifiability.slow_misfit import find_slow_misfit
+from biogrip.instrument.gripper import GRIPPER
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.whitening import NoiseModel
 from tests.helpers.default import STUDY
@@ -30,7 +31,7 @@ CASE = "endothelial_cell"
     ],
 )
 def test_share_and_time_decide(share: float, time_s: float, weight: str | None) -> None:
-    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0)
+    note = find_slow_misfit(NoiseModel(share, time_s, 0.0), 400.0, instrument=GRIPPER)
     assert (note and note.weight) == weight
 
 

@@ -10,6 +10,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import AR1, Outliers
 from biogrip.identifiability.whiteness import FALSE_ALARM, doubts_about_noise, uneven
+from biogrip.instrument.gripper import GRIPPER
 
 TIMES: Array = np.linspace(0, 400, 4001)
 SAME = np.ones(4001)
@@ -31,7 +32,8 @@ def test_white_noise_is_seldom_doubted() -> None:
     """Three tests of 0.003 and one of next to nothing: of 1500 traces 13 or so are wrong."""
     rng = np.random.default_rng(1)
     doubted = sum(
-        any(doubts_about_noise(rng.standard_normal(1001), SAME[:1001])) for _ in range(1500)
+        any(doubts_about_noise(rng.standard_normal(1001), SAME[:1001], instrument=GRIPPER))
+        for _ in range(1500)
     )
     assert doubted <= 3 * FALSE_ALARM * 1500 + 4 * np.sqrt(3 * FALSE_ALARM * 1500)
 
@@ -50,7 +52,7 @@ def test_what_is_not_white_is_said(parts: dict[str, Any], said: str) -> None:
     clean = np.ones(len(TIMES))
     for seed in range(10):
         residual = add_noise(clean, noise, np.random.default_rng(seed), TIMES) - clean
-        doubts = " ".join(doubts_about_noise(residual, SAME))
+        doubts = " ".join(doubts_about_noise(residual, SAME, instrument=GRIPPER))
         # Where neighbours are correlated enough, too, that is what is said.
         assert said in doubts or (said.startswith("more") and "Neighbouring residuals" in doubts)
 
@@ -59,6 +61,8 @@ def test_noise_that_grows_is_said_and_nothing_else() -> None:
     """Its tails and its power vary along the trace; without the growth it is white."""
     growth = np.linspace(0.02, 1.0, len(TIMES))
     residual = growth * np.random.default_rng(4).standard_normal(len(TIMES))
-    assert any("outliers" in said for said in doubts_about_noise(residual, SAME))
-    (said,) = doubts_about_noise(residual, growth)
+    assert any(
+        "outliers" in said for said in doubts_about_noise(residual, SAME, instrument=GRIPPER)
+    )
+    (said,) = doubts_about_noise(residual, growth, instrument=GRIPPER)
     assert "The noise grows with the rotation: it is 14 times as large" in said

@@ -14,7 +14,7 @@ from biogrip.identify.genome import GeneRange
 from biogrip.identify.local_fits import LocalFits
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem, make_problem
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.nonlinear import nonlinear_rotation
 from tests.helpers.problems import condensed_of, problem_alone
 
@@ -35,7 +35,7 @@ def case_problem(gripper: Gripper, torque_Nm: float, traces: int) -> list[Proble
     noise = np.random.default_rng(5).standard_normal((traces, len(time_s)))
     condensed = condensed_of(torque, time_s, nonlinear=True)
     return [
-        make_problem(gripper, MODEL, torque, time_s, trace, RANGES, condensed)
+        make_problem(gripper, MODEL, torque, time_s, trace, RANGES, condensed, instrument=GRIPPER)
         for trace in clean + 0.01 * clean.max() * noise
     ]
 

@@ -10,6 +10,7 @@ from biogrip.identify.answer import silent
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.identify.multi_start import fit_from
 from biogrip.identify.problem import Problem, make_problem
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.response.inertia import ringing_s
 from biogrip.response.linear import rotation, step_response
 from tests.helpers.problems import GRIPPER, RANGES, condensed_of, problem_alone
@@ -37,6 +38,7 @@ def _problems(count: int) -> list[Problem]:
             RANGES,
             rows,
             noise_rad=1e-6,
+            instrument=INSTRUMENTS["rotation"],
         )
         for seed in range(count)
     ]

@@ -16,7 +16,7 @@ from biogrip.identify.genome import WORD_BITS, GeneRange, Genome
 from biogrip.identify.problem import Problem, make_problem
 from biogrip.identify.redraws import redraws
 from biogrip.identify.selection import best
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.misfit import combine_misfits
 from tests.helpers.plain_genetic import chromosomes_of, decoded, identified
@@ -60,7 +60,10 @@ def case_problem(
     noise = np.random.default_rng(3).standard_normal((count, len(time_s)))
     traces = clean + 0.1 * clean.max() * noise
     shared = condensed_of(steps, time_s, **how)
-    return [make_problem(gripper, model, steps, time_s, trace, RANGES, shared) for trace in traces]
+    return [
+        make_problem(gripper, model, steps, time_s, trace, RANGES, shared, instrument=GRIPPER)
+        for trace in traces
+    ]
 
 
 def rng(seed: int) -> np.random.Generator:

@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS, Sample
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import ringing_s
 from biogrip.response.nuisance import nuisance_basis
@@ -56,7 +56,9 @@ def test_least_squares_sees_no_difference(
     gripper: Gripper = request.getfixturevalue(arms)
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
     condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance)
-    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    residuals = Residuals(
+        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
+    )
     for sample in random_samples(20, seed=8):
         rows = assert_alike(residuals, np.log(sample))
         assert rows <= min(80 if torque.symmetric else 160, len(time_s) + 1)
@@ -66,9 +68,11 @@ def test_a_clean_trace_leaves_no_residual(gripper: Gripper) -> None:
     torque, time_s = torque_history(PROTOCOLS["steps"]), TIMES["uniform"]
     condensed = condensed_of(torque, time_s)
     model, x = Sample("generalized_maxwell", 2).model, np.log([5.0, 0.2, 1.0, 9.0, 99.0, 0.5])
-    empty = Residuals(gripper, model, torque, time_s, np.zeros(len(time_s)), condensed)
+    empty = Residuals(
+        gripper, model, torque, time_s, np.zeros(len(time_s)), condensed, instrument=GRIPPER
+    )
     clean, _ = empty(x)
-    exact = Residuals(gripper, model, torque, time_s, clean, condensed)
+    exact = Residuals(gripper, model, torque, time_s, clean, condensed, instrument=GRIPPER)
     assert np.linalg.norm(condensed_rows(exact, x)[0]) < 1e-10 * np.linalg.norm(clean)
 
 
@@ -80,7 +84,12 @@ def test_the_nonlinear_model_is_condensed_along(
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
     condensed = condensed_of(torque, time_s, offset=True, drift=True, nonlinear=True)
     model, x = MODELS["liquid_drop"], np.log([9.5, 0.3, 10.0])
-    assert_alike(Residuals(gripper, model, torque, time_s, noise(len(time_s)), condensed), x)
+    assert_alike(
+        Residuals(
+            gripper, model, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
+        ),
+        x,
+    )
 
 
 @pytest.mark.parametrize("nuisance", [False, True])
@@ -94,7 +103,9 @@ def test_of_arms_that_ring_few_nodes_stand_for_what_comes_later(
     rings_s = ringing_s(gripper)
     condensed = condensed_of(torque, time_s, offset=nuisance, drift=nuisance, ringing_s=rings_s)
     assert not condensed.reduced
-    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    residuals = Residuals(
+        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
+    )
     assert residuals.inertia
     for x in (CELL, *np.log(random_samples(2, seed=9))):
         assert assert_alike(residuals, x) < 4000
@@ -107,7 +118,9 @@ def test_of_arms_that_ring_few_nodes_stand_for_what_comes_later(
 def test_the_nonlinear_model_of_arms_that_ring(gripper: Gripper, times: str) -> None:
     torque, time_s = torque_history(PROTOCOLS["steps"]), DENSE[times][::4]
     condensed = condensed_of(torque, time_s, nonlinear=True, ringing_s=ringing_s(gripper))
-    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    residuals = Residuals(
+        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
+    )
     assert assert_alike(residuals, CELL) < 8000
 
 
@@ -118,5 +131,7 @@ def test_in_coloured_noise_every_sample_of_arms_that_ring_has_a_row(gripper: Gri
     condensed = Condensed(
         torque, time_s, nuisance, ringing_s=ringing_s(gripper), whitening=whitening
     )
-    residuals = Residuals(gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed)
+    residuals = Residuals(
+        gripper, MAXWELL, torque, time_s, noise(len(time_s)), condensed, instrument=GRIPPER
+    )
     assert assert_alike(residuals, CELL) == len(time_s) + 1

@@ -13,7 +13,7 @@ from biogrip.experiment.models import MODELS
 from biogrip.experiment.network import Network
 from biogrip.experiment.protocol import Load, Phase, TorqueHistory, hold, load, torque_history
 from biogrip.experiment.sample import SampleModel
-from biogrip.instrument.gripper import NO_ARMS
+from biogrip.instrument.gripper import GRIPPER, NO_ARMS
 from biogrip.response.condensed import Condensed
 from biogrip.response.residuals import Residuals
 from biogrip.response.sensitivity import rotations_and_sensitivities
@@ -161,7 +161,7 @@ def test_condensed_rows_have_the_sums_of_squares_of_all_readings(
         len(times)
     )
     condensed = Condensed(history, times, np.zeros((0, len(times))))
-    residuals = Residuals(NO_ARMS, model, history, times, trace, condensed)
+    residuals = Residuals(NO_ARMS, model, history, times, trace, condensed, instrument=GRIPPER)
     # Exponents stay below one.
     moved = [parameter.kind != "exponent" for parameter in model.parameters]
     logs = np.log([model.example]) + np.linspace(-0.3, 0.4, 5)[:, None] * moved

@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import MODELS, Sample, SampleModel
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.condensed import Condensed
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.response.residuals import Residuals
@@ -23,7 +23,7 @@ def case_problem(
     torque, time_s = torque_history(PROTOCOLS[protocol]), TIMES[times]
     condensed = Condensed(torque, time_s, nuisance_basis(time_s, offset=nuisance, drift=nuisance))
     silence = np.zeros(len(time_s))
-    return Residuals(gripper, model, torque, time_s, silence, condensed)
+    return Residuals(gripper, model, torque, time_s, silence, condensed, instrument=GRIPPER)
 
 
 def samples(model: SampleModel, count: int) -> Array:

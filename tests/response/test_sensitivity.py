@@ -6,7 +6,7 @@ import pytest
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory, torque_history
 from biogrip.experiment.sample import MODELS, Sample, SampleModel, with_fixed
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response import residuals as of_residuals
 from biogrip.response import sensitivity
 from biogrip.response.condensed import Condensed
@@ -156,7 +156,7 @@ def test_residuals_do_not_see_what_the_instrument_added(
     basis = nuisance_basis(times, offset=True, drift=True)
     condensed = Condensed(steps, times, basis)
     plain, shifted = (
-        Residuals(gripper, model, steps, times, trace + added, condensed)
+        Residuals(gripper, model, steps, times, trace + added, condensed, instrument=GRIPPER)
         for added in (0.0, 5e-3 + 1e-5 * times)
     )
     np.testing.assert_allclose(plain(x)[0], shifted(x)[0], atol=1e-15)
@@ -175,7 +175,7 @@ def test_the_gradient_of_many_samples_is_summed_in_parts(
         nuisance_basis(times, offset=True, drift=False), 0.1 * np.sin(times / 30)[None]
     )
     condensed = Condensed(steps, times, basis)
-    residuals = Residuals(gripper, model, steps, times, trace, condensed)
+    residuals = Residuals(gripper, model, steps, times, trace, condensed, instrument=GRIPPER)
     residual, slopes = residuals(x)
     np.testing.assert_array_equal(residuals.left(x), residual)
     for at_once in (1000, 90):

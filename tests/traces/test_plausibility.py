@@ -18,7 +18,7 @@ from biogrip.experiment.protocol import (
     torque_history,
 )
 from biogrip.experiment.sample import MODELS
-from biogrip.instrument.gripper import Gripper
+from biogrip.instrument.gripper import GRIPPER, Gripper
 from biogrip.response.linear import rotation, step_response
 from biogrip.response.nuisance import nuisance_basis
 from biogrip.traces.columns import Columns
@@ -64,7 +64,7 @@ def check(
 ) -> str | None:
     nuisance = nuisance_basis(recording.time_s, offset=offset, drift=False)
     return check_recording(
-        recording, gripper, torque, path, columns, nuisance, noise_rad, noise_rad
+        recording, gripper, torque, path, columns, nuisance, GRIPPER, noise_rad, noise_rad
     )
 
 
@@ -467,7 +467,7 @@ MIRRORED = "found a rotation that goes against the torque"
 
 def said_of(recording: Recording, gripper: Gripper, torque: TorqueHistory, basis: Array) -> str:
     try:
-        check_recording(recording, gripper, torque, FILE, SI, basis)
+        check_recording(recording, gripper, torque, FILE, SI, basis, GRIPPER)
     except BiogripError as error:
         return str(error)
     return ""

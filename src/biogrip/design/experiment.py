@@ -11,7 +11,7 @@ from biogrip.design.waveform import Limits
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import SampleModel
 from biogrip.experiment.sampling import Sampling
-from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.sensitivity import linear_responses
 
@@ -55,10 +55,10 @@ class DesignInputs:
     """Information on the log-parameters from earlier experiments, (n, n_parameters, n_parameters)
     or (1, n_parameters, n_parameters); for those out of reach, also a prior standard deviation of
     `NO_BOUND`."""
+    instrument: Instrument
+    """What is held and read."""
     out_of_reach: tuple[int, ...] = ()
     """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
-    instrument: Instrument = GRIPPER
-    """What is held and read."""
     noise: DesignNoise = WHITE
     """What of the noise is not white, and what is fitted along."""
 

@@ -31,7 +31,7 @@ from biogrip.design.waveform import Waveform
 from biogrip.experiment.protocol import hold as hold_load
 from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.sample import SampleModel
-from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
+from biogrip.instrument.gripper import NO_ARMS, Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.modes import Modes
 from biogrip.response.protocol_modes import compute_protocol_modes
@@ -83,7 +83,7 @@ class Views:
         model: SampleModel,
         parameters: Array,
         elapsed_s: Array,
-        instrument: Instrument = GRIPPER,
+        instrument: Instrument,
     ) -> None:
         arm, self.lever_m = gripper.left, gripper.lever_m
         self.instrument = instrument

@@ -5,7 +5,6 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.identifiability.fit_status import DOUBT, REJECTION, Note
 from biogrip.identify.noise_model_fit import NoiseModelLikelihood
-from biogrip.instrument.gripper import GRIPPER
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.noise_estimate import estimate_noise
 from biogrip.response.residuals import Residuals
@@ -25,7 +24,7 @@ _AS_THE_SCATTER = 1.44
 
 
 def find_slow_misfit(
-    noise_model: NoiseModel, duration_s: float, instrument: Instrument = GRIPPER
+    noise_model: NoiseModel, duration_s: float, instrument: Instrument
 ) -> Note | None:
     """Return a note if the autocorrelated part of a noise model is, or may be, misfit."""
     share, time_s = noise_model.ar1, noise_model.time_s

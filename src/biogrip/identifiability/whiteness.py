@@ -7,7 +7,6 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.digits import counted
 from biogrip.identify.outliers import FAR, outliers_of
-from biogrip.instrument.gripper import GRIPPER
 from biogrip.instrument.instrument import Instrument
 
 FALSE_ALARM = 0.003
@@ -20,7 +19,7 @@ _STRETCHES, _SHORTEST = 20, 5
 
 
 def doubts_about_noise(
-    residual: Array, growth: Array, instrument: Instrument = GRIPPER, rounding_rad: float = 0.0
+    residual: Array, growth: Array, instrument: Instrument, rounding_rad: float = 0.0
 ) -> Iterator[str]:
     """Yield a sentence for each test of white noise that the residuals of a fit fail.
 

@@ -13,7 +13,7 @@ from biogrip.experiment.sample import Sample, SampleModel, with_fixed
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.problem import Problem, make_problem, searched
 from biogrip.instrument.calibrated_gripper import read_calibrated_arms
-from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.inertia import change_by_inertia, inertia_shows, ringing_s
@@ -41,7 +41,7 @@ class CaseProblem:
     """Constitutive model."""
     fixed: Mapping[str, float]
     """Parameters that are known, by name."""
-    instrument: Instrument = GRIPPER
+    instrument: Instrument
     """What is held and read; other than a gripper, it has `NO_ARMS`."""
     nonlinear: bool = False
     """True to simulate the nonlinear model."""

@@ -9,7 +9,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
 from biogrip.identify.genome import GeneRange, Genome, make_genome
-from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.misfit import Misfit, make_misfit
@@ -54,7 +54,7 @@ def make_problem(
     condensed: Condensed,
     *,
     noise_rad: float | None = None,
-    instrument: Instrument = GRIPPER,
+    instrument: Instrument,
 ) -> Problem:
     """Set up the identification of one trace.
 

@@ -9,7 +9,7 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.experiment.protocol import TorqueHistory
 from biogrip.experiment.sample import SampleModel
-from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument
 from biogrip.response.condensed import Condensed
 from biogrip.response.grip import Grip, compute_grip
@@ -58,7 +58,7 @@ class Residuals:
         condensed: Condensed,
         *,
         noise_rad: float | None = None,
-        instrument: Instrument = GRIPPER,
+        instrument: Instrument,
     ) -> None:
         self.instrument = instrument
         self._gripper = gripper

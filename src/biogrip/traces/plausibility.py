@@ -18,7 +18,7 @@ import numpy as np
 from biogrip.arrays import Array, parts
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import TorqueHistory, torque_at
-from biogrip.instrument.gripper import GRIPPER, Gripper
+from biogrip.instrument.gripper import Gripper
 from biogrip.instrument.instrument import Instrument, Quantity
 from biogrip.response.lagged_torques import lagged_torques
 from biogrip.response.noise_estimate import estimate_noise
@@ -108,10 +108,10 @@ def check_recording(
     path: Path,
     columns: Columns,
     nuisance: Array,
+    instrument: Instrument,
     noise_rad: float | None = None,
     typical_rad: float | None = None,
     onset_s: float | None = None,
-    instrument: Instrument = GRIPPER,
 ) -> str | None:
     """Refuse a trace that is impossible with the instrument and protocol.
 
@@ -131,6 +131,8 @@ def check_recording(
         Source of the trace, for messages.
     nuisance : (n_functions, n_samples)
         Orthonormal nuisance functions of the instrument, see `nuisance_basis`.
+    instrument
+        What is held and read.
     noise_rad
         Standard deviation of the noise, if known; otherwise it is estimated from the residuals
         of the fit.
@@ -139,8 +141,6 @@ def check_recording(
     onset_s
         Time of the trace's clock at which the protocol starts; readings before it are allowed if
         it is given.
-    instrument
-        What is held and read.
 
     Returns
     -------

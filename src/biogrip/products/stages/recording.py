@@ -81,10 +81,10 @@ def read_checked(
         recorded,
         columns,
         nuisance,
+        problem.instrument,
         None if weighted else problem.noise_rad,
         _typical_noise(trace, problem),
         onset_s,
-        problem.instrument,
     )
     sd_rad = trace.sd_rad
     if problem.noise_share is not None:
