@@ -3,14 +3,14 @@
 import pandas as pd
 import pytest
 
-from tests.helpers.status_campaign import QUANTITIES, SET_UPS, TABLE, answer, counted
+from tests.helpers.status_campaign import QUANTITIES, SET_UPS, TABLE, answers, counted
 
 
 @pytest.mark.parametrize("name", ["white", "jump", "unit"])
 def test_right_set_ups_are_ok_and_wrong_ones_are_not(name: str) -> None:
     """Two limits of 95 % miss the truth both once in 400 traces."""
     set_up = SET_UPS[name]
-    found = [answer(set_up, "white", seed) for seed in range(2)]
+    found = answers(set_up, "white", range(2))
     table = counted(set_up, {"white": found})
     assert len(table) == len(QUANTITIES)
     if set_up.right:

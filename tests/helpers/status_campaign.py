@@ -10,21 +10,23 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from biogrip.arrays import Array
-from biogrip.errors import BiogripError
 from biogrip.experiment.noise import Noise, add_noise
 from biogrip.experiment.noise_parts import AR1, Drift, Flicker, Outliers
 from biogrip.experiment.protocol import hold, torque_history
 from biogrip.experiment.sample import CANDIDATES
 from biogrip.identifiability.fit_status import DOUBTFUL, OK, REJECTED
 from biogrip.instrument.gripper import Gripper
-from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
+from biogrip.own_traces.many_traces import identify_batch
+from biogrip.own_traces.one_trace import IdentifyOptions
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.response.simulation import simulated_rotation
 from tests.helpers.default import STUDY
@@ -45,6 +47,8 @@ LEVEL = 0.02
 """Standard deviation of the noise over the largest rotation."""
 
 REFUSED = "refused"
+
+_BATCH = 25
 
 
 @dataclass(frozen=True)
@@ -172,20 +176,25 @@ def _response(gripper: Gripper, set_up: SetUp) -> Array:
     return np.concatenate((np.zeros(late), clean[: len(clean) - late]))
 
 
-def answer(set_up: SetUp, noise_model: str, seed: int) -> Answered:
-    """Simulate a trace, and identify it from a file as the command does."""
-    with TemporaryDirectory() as folder:
-        config, trace, found = (Path(folder) / name for name in ("c.yaml", "t.csv", "t.json"))
+def answers(set_up: SetUp, noise_model: str, seeds: Sequence[int]) -> list[Answered]:
+    """Simulate traces, and identify them from their files side by side, as the command does."""
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        config = folder / "c.yaml"
         config.write_text(CONFIG)
-        rows = np.c_[TIMES, trace_of(set_up, seed)]
-        np.savetxt(trace, rows, "%.9g", ",", header="time_s,rotation_rad", comments="")
-        options = IdentifyOptions(
-            trace, "generalized_maxwell", ReadAs(noise_model=noise_model), config
-        )
-        try:
-            data = identify_trace(options, found).data
-        except BiogripError:
-            return Answered(REFUSED, {})
+        options = []
+        for seed in seeds:
+            trace = folder / f"{seed}.csv"
+            rows = np.c_[TIMES, trace_of(set_up, seed)]
+            np.savetxt(trace, rows, "%.9g", ",", header="time_s,rotation_rad", comments="")
+            read_as = ReadAs(noise_model=noise_model)
+            options.append(IdentifyOptions(trace, "generalized_maxwell", read_as, config))
+        outcome = identify_batch(options, None, page=False)
+    found = {data["trace"]: _answered(data) for data in outcome.found}
+    return [found.get(str(own.trace), Answered(REFUSED, {})) for own in options]
+
+
+def _answered(data: dict[str, Any]) -> Answered:
     if data["fit"] == REJECTED:
         return Answered(REJECTED, {})
     items = {item["quantity"]: item for item in data["quantities"]}
@@ -235,9 +244,10 @@ def main(traces: int, names: Sequence[str]) -> None:
     with ProcessPoolExecutor() as processes:
         for name in names:
             set_up = SET_UPS[name]
+            batches = [range(n, min(n + _BATCH, traces)) for n in range(0, traces, _BATCH)]
             found = {
                 noise_model: list(
-                    processes.map(partial(answer, set_up, noise_model), range(traces), chunksize=5)
+                    chain(*processes.map(partial(answers, set_up, noise_model), batches))
                 )
                 for noise_model in ("white", "coloured")
             }
