@@ -54,6 +54,7 @@ class Ask:
                 "fastest_Hz": 50.0,
                 "longest_s": LASTS_S,
                 "candidates": 128,
+                "most_steps": 4,
                 "shapes": [self.shape],
             },
         }
@@ -244,8 +245,9 @@ def test_of_plausible_fractional_samples_the_worst_is_said(reading: str, tmp_pat
     assert len({line.index("|") for line in rows}) == 1
 
 
-def test_after_a_trace_the_next_experiment_tells_more(tmp_path: Path) -> None:
-    ask = ASKS["strain"]
+@pytest.mark.parametrize("found", ["strain"], indirect=True)
+def test_after_a_trace_the_next_experiment_tells_more(found: Found, tmp_path: Path) -> None:
+    ask = found.ask
     experiment = set_up(INSTRUMENTS["strain"], (hold(LASTS_S, ask.largest),), Sample(ask.model))
     times = np.arange(1, READINGS + 1) * LASTS_S / READINGS
     trace = simulate(experiment, ask.truth, times)
@@ -254,8 +256,7 @@ def test_after_a_trace_the_next_experiment_tells_more(tmp_path: Path) -> None:
     (tmp_path / "first.csv").write_text("\n".join(["time_s,strain", *rows]) + "\n")
     after = ("--after", str(tmp_path / "first.csv"))
     both = commanded(tmp_path, "strain", *after, plausible_samples=2)
-    alone = commanded(tmp_path, "strain")
-    for (_, one), (_, other) in zip(both.promised, alone.promised, strict=True):
+    for (_, one), (_, other) in zip(both.promised, found.promised, strict=True):
         assert one < other
     command = ["design", str(tmp_path / "asked.yaml"), "--output", str(tmp_path / "out.yaml")]
     for options in (("--reading", "compliance=strain"), ("--hold", "40")):
