@@ -104,11 +104,22 @@ def test_what_is_not_held_is_asked_for_and_kinds_do_not_mix(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     trace = written(tmp_path / "t.csv", "strain", response("strain", 1.0))
+    held = "protocol: {phases: [{duration_s: 5, stress_Pa: 1}]}\n"
+    (relaxing := tmp_path / "relaxing.yaml").write_text(f"instrument: relaxation\n{held}")
+    (mistyped := tmp_path / "mistyped.yaml").write_text(f"instrument: creeep\n{held}")
     refusals = {
         ("--reading", "strain=strain"): "--hold: is missing; allowed is the stress in Pa that was",
         ("--reading", "strian=strain"): "--reading: found 'strian', allowed are displacement, "
         "strain, compliance, force, stress, modulus. Did you mean 'strain'?",
         ("--reading", "modulus=strain", "--reading-unit", "mm"): "found 'mm', allowed are Pa, kPa",
+        ("--reading", "strain=x", "--hold", "1"): "Say which is which by --time and --reading.",
+        ("--reading", "strain=strain", "--hold", "nan"): "--hold: found nan, allowed is another",
+        ("--reading", "strain=strain", "--hold", "0"): "--hold: found 0, allowed is another number",
+        ("--reading", "strain=strain", "--rotation", "x"): "--rotation: does not go with --reading",
+        ("--reading", "strain=strain", "--config", str(relaxing)): "--reading: found 'strain', "
+        "allowed are force, stress, modulus: those of instrument: relaxation of the config.",
+        ("--reading", "strain=strain", "--config", str(mistyped)): "mistyped.yaml, line 1: "
+        "instrument: found 'creeep'. Did you mean 'creep'?",
     }
     for options, message in refusals.items():
         assert main(["identify", str(trace), *options]) != 0

@@ -8,13 +8,16 @@ import pandas as pd
 import pytest
 
 from benchmarks.sheet import write_sheet
+from biogrip.errors import BiogripError
 from biogrip.own_traces import fitted_traces
 from biogrip.own_traces.fitted_cells import check_sheet
-from biogrip.own_traces.fitted_traces import TraceToFit
+from biogrip.own_traces.fitted_traces import TraceToFit, trace_of
+from biogrip.own_traces.one_trace import case_of
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.running.rules import make_rules, needed_for, with_losses
 from biogrip.study.load import load_study, read_configs
+from biogrip.study.study import Study
 from tests.helpers.drops import write_trace
 from tests.helpers.places import CONFIG as CONFIG_FILE
 from tests.helpers.runs import Run, biogrip, called, replaced, snakemake
@@ -180,6 +183,30 @@ def test_a_cell_in_two_groups_stops_the_study(lab: Path) -> None:
     done = called(lab, "run", "lab.yaml", "-j2")
     assert done.status != 0
     assert "cells.tsv, line 4, column 'dish': found 'B' for the cell 'second'" in done.output
+
+
+def test_a_study_names_the_columns_of_all_its_traces_once(
+    lab: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As a config of the command does; a row that names another goes before it."""
+    monkeypatch.chdir(lab)
+    (lab / "cells.tsv").write_text(
+        "file\tmeasurement.time\na.csv\t\nb.csv\tclock_s\nc.csv\t\n", encoding="utf-8"
+    )
+
+    def study_with(measured: str) -> Study:
+        (lab / "lab.yaml").write_text(f"{CONFIG}measurement: {measured}\n")
+        files = [CONFIG_FILE, lab / "lab.yaml"]
+        return load_study(read_configs(files), files)
+
+    study = study_with("{time: t_s, rotation: phi_rad, noise_share: 0.01}")
+    check_sheet(study)
+    assert study.traces is not None
+    columns = [case_of(trace_of(study.traces, row).options).columns for row in study.traces.rows]
+    assert [each.time for each in columns] == ["t_s", "clock_s", "t_s"]
+    assert {each.reading for each in columns} == {"phi_rad"}
+    with pytest.raises(BiogripError, match=r"lab.yaml, line 4: measurement.sd: found 1, allowed"):
+        study_with("{sd: 1}")
 
 
 def test_planning_looks_at_every_row_a_fixed_number_of_times(

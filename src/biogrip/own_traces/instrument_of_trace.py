@@ -32,11 +32,13 @@ def with_instrument(
     Raises
     ------
     BiogripError
-        If nothing says what is held.
+        If nothing says what is held, or ``--reading`` is none of the config's instrument.
     """
     instrument = _instrument(merged, given)
+    _refuse_another(read_as, given.get("instrument", instrument.kind))
     measurement = {instrument.read.name: instrument.read.column} | merged["measurement"]
-    found = {**merged, "instrument": instrument.kind, "measurement": measurement}
+    kind = given.get("instrument", instrument.kind)
+    found = {**merged, "instrument": kind, "measurement": measurement}
     if "protocol" in given and read_as.hold is None:
         return found
     level = read_as.hold
@@ -56,6 +58,16 @@ def with_instrument(
         instrument.controlled.column: level,
     }
     return {**found, "protocol": {"phases": [phase]}}
+
+
+def _refuse_another(read_as: ReadAs, kind: Any) -> None:
+    """Refuse a ``--reading`` of another instrument than the config's."""
+    allowed = [name for name, each in INSTRUMENTS.items() if each.kind == kind]
+    if read_as.reading and allowed and read_as.reading[0] not in allowed:
+        raise BiogripError(
+            f"--reading: found '{read_as.reading[0]}', allowed are {', '.join(allowed)}: those of "
+            f"instrument: {kind} of the config."
+        )
 
 
 def _duration_s(trace: Path, read_as: ReadAs, instrument: Instrument) -> float:

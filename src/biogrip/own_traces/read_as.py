@@ -1,5 +1,6 @@
 """Command-line options for reading the file of a recorded trace."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -162,6 +163,10 @@ class ReadAs:
                 f"--reading: found '{self.reading[0]}', allowed are {', '.join(allowed)}."
                 + nearest(self.reading[0], allowed)
             )
+        if self.reading and self.rotation is not None:
+            raise BiogripError("--rotation: does not go with --reading; leave out one of them.")
+        if self.hold is not None and (self.hold == 0 or not math.isfinite(self.hold)):
+            raise BiogripError(f"--hold: found {self.hold:g}, allowed is another number.")
         for key, value in self.given.items():
             option = _OPTIONS.get(key, key).replace("_", "-")
             if self.noise_model == COLOURED and key in KNOWN_NOISE:

@@ -8,6 +8,7 @@ from typing import Any
 from biogrip.errors import BiogripError
 from biogrip.study.case_blocks import OVERRIDABLE
 from biogrip.study.config import StudyConfig
+from biogrip.study.measurement_block import OF_FILE
 from biogrip.study.named_blocks import KEY as BLOCKS
 from biogrip.study.named_blocks import read_named_blocks
 from biogrip.study.schema import schema_of
@@ -17,7 +18,7 @@ from biogrip.study.source import ConfigFiles, KeyPath, overlaid, read_config, re
 from biogrip.study.study import Study
 from biogrip.study.traces_block import KEY as TRACES
 from biogrip.study.traces_block import READ
-from biogrip.study.validation import brackets_problem, checked_study
+from biogrip.study.validation import brackets_problem, checked_study, measurement_problem
 from biogrip.traces.columns import place as place_of
 
 NOT_OF_TRACES = (TRACES, BLOCKS, "cases", "only", "seeds", "batch_size", "sweeps")
@@ -100,7 +101,18 @@ def _with_rows(
     ]
     kept = {key: value for key, value in given.items() if key not in NOT_OF_TRACES}
     filled = {**config, TRACES: {**block, "rows": rows, "given": kept}}
+    if isinstance(measured := config.get("measurement"), Mapping):
+        filled["measurement"] = _without_columns(measured, places)
     return filled if "cases" in given else {**filled, "cases": {}, "reconstructed": []}
+
+
+def _without_columns(measured: Mapping[str, Any], places: ConfigFiles) -> dict[str, Any]:
+    """Return a study's ``measurement`` without what is of its traces alone."""
+    for key in (key for key in OF_FILE if key in measured):
+        if problem := measurement_problem(key, measured[key]):
+            place = places.place(("measurement", key))
+            raise BiogripError(f"{place}: measurement.{key}: {problem}")
+    return {key: value for key, value in measured.items() if key not in OF_FILE}
 
 
 def _fill_in(config: Mapping[str, Any]) -> Mapping[str, Any]:

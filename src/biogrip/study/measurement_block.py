@@ -26,7 +26,8 @@ READINGS = tuple(INSTRUMENTS)
 
 _COLUMNS = ("time", *READINGS, "time_unit", "rotation_unit", "reading_unit", "skip", "scale")
 _TABLE = ("block", "average_repeated", "from_s", "until_s")
-_OF_FILE = (*_COLUMNS, *_TABLE, *KNOWN_NOISE, "start_s", "fit_start")
+OF_FILE = (*_COLUMNS, *_TABLE, *KNOWN_NOISE, "start_s", "fit_start")
+"""Keys of recorded traces only."""
 _Column = Annotated[str | None, Field(min_length=1, max_length=4000)]
 
 
@@ -175,7 +176,7 @@ class MeasurementBlock(Block):
         if self.bursts and self.times_s:
             yield ("bursts",), "does not go with times_s; allowed is one of them."
         if self.file is None:
-            for key in _OF_FILE:
+            for key in OF_FILE:
                 given = getattr(self, key)
                 if given is not None and given is not False:
                     yield (key,), "is only for a recorded trace, whose measurement has a file."

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from biogrip.instrument.gripper import ROTATION
 from biogrip.instrument.instrument import Quantity
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.terminal import visible
 
 _MOST_LISTED = 50
@@ -63,7 +64,9 @@ class Columns:
 def said_by(by_options: bool, *names: str) -> str:
     """Return the options or config keys that set something, for messages."""
     if by_options:
-        return " and ".join(f"--{name.replace('_', '-')}" for name in names)
+        others = set(INSTRUMENTS) - {ROTATION.name}
+        options = ("reading" if name in others else name for name in names)
+        return " and ".join(f"--{option.replace('_', '-')}" for option in options)
     return f"{' and '.join(names)} under measurement"
 
 
