@@ -335,7 +335,7 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
         help="average the readings of equal times",
     )
     command.add_argument(
-        "--scale", type=float, metavar="FACTOR", help="rotation = FACTOR times the column [1]"
+        "--scale", type=float, metavar="FACTOR", help="reading = FACTOR times the column [1]"
     )
     command.add_argument(
         "--start",
@@ -357,10 +357,10 @@ def _reading_options(command: argparse.ArgumentParser) -> None:
             name, action=argparse.BooleanOptionalAction, help=f"fit {what} along, or not"
         )
     command.add_argument(
-        "--sd", metavar="COLUMN", help="column of the rotations' standard deviations"
+        "--sd", metavar="COLUMN", help="column of the readings' standard deviations"
     )
     command.add_argument(
-        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the rotation"
+        "--noise-share", type=float, metavar="SHARE", help="known noise, as a share of the reading"
     )
 
 

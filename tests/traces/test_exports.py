@@ -331,6 +331,12 @@ def test_what_was_recognised_is_a_small_table(tmp_path: Path) -> None:
         "  modulus  Relaxation Modulus, in Pa",
         "  rows     15, 1 gap, from 0.5 to 7 s",
     ]
+    form = read_recording(tmp_path / "t.tsv", replace(columns, from_s=2.0)).recognised
+    assert form is not None
+    outside = np.sum(numbers(0)[0] < 2.0)
+    assert outside > 0
+    rows_in_words = f"15, 1 gap, {outside} not among the times to use, from 2 to 7 s"
+    assert form.in_words(Path("t.tsv")).endswith(rows_in_words)
 
 
 def test_a_usual_table_is_usual(tmp_path: Path) -> None:

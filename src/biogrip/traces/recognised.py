@@ -105,5 +105,6 @@ class Recognised:
     def _rows(self) -> str:
         gaps = f", {counted(self.gaps, 'gap')}" if self.gaps else ""
         averaged = f", {counted(self.averaged, 'reading')} averaged" if self.averaged else ""
+        outside = f", {self.outside} not among the times to use" if self.outside else ""
         first, last = self.range_s
-        return f"{self.rows}{gaps}{averaged}, from {first:g} to {last:g} s"
+        return f"{self.rows}{gaps}{averaged}{outside}, from {first:g} to {last:g} s"
