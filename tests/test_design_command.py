@@ -37,7 +37,7 @@ search_range:
   k_p: {exponent: [-5, 8]}
 design:
   {noise_rad: 3.0e-6, readings: 400, fastest_Hz: 1.0e+5, longest_s: 60.0,
-   largest_torque_Nm: 8.0e-9, most_steps: 8, candidates: 128}
+   largest_torque_Nm: 8.0e-9, most_steps: 4, candidates: 128}
 only: [liquid_drop_2]
 """
 

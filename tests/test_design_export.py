@@ -34,7 +34,7 @@ DROP: dict[str, Any] = {
         "fastest_Hz": 1e5,
         "longest_s": 60.0,
         "largest_torque_Nm": 8e-9,
-        "most_steps": 8,
+        "most_steps": 4,
         "candidates": 128,
     },
     "only": ["liquid_drop_2"],
