@@ -1,5 +1,6 @@
 """Every kind of case comes to its results."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from tests.helpers.in_process import inputs_and_outputs, make_in_process
 from tests.helpers.pictures import assert_drawn, in_coarse_dots
 from tests.helpers.places import ROOT
 from tests.helpers.runs import built_once
+from tests.test_instruments import OF_A_GRIPPER
 
 CASES = """
 seeds: 2
@@ -59,19 +61,41 @@ cases:
   calibrated:
     sample: {model: liquid_drop, k: 1.0, k_p: 0.1, c: 10.0}
     assumed_gripper: calibrated
+  crept:
+    instrument: creep
+    sample: {model: zener_maxwell, k: 300.0, k_p: 200.0, c: 900.0}
+    protocol: {phases: [{duration_s: 30, stress_Pa: 40}, {duration_s: 10, stress_Pa: 0}]}
+  relaxed:
+    instrument: relaxation
+    sample: {model: springpot, k_alpha: 0.02, alpha: 0.3}
+    protocol:
+      phases:
+        - {duration_s: 0.5, displacement_m: 0, to_displacement_m: 1.0e-6}
+        - {duration_s: 39.5, displacement_m: 1.0e-6}
 """
 NAMES = [name for name, case in yaml.safe_load(CASES)["cases"].items() if case]
 NOISY = [name for name in NAMES if name != "silent"]
 # The one has a panel a parameter, of which there are two to six.
 FIGURES = {"fit": NAMES, "evolution": ["silent", "kelvin_voigt", "burgers", "branches"]}
 # One of each kind; a trace of the nonlinear model would take minutes.
-JUDGED = ("silent", "kelvin_voigt", "burgers", "branches", "swinging", "uneven", "calibrated")
+JUDGED = (
+    "silent",
+    "kelvin_voigt",
+    "burgers",
+    "branches",
+    "swinging",
+    "uneven",
+    "calibrated",
+    "crept",
+    "relaxed",
+)
 WANTED = [
     *(f"results/figures/{figure}_{name}.png" for figure, of in FIGURES.items() for name in of),
     *(f"results/tables/errors_{name}.csv" for name in NAMES),
     *(f"results/tables/verdicts_{name}.csv" for name in JUDGED),
     *(f"results/figures/{figure}_silent.png" for figure in ("profiles", "scatter")),
     "results/figures/moduli.png",
+    *(f"results/summaries/{name}.html" for name in ("silent", "crept", "relaxed")),
 ]
 
 
@@ -105,6 +129,20 @@ def test_without_noise_all_is_determined_and_drawn(study: Path) -> None:
     assert_drawn(study / "figures" / "moduli.png")
     for figure in ("profiles", "scatter"):
         assert (study / "figures" / f"{figure}_silent.png").exists()
+
+
+@pytest.mark.parametrize(("name", "unit"), [("crept", "Pa"), ("relaxed", "N/m")])
+def test_cases_of_other_instruments_stand_beside_those_of_the_gripper(
+    study: Path, name: str, unit: str
+) -> None:
+    found = pd.read_csv(study / "tables" / f"verdicts_{name}.csv")
+    assert set(found["expected_verdict"]) == {"determined"}
+    assert found["unit"].str.startswith(unit).any()
+    page = (study / "summaries" / f"{name}.html").read_text(encoding="utf-8")
+    words = re.sub(r'"data:[^"]*"|<style.*?</style>', "", page, flags=re.DOTALL)
+    assert not OF_A_GRIPPER.search(words), OF_A_GRIPPER.search(words)
+    beside = (study / "summaries" / "silent.html").read_text(encoding="utf-8")
+    assert "take the gripper as exact" in beside
 
 
 def test_what_is_fixed_stays(study: Path) -> None:
