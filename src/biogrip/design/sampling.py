@@ -20,7 +20,7 @@ References
    Statistical Decision Theory and Related Topics III, vol. 2 (1982), 485-495.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -247,28 +247,51 @@ def _mixed(
     """Improve the shares of fillings, given their information, (n_fillings, n, p, p)."""
     flat = known.reshape(len(known), -1)
 
-    def at(shares: Array) -> tuple[Array, float]:
+    def at(shares: Array) -> tuple[float, Callable[[], Array]]:
         inverse = inverted((shares @ flat).reshape(known.shape[1:]) + before)
         covariances = inverse[:, :, criterion.targets][:, criterion.targets]
-        return inverse, criterion.smooth(covariances, sharpness)
+        return criterion.smooth(covariances, sharpness), lambda: worth_of(inverse)
 
     def worth_of(inverse: Array) -> Array:
         _, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
-        # Of singular information, rounding errors may have any sign.
-        return np.maximum(np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known), 0.0)
+        return np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
 
+    return improve_shares(shares, criterion, _MIXED, at)
+
+
+def improve_shares(
+    shares: Array,
+    criterion: Criterion,
+    tries: int,
+    at: Callable[[Array], tuple[float, Callable[[], Array]]],
+) -> Array:
+    """Improve shares of fillings, by steps that only ever make the criterion smaller.
+
+    Parameters
+    ----------
+    shares : (n_fillings,)
+        Shares to begin with.
+    criterion
+        Criterion to be minimized.
+    tries
+        Number of steps that are tried.
+    at
+        Function of shares. It returns the criterion, and a function that computes what each filling
+        is worth there, (n_fillings,).
+    """
     power = 1.0 if criterion.name == "D" else 0.5
-    inverse, value = at(shares)
-    worth = worth_of(inverse)
-    for _ in range(_MIXED):
+    value, worth_there = at(shares)
+    # Of singular information, rounding errors may have any sign.
+    worth = np.maximum(worth_there(), 0.0)
+    for _ in range(tries):
         largest = worth.max()
         if not largest > 0:
             break
         tried = shares * (worth / largest) ** power
         tried /= tried.sum()
-        inverse, new_value = at(tried)
+        new_value, worth_there = at(tried)
         if new_value <= value:
-            shares, value, worth = tried, new_value, worth_of(inverse)
+            shares, value, worth = tried, new_value, np.maximum(worth_there(), 0.0)
             power *= 1.2
         else:
             power *= 0.4

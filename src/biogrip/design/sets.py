@@ -69,6 +69,10 @@ class SetProblem:
         """Return covariances of log-parameters, (n_cells, n_parameters, n_parameters)."""
         return inverted(np.tensordot(counts, self.information, 1) + self.before)
 
+    def repeat(self, experiment: int, times: int = 1) -> IntArray:
+        """Return how often each is made if one is made some times, (n_experiments,)."""
+        return times * np.eye(len(self.costs), dtype=np.intp)[experiment]
+
     def made(self, counts: IntArray) -> ExperimentSet:
         """Return the set in which each experiment is made so often."""
         known = self.are_known(self.covariances(counts))
@@ -91,10 +95,11 @@ class SetProblem:
             LinearConstraint((np.arange(len(cost)) < many).astype(float)[None], ub=self.most),
             LinearConstraint((np.arange(len(cost)) >= many).astype(float)[None], lb=cells),
         ]
-        if self.made(np.zeros(many, dtype=np.intp)).known.sum() >= cells:
-            return self.made(np.zeros(many, dtype=np.intp))
+        none = self.made(np.zeros(many, dtype=np.intp))
+        if none.known.sum() >= cells:
+            return none
         if not self._rows:
-            self._cut(np.zeros(many, dtype=np.intp))
+            self._cut(none.counts)
         while True:
             found = milp(
                 cost,
@@ -149,10 +154,9 @@ def front(problem: SetProblem, shares: Sequence[float] = ()) -> list[ExperimentS
 
 def repeated(problem: SetProblem) -> list[ExperimentSet]:
     """Return the cheapest sets for more and more cells that are one experiment again and again."""
-    many = len(problem.costs)
     every = [
-        problem.made(count * np.eye(many, dtype=np.intp)[index])
-        for index in range(many)
+        problem.made(problem.repeat(index, count))
+        for index in range(len(problem.costs))
         for count in range(1, problem.most + 1)
     ]
     return nothing_beats(every)

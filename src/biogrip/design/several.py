@@ -61,6 +61,8 @@ class Several:
 
     settings: PriceSettings
     """What was asked for."""
+    targets: tuple[int, ...]
+    """Indices of the parameters that it was asked for."""
     offers: list[Offer]
     """Experiments to choose from."""
     at_once: list[ExperimentSet]
@@ -161,7 +163,7 @@ def choose_several(
     alone = repeated(problem)
     # One repeated is a set too, with shares between those of the front.
     at_once = nothing_beats([*front(problem, [settings.share]), *alone])
-    return Several(settings, offers, at_once, chosen, alone, rounds)
+    return Several(settings, inputs.criterion.targets, offers, at_once, chosen, alone, rounds)
 
 
 def _grid(inputs: DesignInputs) -> Iterator[Limits]:
@@ -247,8 +249,8 @@ def _in_parts(population: DesignInputs) -> Iterator[DesignInputs]:
 
 def _most(problem: SetProblem) -> ExperimentSet:
     """Return the repetition of one experiment with which most cells are known."""
-    unit = np.eye(len(problem.costs), dtype=np.intp) * problem.most
-    return min(map(problem.made, unit), key=lambda each: (-each.share, each.cost))
+    every = [problem.made(problem.repeat(one, problem.most)) for one in range(len(problem.costs))]
+    return min(every, key=lambda each: (-each.share, each.cost))
 
 
 def _first(problem: SetProblem, chosen: ExperimentSet) -> int:
@@ -258,14 +260,12 @@ def _first(problem: SetProblem, chosen: ExperimentSet) -> int:
 
 def _best(problem: SetProblem, offers: IntArray) -> int:
     """Return the experiment after which cells are known best, on a mean."""
-    unit = np.eye(len(problem.costs), dtype=np.intp)
-    return int(min(offers, key=lambda index: _unknown(problem, unit[index])))
+    return int(min(offers, key=lambda index: _unknown(problem, problem.repeat(index))))
 
 
 def _hardest(problem: SetProblem, offer: int) -> IntArray:
     """Return the cells in the order of what an experiment leaves unknown, the worst first."""
-    unit = np.eye(len(problem.costs), dtype=np.intp)
-    return np.argsort(-_worst(problem, unit[offer]), kind="stable")
+    return np.argsort(-_worst(problem, problem.repeat(offer)), kind="stable")
 
 
 def _unknown(problem: SetProblem, counts: IntArray) -> float:

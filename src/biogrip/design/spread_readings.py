@@ -20,11 +20,19 @@ References
    Mathematical Analysis and Applications 26 (1969), 576-594.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from biogrip.arrays import Array, IntArray
 from biogrip.design.criteria import Criterion, inverted
-from biogrip.design.sampling import compute_covariances, fill, fill_evenly, gap_of
+from biogrip.design.sampling import (
+    compute_covariances,
+    fill,
+    fill_evenly,
+    gap_of,
+    improve_shares,
+)
 
 # Fillings, at most, and improvements of their mixture after each; gap at which to stop.
 _FILLINGS, _MIXED, _GAP = 60, 4, 0.005
@@ -118,19 +126,31 @@ def spread_readings(
         sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
         shares = _mixed(np.array(fillings), shares, rows, noise, criterion, before, sharpness)
         readings = shares @ np.array(fillings)
-        information, roots = noise.respond(rows, readings)
-        covariances, of_samples, slope = compute_covariances(
-            inverted(information + before), criterion, sharpness
-        )
+        covariances, worth = _rate(readings, rows, noise, criterion, before, sharpness)
         if (bound := criterion.typical_bound(covariances)) < lowest:
             best, lowest = readings, bound
-        worth = of_samples @ np.einsum("npc,npc->nc", slope @ roots, roots)
         filling = fill(worth, capacity, room)
         if gap_of(criterion, covariances, float(worth @ (filling - readings)), sharpness) < _GAP:
             break
         fillings.append(filling)
         shares = np.append(shares * (1 - 1 / len(fillings)), 1 / len(fillings))
     return best
+
+
+def _rate(
+    readings: Array,
+    rows: Array,
+    noise: CellNoise,
+    criterion: Criterion,
+    before: Array | float,
+    sharpness: float,
+) -> tuple[Array, Array]:
+    """Return covariances of the parameters asked for, and what a reading more in each is worth."""
+    information, roots = noise.respond(rows, readings)
+    covariances, of_samples, slope = compute_covariances(
+        inverted(information + before), criterion, sharpness
+    )
+    return covariances, of_samples @ np.einsum("npc,npc->nc", slope @ roots, roots)
 
 
 def _mixed(
@@ -142,28 +162,15 @@ def _mixed(
     before: Array | float,
     sharpness: float,
 ) -> Array:
-    """Improve the shares of fillings, by steps that only ever make the criterion smaller."""
+    """Improve the shares of fillings."""
+    if len(shares) == 1:
+        return shares
 
-    def at(shares: Array) -> tuple[float, Array]:
-        information, roots = noise.respond(rows, shares @ fillings)
-        covariances, of_samples, slope = compute_covariances(
-            inverted(information + before), criterion, sharpness
-        )
-        worth = of_samples @ np.einsum("npc,npc->nc", slope @ roots, roots)
-        return criterion.smooth(covariances, sharpness), np.maximum(fillings @ worth, 0.0)
+    def at(shares: Array) -> tuple[float, Callable[[], Array]]:
+        covariances, worth = _rate(shares @ fillings, rows, noise, criterion, before, sharpness)
+        return criterion.smooth(covariances, sharpness), lambda: fillings @ worth
 
-    power = 1.0 if criterion.name == "D" else 0.5
-    value, worth = at(shares)
-    for _ in range(_MIXED if len(shares) > 1 else 0):
-        tried = shares * (worth / worth.max()) ** power
-        tried /= tried.sum()
-        new_value, new_worth = at(tried)
-        if new_value <= value:
-            shares, value, worth = tried, new_value, new_worth
-            power *= 1.2
-        else:
-            power *= 0.4
-    return shares
+    return improve_shares(shares, criterion, _MIXED, at)
 
 
 def whole_along(readings: Array) -> IntArray:

@@ -5,13 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from biogrip.design.experiment import DesignInputs
 from biogrip.design.price import PriceSettings
 from biogrip.design.sets import ExperimentSet
 from biogrip.design.several import Several, choose_several
 from biogrip.digits import counted
 from biogrip.experiment.random_streams import stream
-from biogrip.study.design_inputs import plausible, plausible_ends
+from biogrip.study.design_inputs import make_design_inputs, plausible, plausible_ends
 from biogrip.study.study import Case
 
 WAYS = ("designed at once", "one repeated", "one after the other, mean")
@@ -21,9 +20,7 @@ WAYS = ("designed at once", "one repeated", "one after the other, mean")
 _SHARES = (0.5, 0.8, 0.9)
 
 
-def several_of(
-    case: Case, inputs: DesignInputs, study_seed: int, progress: Callable[[int, int], None]
-) -> Several | None:
+def several_of(case: Case, study_seed: int, progress: Callable[[int, int], None]) -> Several | None:
     """Choose experiments of a case whose block `design` has a price; else return nothing.
 
     The callback gets the numbers of experiments designed and to be designed.
@@ -42,7 +39,7 @@ def several_of(
         return None
     population = replace(block, plausible_samples=block.price.cells)
     return choose_several(
-        inputs,
+        make_design_inputs(case),
         block.price,
         plausible(case, population),
         plausible_ends(case),
@@ -53,10 +50,10 @@ def several_of(
     )
 
 
-def aim(case: Case, several: Several, names: list[str]) -> str:
+def aim(case: Case, several: Several) -> str:
     """Return what is asked for, in words."""
     settings = several.settings
-    *first, last = names
+    *first, last = (case.searched.names[index] for index in several.targets)
     listed = f"{', '.join(first)} and {last}" if first else last
     return (
         f"{listed} within {100 * settings.within:g} % ({100 * case.confidence:g} % intervals) in "

@@ -16,7 +16,6 @@ from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.progress import Progress
 from biogrip.study.defaults import default_config
-from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case
 from biogrip.terminal import visible_lines
@@ -105,7 +104,7 @@ def design(
             def grouped(count: int, many: int, title: str = case.title) -> None:
                 progress.doing(f"{title}: {count} of {many} groups of experiments designed")
 
-            several = several_of(case, make_design_inputs(case), study.study_seed, grouped)
+            several = several_of(case, study.study_seed, grouped)
             found.append(replace(one, several=several))
             if export:
                 check_limits(found[-1])

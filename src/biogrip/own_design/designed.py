@@ -97,15 +97,8 @@ def in_words(found: Designed) -> str:
         lines.append(f"  {left_out(found.inputs)}")
     lines.append(f"  {best_in_words(found)}{_pressed(found)}")
     if found.several:
-        lines += [f"  {line}" for line in in_lines(found.several, aim_of(found))]
+        lines += [f"  {line}" for line in in_lines(found.several, aim(found.case, found.several))]
     return "\n".join(lines)
-
-
-def aim_of(found: Designed) -> str:
-    """Return what is asked of several experiments, in words."""
-    assert found.several is not None
-    targets = make_design_inputs(found.case).criterion.targets
-    return aim(found.case, found.several, [found.inputs.model.names[index] for index in targets])
 
 
 def best_in_words(found: Designed) -> str:

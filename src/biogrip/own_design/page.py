@@ -18,6 +18,7 @@ from biogrip.instrument.actuator import CombDrive, voltage
 from biogrip.instrument.instrument import Instrument
 from biogrip.own_design.at_a_price import (
     WAYS,
+    aim,
     costs,
     in_print,
     price_in_words,
@@ -25,7 +26,6 @@ from biogrip.own_design.at_a_price import (
 )
 from biogrip.own_design.designed import (
     Designed,
-    aim_of,
     best_in_words,
     in_numbers,
     kind,
@@ -164,7 +164,7 @@ def _several(found: Designed, several: Several) -> dict[str, Any]:
     plans = several.plans_of(chosen) if chosen else []
     return {
         "price": price_in_words(several.settings),
-        "aim": aim_of(found),
+        "aim": aim(found.case, several),
         "offers": len(several.offers),
         "ways": WAYS,
         "rows": [(f"{100 * share:g}", *map(in_print, row)) for share, row in costs(several)],

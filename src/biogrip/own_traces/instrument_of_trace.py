@@ -35,9 +35,9 @@ def with_instrument(
         If nothing says what is held, or ``--reading`` is none of the config's instrument.
     """
     instrument = _instrument(merged, given)
-    _refuse_another(read_as, given.get("instrument", instrument.kind))
-    measurement = {instrument.read.name: instrument.read.column} | merged["measurement"]
     kind = given.get("instrument", instrument.kind)
+    _refuse_another(read_as, kind)
+    measurement = {instrument.read.name: instrument.read.column} | merged["measurement"]
     found = {**merged, "instrument": kind, "measurement": measurement}
     if "protocol" in given and read_as.hold is None:
         return found
