@@ -17,9 +17,11 @@ from biogrip.design.rating import Rater, Torque
 from biogrip.design.schedule import presses
 from biogrip.design.shapes import SHAPES
 from biogrip.experiment.noise_parts import AR1
+from biogrip.experiment.protocol import torque_history
 from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.at_truth import bounds_percent
 from biogrip.identify.answer import silent
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.least_squares import LeastSquaresSettings, identify_many
 from biogrip.instrument.actuator import torque, voltage
 from biogrip.own_design.earlier import Recorded, estimate_from_recordings
@@ -159,6 +161,55 @@ def test_noise_with_memory_is_said_and_its_bounds_are_those_promised(tmp_path: P
         promised = re.search(rf"^  {name} .*\| (\S+) %$", said.getvalue(), re.MULTILINE)
         assert promised
         assert float(promised[1]) == pytest.approx(100 * variance**0.5, rel=0.06)
+
+
+CAMERA = ASKED.replace("1.0e+5", "1.0e+3").replace("60.0", "20.0")
+EXPOSED = CAMERA.replace("readings", "noise: {exposure_s: 1.0e-3}, readings")
+
+
+def exposed_rows(case: Case, times: Array) -> Array:
+    """Rotations and sensitivities as means over 1 ms by quadrature, (1 + n_parameters, n_times)."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    # Arms ring some times in a millisecond.
+    parts = (np.arange(40)[:, None] + (nodes + 1) / 2).ravel() / 40
+    instants = times[:, None] - 1e-3 * (1 - parts)
+    values = np.array([[case.parameters[name] for name in case.problem.searched.names]])
+    torque = torque_history(case.phases)
+    rows = linear_responses(
+        case.gripper, case.problem.searched, torque, instants.ravel(), values, inertia=True
+    )[0]
+    found: Array = rows.reshape(-1, *instants.shape) @ np.tile(weights / 80, 40)
+    return found
+
+
+def test_a_cameras_exposure_is_said_and_its_bounds_are_those_promised(tmp_path: Path) -> None:
+    """By quadrature over each exposure; a study fits such readings, taken for instants they err."""
+    (tmp_path / "asked.yaml").write_text(EXPOSED)
+    said = StringIO()
+    with redirect_stdout(said):
+        assert design(tmp_path) == 0
+    words = "white noise of 3 µrad, readings averaged over 0.001 s each."
+    assert words in said.getvalue()
+    assert words in (tmp_path / "out.html").read_text()
+    case = designed_case(tmp_path)
+    times = case.sampling.over(case.problem.torque.end_s)
+    rotation, *rows = exposed_rows(case, times)
+    inverse = np.linalg.inv(np.array(rows) @ np.array(rows).T / 9e-12)
+    names = case.problem.searched.names
+    for name, variance in zip(names, np.diag(inverse), strict=True):
+        promised = re.search(rf"^  {name} .*\| (\S+) %$", said.getvalue(), re.MULTILINE)
+        assert promised
+        assert float(promised[1]) == pytest.approx(100 * variance**0.5, rel=0.06)
+
+    def errors(problem: CaseProblem) -> Array:
+        posed = problem.of(times, rotation, noise_rad=3e-6)
+        settings = LeastSquaresSettings(candidates=500, starts=8)
+        (found,) = identify_many([posed], settings, [np.random.default_rng(1)], silent)
+        truth = [case.parameters[name] for name in names]
+        return np.abs(np.log(found.parameters / truth)) / np.diag(inverse) ** 0.5
+
+    assert errors(case.problem).max() < 0.01
+    assert errors(replace(case.problem, phases=case.phases)).max() > 3
 
 
 def test_earlier_traces_are_taken_for_white(
@@ -444,7 +495,24 @@ def _take_one_torque(monkeypatch: pytest.MonkeyPatch) -> None:
                 "sequence: {cells: 2, experiments: 2}",
             ),
             [],
-            "takes noise for white; leave it out with noise that has memory",
+            "takes noise for white and readings of instants; leave it out with noise that has",
+        ),
+        (
+            EXPOSED.replace(
+                "candidates: 128", "ranges: {k: [1, 2]}, sequence: {cells: 2, experiments: 2}"
+            ),
+            [],
+            "leave it out with noise that has memory or an exposure",
+        ),
+        (
+            EXPOSED.replace("1.0e-3}", "2.0e-3}"),
+            [],
+            "found 0.002, allowed is at most the time between readings, 0.001 s",
+        ),
+        (
+            EXPOSED + "protocol: {phases: [{duration_s: 9, voltage_V: 1, to_voltage_V: 2}]}\n",
+            [],
+            "is a ramp of the voltage, of whose torque no means are known; leave it out",
         ),
         (
             ASKED.replace("candidates: 128", "shapes: [ramps], shortest_step_s: 20.0"),

@@ -9,6 +9,7 @@ from biogrip.design.steps import steps
 from biogrip.design.time_bins import periodic_time_bins, time_bins, with_fine_end
 from biogrip.design.views import Views
 from biogrip.design.waveform import Limits, Waveform, hold, linear, swinging
+from biogrip.experiment.exposure import average
 from biogrip.experiment.protocol import Phase, load, torque_history
 from biogrip.experiment.sample import MODELS
 from biogrip.instrument.gripper import GRIPPER, NO_ARMS, Gripper
@@ -101,6 +102,33 @@ def test_without_arms_against_responses(reading: str, name: str, waveform: str) 
     ends = np.nextafter(held.time_s + DURATIONS, 0)
     last = linear_responses(NO_ARMS, model, held, ends, sample, inertia=False)[0, 0]
     np.testing.assert_allclose(moving.last_rotation[0], last, atol=1e-6 * peaks[0, 0, 0])
+
+
+@pytest.mark.parametrize("name", WAVEFORMS)
+@pytest.mark.parametrize("exposure_s", [1e-6, 1e-4, 3e-3])
+def test_readings_are_averaged_and_the_force_is_not(
+    gripper: Gripper, exposure_s: float, name: str
+) -> None:
+    """Against responses to torques that are averaged, from times as short as the exposure."""
+    waveform = WAVEFORMS[name]
+    phases = phases_of(waveform)
+    elapsed = exposure_s + np.append(0.0, np.geomspace(1e-6, 0.015, 30))
+    moving = Views(gripper, MODEL, SAMPLES, elapsed, GRIPPER, exposure_s).under(waveform)
+    view, own = moving.respond(np.arange(4)), moving.respond(np.arange(4), elapsed[::3])
+    now = Views(gripper, MODEL, SAMPLES, elapsed, GRIPPER).under(waveform).respond(np.arange(4))
+    peak = np.abs(view.sensitivity).max()
+    np.testing.assert_allclose(own.sensitivity, view.sensitivity[..., ::3], atol=1e-13 * peak)
+    np.testing.assert_array_equal(view.force, now.force)
+    np.testing.assert_array_equal(view.rotation, now.rotation)
+    averaged = torque_history(average(phases, exposure_s))
+    for k, start in enumerate(torque_history(phases).time_s):
+        for row, sample in enumerate(SAMPLES):
+            exact = ringing_responses(gripper, MODEL, averaged, start + elapsed, sample[None])[0]
+            # A shorter exposure is the difference of larger responses to steeper ramps.
+            share = 1e-8 * max(1.0, 1e-4 / exposure_s)
+            np.testing.assert_allclose(
+                view.sensitivity[row, :, k], exact[1:], atol=share * np.abs(exact[0]).max()
+            )
 
 
 @pytest.mark.parametrize("name", SHAPES)

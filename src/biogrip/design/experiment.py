@@ -8,6 +8,7 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion, inverted
 from biogrip.design.noise import WHITE, DesignNoise
 from biogrip.design.waveform import Limits
+from biogrip.experiment.exposure import average
 from biogrip.experiment.protocol import Phase, TorqueHistory, torque_history
 from biogrip.experiment.sample import SampleModel
 from biogrip.experiment.sampling import Sampling
@@ -60,14 +61,21 @@ class DesignInputs:
     out_of_reach: tuple[int, ...] = ()
     """Indices of parameters that no torque determines, see `biogrip.design.within_reach`."""
     noise: DesignNoise = WHITE
-    """What of the noise is not white, and what is fitted along."""
+    """What of the noise is not white, what is fitted along, and what readings average over."""
 
     def history(self, phases: tuple[Phase, ...]) -> TorqueHistory:
         """Return what phases hold against time."""
         return torque_history(phases, deforms=self.instrument.deforms)
 
+    def averaged(self, phases: tuple[Phase, ...]) -> TorqueHistory:
+        """Return the mean of what phases hold over the exposure of each reading."""
+        return self.history(average(phases, self.noise.exposure_s))
+
     def sensitivities(self, torque: TorqueHistory, time_s: Array) -> Array:
-        """Compute sensitivities over the noise, arms with inertia: (n, n_parameters, n_times)."""
+        """Compute sensitivities over the noise, arms with inertia: (n, n_parameters, n_times).
+
+        Those of readings are under a torque that is `averaged`.
+        """
         rows = linear_responses(
             self.gripper,
             self.model,

@@ -1,4 +1,4 @@
-"""Noise of an experiment that is designed: parts with memory, offset and drift fitted along.
+"""Noise of an experiment that is designed: parts with memory, and what is fitted along.
 
 Readings closer than the memory of the noise tell less than independent ones of what changes slowly,
 and more of what changes fast. The Fisher information is that of generalised least squares,
@@ -8,8 +8,10 @@ that are whitened and rid of offset and drift, in linear time (`biogrip.response
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
 from biogrip.arrays import Array
 from biogrip.experiment.noise_parts import AR1, Flicker, flicker_rates
@@ -30,6 +32,9 @@ class DesignNoise(Block):
     """If true, a constant offset is fitted along. By default only with ar1 or flicker."""
     drift: bool | None = None
     """If true, a linear drift is fitted along. By default only with ar1 or flicker."""
+    exposure_s: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """Time over which each reading is averaged, up to its instant, as the exposure of a camera's
+    frame. By default 0: readings are of instants."""
 
     def problems(self) -> Iterator[Problem]:
         """Find components whose shares exceed one together."""

@@ -54,7 +54,12 @@ class Rater:
         self._time_bins = time_bins(round(inputs.limits.longest_s * inputs.fastest_Hz), _GROWTH)
         elapsed_s = self._time_bins.middle / inputs.fastest_Hz
         self._views = Views(
-            inputs.gripper, inputs.model, inputs.parameters, elapsed_s, inputs.instrument
+            inputs.gripper,
+            inputs.model,
+            inputs.parameters,
+            elapsed_s,
+            inputs.instrument,
+            inputs.noise.exposure_s,
         )
 
     def torque(self, waveform: Waveform) -> Torque:

@@ -156,7 +156,7 @@ def sampling_problem(
     order = np.argsort(slot, kind="stable")
     sensitivity = np.empty((*inputs.parameters.shape, len(slot)))
     times_s = slot[order] / inputs.fastest_Hz
-    sensitivity[..., order] = inputs.sensitivities(inputs.history(phases), times_s)
+    sensitivity[..., order] = inputs.sensitivities(inputs.averaged(phases), times_s)
     along = inputs.along(slot / inputs.fastest_Hz)
     along = np.broadcast_to(along, (len(sensitivity), *along.shape))
     capacity = np.concatenate([own.capacity for own in each]).astype(float)
@@ -206,7 +206,7 @@ def _in_bursts(
     inputs: DesignInputs, phases: tuple[Phase, ...], problem: SamplingProblem, counts: IntArray
 ) -> Plan:
     bursts = make_bursts(problem.each, problem.starts, counts, inputs.fastest_Hz)
-    history = inputs.history(phases)
+    history = inputs.averaged(phases)
     return Plan(
         phases,
         bursts,

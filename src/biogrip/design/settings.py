@@ -161,15 +161,15 @@ class DesignSettings(Block):
         if shortest_s > self.longest_s:
             text = f"found {self.longest_s}, allowed is at least {words}, {shortest_s:g} s"
             yield ("longest_s",), f"{text}{self._instead(self.longest_s / fewest)}."
-        if self.noise and self.noise.has_memory:
-            if self.sequence:
-                yield (
-                    ("sequence",),
-                    "takes noise for white; leave it out with noise that has memory.",
-                )
-            if self.readings > MOST_SAMPLES:
-                text = f"found {self.readings}, allowed are at most {MOST_SAMPLES} with noise that "
-                yield ("readings",), f"{text}has memory."
+        if self.noise and (exposure_s := self.noise.exposure_s) > 1 / self.fastest_Hz:
+            text = f"found {exposure_s:g}, allowed is at most the time between readings, "
+            yield ("noise", "exposure_s"), f"{text}{1 / self.fastest_Hz:g} s."
+        if self.sequence and self.noise and (self.noise.has_memory or self.noise.exposure_s):
+            text = "takes noise for white and readings of instants; leave it out with noise that "
+            yield ("sequence",), f"{text}has memory or an exposure."
+        if self.noise and self.noise.has_memory and self.readings > MOST_SAMPLES:
+            text = f"found {self.readings}, allowed are at most {MOST_SAMPLES} with noise that "
+            yield ("readings",), f"{text}has memory."
         for name, (low, high) in (self.ranges or {}).items():
             if not low <= high:
                 yield ("ranges", name), f"found {low} to {high}, allowed is the lower one first."

@@ -228,7 +228,7 @@ def _offers(index: int) -> list[Offer]:
 
 def _information(population: DesignInputs, plan: Plan) -> Array:
     """Compute the information of an experiment, (n_cells, n_parameters, n_parameters)."""
-    history, time_s = population.history(plan.phases), plan.time_s
+    history, time_s = population.averaged(plan.phases), plan.time_s
     read = [
         some.noise.whiten(time_s, some.sensitivities(history, time_s))
         for some in _in_parts(population)

@@ -13,6 +13,9 @@ The left arm's equation gives the force: b F = tau - I phi'' - c phi' - k phi, w
 phi' is r times its weight, g and the torque together; the torque's own slope drops out, for arms
 with inertia do not start to turn at once.
 
+Readings are means of g over an exposure T, no longer than the time since the step. Those of the
+functions of e are again of the same kind, such as e^(r (e - T)) (e^(r T) - 1) / (r T).
+
 Without a gripper modes are those of the sample (`biogrip.response.protocol_modes`). Where the
 protocol is a deformation x, a mode's load is h = g + x (`biogrip.response.mode_decay`). With h for
 G + v, the response is
@@ -40,6 +43,8 @@ from biogrip.response.ringing import ringing_modes
 # Share of a mode that decays within the longest time, at least; twice the rounding error over it
 # is lost under ramps.
 _SLOWEST = 1e-7
+# Magnitude up to which a series is exact, to 1e-12.
+_SMALL = 0.02
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,7 @@ class Views:
     """Modes of plausible samples, prepared for responses to many torques.
 
     Arms have inertia, and are driven alike. Responses are computed at times after a step, by
-    default those given here, (n_times,).
+    default those given here, (n_times,). Sensitivities are means over the exposure before them.
     """
 
     def __init__(
@@ -84,6 +89,7 @@ class Views:
         parameters: Array,
         elapsed_s: Array,
         instrument: Instrument,
+        exposure_s: float = 0.0,
     ) -> None:
         arm, self.lever_m = gripper.left, gripper.lever_m
         self.instrument = instrument
@@ -98,15 +104,26 @@ class Views:
         self.inert = self.weights * (
             arm.inertia_kgm2 * self.rates**2 + arm.damping_Nms_per_rad * self.rates
         )
+        self.exposure_s = exposure_s
         self.elapsed_s = elapsed_s
         self.functions = self.functions_at(elapsed_s)
+        self.averaged = self.averaged_at(elapsed_s) if exposure_s else self.functions
 
     def functions_at(self, elapsed_s: Array) -> Array:
         """Return e^(r e) - 1, e^(r e), e e^(r e), real then imaginary parts, (n, 6 m, n_times)."""
         z = self.rates[..., None] * elapsed_s
-        decay = np.exp(z)
-        functions = np.concatenate((np.expm1(z), decay, elapsed_s * decay), axis=1)
-        return np.concatenate((functions.real, -functions.imag), axis=1)
+        decay: ComplexArray = np.exp(z)
+        return _in_parts(np.expm1(z), decay, elapsed_s * decay)
+
+    def averaged_at(self, elapsed_s: Array) -> Array:
+        """Return the means of `functions_at` over the exposure before each time."""
+        before_s = np.maximum(elapsed_s - self.exposure_s, 0.0)
+        z = self.rates[..., None] * self.exposure_s
+        mean, slope = np.expm1(z) / z, _mean_slope(z)
+        earlier = self.rates[..., None] * before_s
+        decay: ComplexArray = np.exp(earlier)
+        slanted: ComplexArray = decay * (before_s * mean + self.exposure_s * slope)
+        return _in_parts(np.expm1(earlier) * mean + (mean - 1), decay * mean, slanted)
 
     def under(self, waveform: Waveform) -> "Moving":
         """Return the responses of the samples to a torque."""
@@ -181,11 +198,13 @@ class Moving:
         By default the times are those of all views.
         """
         views = self._views
-        functions = views.functions
+        functions, averaged = views.functions, views.averaged
         if elapsed_s is None:
             elapsed_s = views.elapsed_s
         else:
-            functions = views.functions_at(elapsed_s)
+            functions = averaged = views.functions_at(elapsed_s)
+            if views.exposure_s:
+                averaged = views.averaged_at(elapsed_s)
         growth, slope, pushed = (
             _Factors(*(part[steps].swapaxes(0, 1)[:, None] for part in vars(factors).values()))
             for factors in (self._growth, self._slope, self._pushed)
@@ -204,24 +223,46 @@ class Moving:
         mixing = np.concatenate([rows(name) for name in ("growing", "decaying", "lasting")], axis=3)
         parts = np.concatenate((mixing.real, mixing.imag), axis=-1)
         count = len(steps)
-        found = (parts.reshape(n, -1, 6 * m) @ functions).reshape(n, p + 2, count, -1)
+        read, now = (
+            (part.reshape(n, -1, 6 * m) @ by).reshape(n, -1, count, len(elapsed_s))
+            for part, by in ((parts[:, :p], averaged), (parts[:, p:], functions))
+        )
 
-        def add(name: str, function: Array) -> None:
-            found[...] += rows(name).sum(axis=-1).real[..., None] * function
+        def add(name: str, mean: Array, function: Array) -> None:
+            scale = rows(name).sum(axis=-1).real[..., None]
+            read[...] += scale[:, :p] * mean
+            now[...] += scale[:, p:] * function
 
         waveform = self._waveform
         levels, slopes = waveform.levels[steps, None], waveform.slopes[steps, None]
-        add("resting", np.ones(1))
-        found[:, p + 1] += levels / views.lever_m
+        add("resting", np.ones(1), np.ones(1))
+        now[:, 1] += levels / views.lever_m
         if slopes.any():
-            add("linear", elapsed_s)
-            found[:, p + 1] += slopes * elapsed_s / views.lever_m
+            add("linear", elapsed_s - views.exposure_s / 2, elapsed_s)
+            now[:, 1] += slopes * elapsed_s / views.lever_m
         if waveform.amplitudes[steps].any():
             angle = self._omega[steps, None] * elapsed_s
-            add("sine", np.sin(angle))
-            add("cosine", np.cos(angle))
-            found[:, p + 1] += waveform.amplitudes[steps, None] * np.sin(angle) / views.lever_m
-        return View(found[:, :p], found[:, p], found[:, p + 1])
+            half = self._omega[steps, None] * views.exposure_s / 2
+            mean = np.sinc(half / np.pi)
+            add("sine", mean * np.sin(angle - half), np.sin(angle))
+            add("cosine", mean * np.cos(angle - half), np.cos(angle))
+            now[:, 1] += waveform.amplitudes[steps, None] * np.sin(angle) / views.lever_m
+        return View(read, now[:, 0], now[:, 1])
+
+
+def _in_parts(*functions: ComplexArray) -> Array:
+    """Return functions of all modes, real then imaginary parts, (n, 6 m, n_times)."""
+    all_modes = np.concatenate(functions, axis=1)
+    return np.concatenate((all_modes.real, -all_modes.imag), axis=1)
+
+
+def _mean_slope(z: ComplexArray) -> ComplexArray:
+    """Return the derivative of (e^z - 1) / z."""
+    series = 0.5 + z * (1 / 3 + z * (1 / 8 + z * (1 / 30 + z * (1 / 144 + z / 840))))
+    small = np.abs(z) < _SMALL
+    by = np.where(small, 1.0, z)
+    found: ComplexArray = np.where(small, series, (np.exp(by) * (by - 1) + 1) / by**2)
+    return found
 
 
 def _carried(

@@ -47,6 +47,8 @@ def _case(found: Designed) -> Iterator[str]:
     parts = "".join(f", {part}" for part in _parts(found.inputs.noise))
     level = _number(found.inputs.noise_rad)
     yield f"      noise: {{ kind: gaussian, level_rad: {level}{parts} }}{note}"
+    if found.inputs.noise.exposure_s:
+        yield f"      exposure_s: {_number(found.inputs.noise.exposure_s)}"
     yield from _assumed(found.inputs.noise)
     yield "      bursts:"
     for burst in found.plan.bursts:
@@ -67,7 +69,7 @@ def _assumed(noise: DesignNoise) -> Iterator[str]:
     """Yield what an identification has to allow for, to come as close as the bounds say."""
     if noise.has_memory:
         yield "      noise_model: coloured"
-    if noise != WHITE:
+    if replace(noise, exposure_s=0.0) != WHITE:
         yield f"      offset: {str(noise.fits_offset).lower()}"
         yield f"      drift: {str(noise.fits_drift).lower()}"
 

@@ -73,7 +73,7 @@ def designed(
         progress,
         neighbours=NEIGHBOURS * block.candidates,
     )
-    history = inputs.history(case.phases)
+    history = inputs.averaged(case.phases)
     before = inputs.bounds(inputs.information(history, case.sampling.over(history.end_s)))
     network = inputs.model.network(inputs.parameters)
     time_s, force_N = np.zeros(0), np.zeros((len(inputs.parameters), 0))
@@ -125,7 +125,8 @@ def noise_in_words(inputs: DesignInputs) -> str:
         level = f"{1e6 * inputs.noise_rad:.3g} µrad"
     along = ["offset"] * noise.fits_offset + ["drift"] * noise.fits_drift
     fitted = f", {' and '.join(along)} fitted along" if along else ""
-    return f"{', '.join(parts)} noise of {level}{fitted}"
+    exposed = f", readings averaged over {noise.exposure_s:g} s each" if noise.exposure_s else ""
+    return f"{', '.join(parts)} noise of {level}{fitted}{exposed}"
 
 
 def _pressed(found: Designed) -> str:

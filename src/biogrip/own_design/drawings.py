@@ -77,7 +77,8 @@ def draw_sensitivities(found: Designed) -> Figure:
     """
     plan = found.plan
     inputs = replace(found.inputs, parameters=found.inputs.parameters[:1])
-    history, times = inputs.history(plan.phases), plan.time_s
+    history, averaged = inputs.history(plan.phases), inputs.averaged(plan.phases)
+    times = plan.time_s
     step = history.time_s.searchsorted(times, side="left") - 1
     chosen = sorted(np.argsort(-np.bincount(step, minlength=len(history.time_s)))[:3].tolist())
     drawn = figure(PAGE_IN, 2.6)
@@ -94,7 +95,7 @@ def draw_sensitivities(found: Designed) -> Figure:
             after = (shown + phase.duration_s // period_s - 1) * period_s
             read = read % period_s / period_s
             axes.set_xlabel("part of the period")
-        rows = inputs.sensitivities(history, start_s + after * (1 - 1e-12))[0]
+        rows = inputs.sensitivities(averaged, start_s + after * (1 - 1e-12))[0]
         for index, name in enumerate(inputs.model.names):
             axes.semilogy(
                 shown, np.abs(rows[index]), color=_COLOURS[index % len(_COLOURS)], label=name

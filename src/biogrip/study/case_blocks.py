@@ -245,6 +245,7 @@ class CaseBlock(Shared):
         )
         yield from self._instrument_problems()
         yield from self._contact_problems()
+        yield from self._exposure_problems()
         yield from self._design_problems()
         yield from self._method_problems()
         yield from self._posterior_problems()
@@ -308,6 +309,22 @@ class CaseBlock(Shared):
         elif self.contact == "unilateral" and self.models.target != "linear":
             text = "found unilateral and a nonlinear target, allowed is models.target: linear"
             yield ("contact",), f"{text} with it."
+
+    def _exposure_problems(self) -> Iterator[Problem]:
+        """Find what readings cannot be averaged of."""
+        designed = self.design.noise if self.design else None
+        if not self.measurement.exposure_s and not (designed and designed.exposure_s):
+            return
+        nonlinear = [key for key, value in vars(self.models).items() if value == "nonlinear"]
+        if self.measurement.exposure_s and (nonlinear or self.contact == "unilateral"):
+            found = f"models.{nonlinear[0]}: nonlinear" if nonlinear else "contact: unilateral"
+            text = f"is for linear responses; leave it out, or {found}."
+            yield ("measurement", "exposure_s"), text
+        for index, phase in enumerate(self.protocol.phases):
+            if phase.to_voltage_V is not None:
+                text = "is a ramp of the voltage, of whose torque no means are known; leave it "
+                yield ("protocol", "phases", index, "to_voltage_V"), f"{text}out, or exposure_s."
+                break
 
     def _design_problems(self) -> Iterator[Problem]:
         if self.design is None:

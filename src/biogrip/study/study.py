@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from biogrip.design.settings import DesignSettings
+from biogrip.experiment.exposure import average
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
 from biogrip.experiment.sampling import Sampling
@@ -132,6 +133,11 @@ class Case:
         return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
+    def averaged(self) -> tuple[Phase, ...]:
+        """Phases that the readings follow: means over the exposure of each."""
+        return average(self.phases, self.block.measurement.exposure_s)
+
+    @cached_property
     def gripper(self) -> Gripper:
         """True gripper, at the angle at which the jaws touch the sample; or none."""
         if not self.instrument.has_jaws:
@@ -185,7 +191,7 @@ class Case:
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         return CaseProblem(
             gripper,
-            self.phases,
+            self.averaged,
             self.ranges,
             self.sample,
             self.fixed,

@@ -23,6 +23,7 @@ def drop(torque_Nm: float, *more: Phase, unilateral: bool = False) -> Any:
         instrument=GRIPPER,
         gripper=STUDY.gripper,
         phases=(hold(100.0, torque_Nm), *more),
+        averaged=(hold(100.0, torque_Nm), *more),
         sampling=Sampling(rate_Hz=1.0),
         sample=Sample("maxwell"),
         parameters={"k": 1.0, "c": 1.0},
