@@ -12,11 +12,11 @@ from functools import cache
 import pandas as pd
 
 from biogrip.design.experiment import NO_BOUND, relative_bounds
+from biogrip.design.schedule import sampled
 from biogrip.design.shapes import STEPS
 from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.random_streams import stream
 from biogrip.identify.answer import silent
-from biogrip.own_design.designed import NEIGHBOURS
 from biogrip.study.design_inputs import make_design_inputs
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study
@@ -24,7 +24,7 @@ from tests.helpers.groups_campaign import write
 from tests.helpers.places import CONFIG, ROOT
 
 TABLE = ROOT / "results" / "published" / "shapes" / "tables" / "designed_shapes.csv"
-ASKED = [CONFIG, ROOT / "config" / "design.yaml"]
+CONFIGS = [CONFIG, ROOT / "config" / "design.yaml", ROOT / "config" / "designed.yaml"]
 TRIED = 2000
 """Torques of other shapes."""
 
@@ -35,15 +35,18 @@ KINDS = (("steps", 10.0), ("ramps", 10.0), ("ramps", 0.1), ("sinusoids", 10.0))
 def told(case_name: str, shape: str, shortest_ms: float, tried: int) -> pd.DataFrame:
     """Design with torques of one shape, and give what is told, a row a quantity.
 
-    Trains of steps are designed as by the command, so that they are the published ones.
+    Trains of steps are the published ones.
     """
     study = _study()
-    wanted = make_design_inputs(study.cases[case_name])
-    limits = replace(wanted.limits, shortest_s=1e-3 * shortest_ms)
-    wanted = replace(wanted, shapes=(shape,), limits=limits)
-    rng = stream(study.study_seed, case_name, 0, "design")
-    neighbours = NEIGHBOURS * tried if shape == STEPS else 0
-    _, plan = plan_within_reach(wanted, tried, rng, silent, neighbours=neighbours)
+    case = study.cases[case_name]
+    wanted = make_design_inputs(case)
+    if shape == STEPS:
+        plan = sampled(wanted, case.phases)
+    else:
+        limits = replace(wanted.limits, shortest_s=1e-3 * shortest_ms)
+        wanted = replace(wanted, shapes=(shape,), limits=limits)
+        rng = stream(study.study_seed, case_name, 0, "design")
+        _, plan = plan_within_reach(wanted, tried, rng, silent)
     bounds = relative_bounds(plan.information)[0]
     return pd.DataFrame(
         {
@@ -61,7 +64,7 @@ def told(case_name: str, shape: str, shortest_ms: float, tried: int) -> pd.DataF
 
 def main(cases: Sequence[str]) -> None:
     """Write the table, and print it."""
-    jobs = [(case, *kind, _tried(case, kind[0])) for case in cases for kind in KINDS]
+    jobs = [(case, *kind, TRIED) for case in cases for kind in KINDS]
     with ProcessPoolExecutor() as processes:
         tables = list(processes.map(told, *zip(*jobs, strict=True)))
     found = pd.concat(tables)
@@ -69,13 +72,9 @@ def main(cases: Sequence[str]) -> None:
     write(found, TABLE)
 
 
-def _tried(case_name: str, shape: str) -> int:
-    return _study().cases[case_name].design.candidates if shape == STEPS else TRIED
-
-
 @cache
 def _study() -> Study:
-    return load_study(read_configs(ASKED), ASKED)
+    return load_study(read_configs(CONFIGS), CONFIGS)
 
 
 if __name__ == "__main__":

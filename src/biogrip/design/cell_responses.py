@@ -13,8 +13,6 @@ from biogrip.design.waveform import Waveform
 _PARTS, _PERIODS = 12, 2.0
 # Largest excess of a sinusoid over its value in the middle of the nearest part, per amplitude.
 _BETWEEN = 1 - np.cos(np.pi / _PARTS)
-# Least force relative to the largest: a margin, for the force is computed at few instants.
-_MARGIN = 2e-3
 
 
 @dataclass(frozen=True)
@@ -59,11 +57,12 @@ class _Part:
 
 
 def compute_cell_responses(
-    views: Views, time_bins: TimeBins, waveform: Waveform, fastest_Hz: float
+    views: Views, time_bins: TimeBins, waveform: Waveform, fastest_Hz: float, margin: float
 ) -> CellResponses:
     """Compute the responses of plausible samples to a torque in N m if its largest is 1, in cells.
 
-    The cells after a step are longer than any step; there are `fastest_Hz` slots per second.
+    The cells after a step are longer than any step; there are `fastest_Hz` slots per second. The
+    margin is that of a sample's force, relative to its largest.
     """
     moving = views.under(waveform)
     slots = np.round(waveform.durations_s * fastest_Hz).astype(np.intp)
@@ -80,7 +79,7 @@ def compute_cell_responses(
     steps = np.concatenate([part.steps for part in parts])
     lowest = np.concatenate([part.lowest_N for part in parts], axis=1)
     lowest = np.minimum(lowest, moving.last_force[:, steps])
-    margin = np.where(steps > 0, _MARGIN, 0.0) * largest[:, None]
+    least = np.where(steps > 0, margin, 0.0) * largest[:, None]
     turned = max(part.turned_rad for part in parts)
     of_cells = np.concatenate([part.places[0] for part in parts])
     return CellResponses(
@@ -91,7 +90,7 @@ def compute_cell_responses(
         starts_s[of_cells] + np.concatenate([part.after_s for part in parts]),
         np.concatenate([part.lasting_s for part in parts]),
         max(turned, float(np.max(np.abs(moving.last_rotation)))),
-        float(np.max((margin - lowest) / largest[:, None])) if views.instrument.has_jaws else 0.0,
+        float(np.max((least - lowest) / largest[:, None])) if views.instrument.has_jaws else 0.0,
     )
 
 

@@ -1,7 +1,8 @@
 """Local search from the best trains of steps that are known: their ends are climbed.
 
 A neighbour of a train (`biogrip.design.neighbours`) replaces it if its best sampling is better.
-Several trains are climbed side by side, and the worse half is given up again and again [1]_.
+Several trains are climbed side by side, and the worse half is given up again and again [1]_. The
+best are polished (`biogrip.design.polish`).
 
 References
 ----------
@@ -16,20 +17,17 @@ from functools import partial
 
 import numpy as np
 
-from biogrip.arrays import IntArray
-from biogrip.design.cell_responses import CellResponses
 from biogrip.design.experiment import DesignInputs
 from biogrip.design.neighbours import (
-    NEW,
     Neighbour,
     Train,
-    neighbour,
+    drawn_neighbour,
     random_train,
     train_of,
     without,
 )
+from biogrip.design.polish import best_of, polish
 from biogrip.design.rating import LOST, Rated, Rater, Torque
-from biogrip.design.sampling import Mixture
 from biogrip.design.waveform import Limits
 from biogrip.worker_processes import worker_processes
 
@@ -40,8 +38,8 @@ _BETTER, _AS_GOOD = 1e-6, 2e-5
 # Most trains climbed side by side, fewest neighbours of each in the first round, and of how many
 # trains drawn at random one is the best.
 _SIDE_BY_SIDE, _FEWEST, _DRAWN = 16, 60, 40
-# Most neighbours drawn for one that can be rated.
-_IN_VAIN = 50
+# Trains that are polished.
+_POLISHED = 2
 
 
 @dataclass(frozen=True)
@@ -62,6 +60,7 @@ def climb(
     tried: int,
     rng: np.random.Generator,
     progress: Callable[[int, float], None],
+    known: Sequence[Torque] = (),
 ) -> list[Torque]:
     """Climb from trains of steps and from random ones; the best comes first.
 
@@ -77,11 +76,13 @@ def climb(
         Generator of random trains and neighbours.
     progress
         Called with the number tried, and the lowest typical relative bound.
+    known
+        Trains of steps from elsewhere, polished if they are among the best.
 
     Returns
     -------
     list of Torque
-        One for each train that was climbed to the end, and those given.
+        Polished ones, one for each train that was climbed to the end, and those given.
     """
     rater = Rater(inputs)
     many = int(np.clip(tried // (4 * _FEWEST), 1, _SIDE_BY_SIDE))
@@ -96,14 +97,14 @@ def climb(
         if rating.logarithm < LOST
     ]
     if not climbers:
-        return list(torques)
+        return [*known, *torques]
     rounds = max(1, (len(climbers) - 1).bit_length())
-    count = 0
+    count, in_round = 0, tried // (rounds + 1)
     with worker_processes(
         min(len(os.sched_getaffinity(0)), len(climbers)), partial(_hold, rater, inputs)
     ) as processes:
         for _ in range(rounds):
-            each = max(1, tried // rounds // len(climbers))
+            each = max(1, in_round // len(climbers))
             found = []
             for climber in processes.map(partial(_climb_here, each), climbers):
                 found.append(climber)
@@ -112,8 +113,15 @@ def climb(
             found.sort(key=lambda climber: climber.rated.logarithm)
             climbers = found[: max(2, len(found) // 2)]
         shortened = list(processes.map(_shorten_here, climbers))
-    shortened.sort(key=lambda climber: climber.rated.logarithm)
-    return [rater.torque(each.train.waveform(inputs.limits)) for each in shortened] + list(torques)
+        shortened.sort(key=lambda climber: climber.rated.logarithm)
+        ends = [rater.torque(climber.train.waveform(inputs.limits)) for climber in shortened]
+        polished: list[Torque] = []
+        # With memory in the noise trains are rated roughly.
+        if not inputs.noise.has_memory:
+            best = best_of(inputs, [*known, *ends], _POLISHED)
+            each = max(1, in_round // _POLISHED)
+            polished = list(processes.map(partial(_polish_here, each), best, rng.spawn(len(best))))
+    return best_of(inputs, polished, _POLISHED) + ends + list(torques)
 
 
 _given: list[tuple[Rater, DesignInputs]] = []
@@ -132,6 +140,11 @@ def _shorten_here(climber: Climber) -> Climber:
     return _shortened(*_given[-1], climber)
 
 
+def _polish_here(tried: int, torque: Torque, rng: np.random.Generator) -> Torque:
+    _, inputs = _given[-1]
+    return polish(inputs, torque, tried, rng)
+
+
 def _drawn_train(rater: Rater, inputs: DesignInputs, rng: np.random.Generator) -> Train:
     """Return the best of some random trains."""
     trains = [random_train(inputs.limits, rng) for _ in range(_DRAWN)]
@@ -144,7 +157,7 @@ def climb_one(rater: Rater, inputs: DesignInputs, climber: Climber, tried: int) 
     train, rng = climber.train, climber.rng
     rated = rater.rate(train.waveform(limits), gap=_GAP, most=_FILLINGS)
     for _ in range(tried):
-        other = _drawn_neighbour(train, limits, rng)
+        other = drawn_neighbour(train, limits, rng)
         if other is None:
             break
         found = _rate_beside(rater, limits, rated, other, rated.logarithm)
@@ -168,13 +181,6 @@ def _shortened(rater: Rater, inputs: DesignInputs, climber: Climber) -> Climber:
     return Climber(train, rated, climber.rng)
 
 
-def _drawn_neighbour(train: Train, limits: Limits, rng: np.random.Generator) -> Neighbour | None:
-    for _ in range(_IN_VAIN):
-        if (other := neighbour(train, limits, rng)) is not None:
-            return other
-    return None
-
-
 def _rate_beside(
     rater: Rater, limits: Limits, rated: Rated, other: Neighbour, allowed: float
 ) -> Rated:
@@ -185,24 +191,10 @@ def _rate_beside(
         other.train.waveform(limits),
         gap=_GAP,
         most=_FILLINGS,
-        start=partial(_carried, rated, other.origins),
+        start=partial(rated.carried, other.origins),
         to_beat=float(np.exp(allowed)),
     )
 
 
 def _is_sure(rated: Rated) -> bool:
     return rated.best is not None and rated.best.gap <= _GAP
-
-
-def _carried(rated: Rated, origins: IntArray, responses: CellResponses) -> Mixture | None:
-    """Return the fillings of a rated train for the cells of another one."""
-    if rated.best is None or rated.responses is None:
-        return None
-    old, mixture = rated.responses, rated.best.mixture.main
-    many = 1 + max(int(old.places.max()), int(responses.places.max()))
-    by_step = np.zeros((len(mixture.shares), int(old.steps.max()) + 1, many))
-    by_step[:, old.steps, old.places] = mixture.fillings
-    here = origins[responses.steps]
-    known = (here != NEW) & (here < by_step.shape[1])
-    fillings = by_step[:, np.where(known, here, 0), responses.places] * known
-    return Mixture(fillings, mixture.shares)

@@ -13,6 +13,8 @@ from biogrip.design.waveform import Limits, Waveform, hold
 _LARGEST, _SMALLER = 0.3, 1e-2
 # Steps of a train that is drawn at random, and the part of the experiment in which they end.
 _MOST_DRAWN, _DRAWN_WITHIN = 7, 0.2
+# Most changes drawn for one that can be made.
+_IN_VAIN = 50
 
 NEW = -1
 """Origin of a step that was not there."""
@@ -69,6 +71,14 @@ def neighbour(train: Train, limits: Limits, rng: np.random.Generator) -> Neighbo
     if found is None or len(found.origins) > limits.most_steps or not found.train.levels.any():
         return None
     return found
+
+
+def drawn_neighbour(train: Train, limits: Limits, rng: np.random.Generator) -> Neighbour | None:
+    """Draw changes until one can be made; return nothing where none is found."""
+    for _ in range(_IN_VAIN):
+        if (other := neighbour(train, limits, rng)) is not None:
+            return other
+    return None
 
 
 def without(train: Train, step: int, longer: int) -> Neighbour:

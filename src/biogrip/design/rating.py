@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from biogrip.arrays import Array
+from biogrip.arrays import Array, IntArray
 from biogrip.design.cell_responses import CellResponses, compute_cell_responses
 from biogrip.design.experiment import DesignInputs
+from biogrip.design.neighbours import NEW
 from biogrip.design.sampling import Mixture, Optimum, best_sampling
 from biogrip.design.spread_readings import effective_capacity
 from biogrip.design.time_bins import time_bins
@@ -17,6 +18,8 @@ from biogrip.design.waveform import Waveform
 # Growth of cells, gap and fillings of samplings during the search; the final torque is sampled
 # more finely.
 _GROWTH, _GAP, _FILLINGS = 1.35, 0.03, 8
+# Least force between the jaws relative to the largest.
+_MARGIN = 2e-3
 # Decimals of a logarithm, so that the last bits of a processor decide nothing.
 _DECIMALS = 8
 
@@ -45,12 +48,32 @@ class Rated:
     responses: CellResponses | None = None
     """Responses in the cells that it distributes readings over, likewise."""
 
+    def carried(self, origins: IntArray, responses: CellResponses) -> Mixture | None:
+        """Return the fillings for the cells of a torque that was made from this one.
+
+        The origins, (n_steps,), are those of its steps, see `biogrip.design.neighbours`.
+        """
+        if self.best is None or self.responses is None:
+            return None
+        old, mixture = self.responses, self.best.mixture.main
+        many = 1 + max(int(old.places.max()), int(responses.places.max()))
+        by_step = np.zeros((len(mixture.shares), int(old.steps.max()) + 1, many))
+        by_step[:, old.steps, old.places] = mixture.fillings
+        here = origins[responses.steps]
+        known = (here != NEW) & (here < by_step.shape[1])
+        fillings = by_step[:, np.where(known, here, 0), responses.places] * known
+        return Mixture(fillings, mixture.shares)
+
 
 class Rater:
-    """Rating of torques for a design problem."""
+    """Rating of torques for a design problem.
 
-    def __init__(self, inputs: DesignInputs) -> None:
-        self._inputs = inputs
+    The jaws have to press with a margin, relative to the largest force: the force is computed at
+    few instants.
+    """
+
+    def __init__(self, inputs: DesignInputs, margin: float = _MARGIN) -> None:
+        self._inputs, self._margin = inputs, margin
         self._time_bins = time_bins(round(inputs.limits.longest_s * inputs.fastest_Hz), _GROWTH)
         elapsed_s = self._time_bins.middle / inputs.fastest_Hz
         self._views = Views(
@@ -112,7 +135,7 @@ class Rater:
 
     def _compute_responses(self, waveform: Waveform) -> CellResponses:
         return compute_cell_responses(
-            self._views, self._time_bins, waveform, self._inputs.fastest_Hz
+            self._views, self._time_bins, waveform, self._inputs.fastest_Hz, self._margin
         )
 
     def _scaled(self, waveform: Waveform, responses: CellResponses) -> Torque:

@@ -1,10 +1,13 @@
 """Rounding of torques to values that can be set: few digits, and whole slots of the camera."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from biogrip.design.experiment import DesignInputs
 from biogrip.design.rating import Torque
-from biogrip.experiment.protocol import Phase, load
+from biogrip.design.waveform import hold
+from biogrip.experiment.protocol import Load, Phase, load
 
 _DIGITS = 4
 
@@ -27,6 +30,28 @@ def set_values(inputs: DesignInputs, torque: Torque) -> tuple[Phase, ...]:
             one = load(duration_s, level, end, min(amplitude, level), frequency_Hz)
         phases.append(Phase(duration_s, one, one))
     return tuple(phases)
+
+
+def torque_of(inputs: DesignInputs, phases: Sequence[Phase]) -> Torque | None:
+    """Return a train of steps that is held, the inverse of `set_values`; else nothing.
+
+    Nothing, too, for one outside the limits, or of unlike arms.
+    """
+    limits = inputs.limits
+    levels = np.array([phase.left.value_Nm for phase in phases])
+    durations_s = np.array([phase.duration_s for phase in phases])
+    units = durations_s / limits.shortest_s
+    if (
+        any(
+            phase.left != phase.right or phase.left != Load(phase.left.value_Nm) for phase in phases
+        )
+        or not np.allclose(units, np.rint(units), rtol=0, atol=1e-6)
+        or round(limits.longest_s / limits.shortest_s) != round(units.sum())
+        or len(phases) > limits.most_steps
+        or not 0 <= levels.min() < levels.max() <= inputs.largest_Nm * (1 + 1e-12)
+    ):
+        return None
+    return Torque(hold(durations_s, levels / levels.max()), float(levels.max()))
 
 
 def _rounded_down(value: float) -> float:

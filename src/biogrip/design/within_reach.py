@@ -6,7 +6,7 @@ errors. Such parameters are removed from the criterion one after the other. They
 very wide prior (`NO_BOUND`), and the others' bounds account for that.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,10 +14,13 @@ import numpy as np
 from biogrip.design.climb import climb
 from biogrip.design.criteria import inverted
 from biogrip.design.experiment import NO_BOUND, DesignInputs, relative_bounds
+from biogrip.design.polish import best_of
 from biogrip.design.schedule import Plan, planned
 from biogrip.design.search import best_torques
+from biogrip.design.set_values import torque_of
 from biogrip.design.shapes import STEPS
 from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import Phase
 
 
 def plan_within_reach(
@@ -27,11 +30,13 @@ def plan_within_reach(
     progress: Callable[[int, float], None],
     *,
     neighbours: int = 0,
+    configured: Sequence[Phase] = (),
 ) -> tuple[DesignInputs, Plan]:
     """Design an experiment, removing parameters from the criterion that no torque determines.
 
     From what the search finds it climbs, as many neighbours of trains of steps being rated as asked
-    for. The other arguments are those of `best_torques`.
+    for. A train that is `configured` is a start, too: the design is no worse. The other arguments
+    are those of `best_torques`.
 
     Returns the design problem with the remaining parameters, and the experiment, in which all
     parameters asked for have a bound.
@@ -54,8 +59,11 @@ def plan_within_reach(
         def count_on(count: int, lowest: float) -> None:
             progress(tried + count, lowest)
 
-        climbed = planned(inputs, climb(inputs, trains, neighbours, rng, count_on))
-        plan = min(plan, climbed, key=lambda each: inputs.typical_bound(each.information))
+        known = [torque for torque in [torque_of(inputs, configured)] if torque]
+        pressing = best_of(inputs, known, 1)
+        climbed = climb(inputs, trains, neighbours, rng, count_on, pressing)
+        plans = [planned(inputs, torques) for torques in (climbed, pressing) if torques]
+        plan = min([plan, *plans], key=lambda each: inputs.typical_bound(each.information))
     return inputs, plan
 
 

@@ -72,6 +72,7 @@ def designed(
         rng,
         progress,
         neighbours=NEIGHBOURS * block.candidates,
+        configured=case.phases,
     )
     history = inputs.averaged(case.phases)
     before = inputs.bounds(inputs.information(history, case.sampling.over(history.end_s)))

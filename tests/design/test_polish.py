@@ -1,0 +1,103 @@
+"""The end of a search: what can be set, at the very limits, and no worse than where it began."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from biogrip.design.climb import climb
+from biogrip.design.polish import best_of, polish
+from biogrip.design.rating import Rater, Torque
+from biogrip.design.schedule import presses, sampled
+from biogrip.design.search import best_torques
+from biogrip.design.set_values import set_values, torque_of
+from biogrip.design.within_reach import plan_within_reach
+from biogrip.experiment.protocol import Load, Phase, hold
+from biogrip.identify.answer import silent
+from tests.design.test_climb import SECOND
+
+# Where the jaws leave drop 2 as soon as the second torque is lower by a few parts in a thousand.
+STEPS = (hold(20.0, 8e-9), hold(0.02, 4e-9), hold(379.98, 7e-9))
+
+
+@cache
+def _found() -> Torque:
+    return best_torques(SECOND, 128, np.random.default_rng(1), silent)[0]
+
+
+def _bound(torque: Torque) -> float:
+    waveform = torque.waveform
+    return Rater(SECOND, margin=0.0).rate(waveform, gap=5e-4, most=100).logarithm
+
+
+def test_it_is_better_can_be_set_and_is_the_same_again() -> None:
+    polished = polish(SECOND, _found(), 150, np.random.default_rng(2))
+    assert _bound(polished) < _bound(_found()) - 0.01
+    phases = set_values(SECOND, polished)
+    assert presses(SECOND, phases)
+    again = torque_of(SECOND, phases)
+    assert again is not None
+    assert set_values(SECOND, again) == phases
+    assert _bound(again) == pytest.approx(_bound(polished), abs=1e-6)
+    other = polish(SECOND, _found(), 150, np.random.default_rng(2))
+    np.testing.assert_array_equal(other.waveform.levels, polished.waveform.levels)
+
+
+def test_of_no_neighbours_it_is_what_can_be_set() -> None:
+    same = polish(SECOND, _found(), 0, np.random.default_rng(2))
+    assert set_values(SECOND, same) == set_values(SECOND, _found())
+
+
+def test_contact_is_kept_without_a_margin() -> None:
+    """The best of torques is one with which a search with its margin would lose contact."""
+    at_limit = None
+    for level in np.linspace(4e-9, 1e-9, 301):
+        phases = (STEPS[0], replace(hold(0.02, float(f"{level:.3e}"))), STEPS[2])
+        if not presses(SECOND, phases):
+            break
+        at_limit = torque_of(SECOND, phases)
+    assert at_limit is not None
+    assert best_of(SECOND, [at_limit], 1) == [at_limit]
+    lost = torque_of(SECOND, phases)
+    assert lost is not None
+    assert best_of(SECOND, [lost], 1) == []
+
+
+def test_the_best_come_first() -> None:
+    torques = best_torques(SECOND, 128, np.random.default_rng(1), silent)[:6]
+    best = best_of(SECOND, torques[::-1], 3)
+    bounds = [_bound(each) for each in best]
+    assert len(best) == 3
+    assert bounds == sorted(bounds)
+
+
+def test_a_configured_train_is_where_a_design_goes_on() -> None:
+    """Of a search that is too short to find anything as good."""
+    (best,) = best_of(SECOND, climb(SECOND, [_found()], 600, np.random.default_rng(2), silent), 1)
+    phases = set_values(SECOND, best)
+    _, plan = plan_within_reach(
+        SECOND, 128, np.random.default_rng(3), silent, neighbours=60, configured=phases
+    )
+    _, without = plan_within_reach(SECOND, 128, np.random.default_rng(3), silent, neighbours=60)
+    bound = SECOND.typical_bound(plan.information)
+    assert bound <= SECOND.typical_bound(sampled(SECOND, phases).information)
+    assert bound < 0.98 * SECOND.typical_bound(without.information)
+
+
+@pytest.mark.parametrize(
+    "phases",
+    [
+        (),
+        (hold(400.0, 0.0),),
+        (hold(399.0, 8e-9),),
+        (hold(399.995, 8e-9), hold(0.005, 1e-9)),
+        (hold(200.0, 8.1e-9), hold(200.0, 1e-9)),
+        (hold(200.0, 8e-9), hold(200.0, 1e-9, 2e-9)),
+        (Phase(200.0, Load(1e-9, 1e-11), Load(1e-9, 1e-11)), hold(200.0, 8e-9)),
+        tuple(hold(40.0, 1e-9 * (1 + k % 2)) for k in range(10)),
+    ],
+    ids=["none", "zero", "short", "off-grid", "large", "unlike", "ramp", "many"],
+)
+def test_what_a_search_could_not_find_is_no_start(phases: tuple[Phase, ...]) -> None:
+    assert torque_of(SECOND, phases) is None
