@@ -21,6 +21,9 @@ from biogrip.experiment.protocol import Phase
 
 # Gap and most fillings of samplings; least decrease of a logarithm.
 _GAP, _FILLINGS, _BETTER = 2e-4, 100, 1e-6
+# Fillings after which a neighbour is given up whose logarithm is larger by more; and fillings of
+# those that are left.
+_FEW, _NEAR, _MORE = 8, 3e-4, 30
 
 
 def best_of(inputs: DesignInputs, torques: Sequence[Torque], most: int) -> list[Torque]:
@@ -59,7 +62,7 @@ def polish(inputs: DesignInputs, torque: Torque, tried: int, rng: np.random.Gene
         if other is None:
             break
         waveform = other.train.waveform(limits)
-        beside = partial(_rate, rater, beside=(rated, other.origins))
+        beside = partial(_rate_beside, rater, rated, other.origins)
         if not _is_better(beside(waveform), rated):
             continue
         settled, phases = _settled(inputs, rater.torque(waveform))
@@ -76,20 +79,19 @@ def _settled(inputs: DesignInputs, torque: Torque) -> tuple[Train, tuple[Phase, 
     return train_of(hold(*held.T), inputs.limits), phases
 
 
-def _rate(rater: Rater, waveform: Waveform, beside: tuple[Rated, IntArray] | None = None) -> Rated:
-    """Rate a train, from the sampling of one it was made from unless that cannot be beaten."""
-    if beside is None:
-        return rater.rate(waveform, gap=_GAP, most=_FILLINGS)
-    rated, origins = beside
-    return rater.rate(
-        waveform,
-        gap=_GAP,
-        most=_FILLINGS,
-        start=partial(rated.carried, origins),
-        to_beat=float(np.exp(rated.logarithm)),
-    )
+def _rate(rater: Rater, waveform: Waveform) -> Rated:
+    return rater.rate(waveform, gap=_GAP, most=_FILLINGS)
+
+
+def _rate_beside(rater: Rater, rated: Rated, origins: IntArray, waveform: Waveform) -> Rated:
+    """Rate a train, from the sampling of one it was made from; roughly if it is hardly better."""
+    rate = partial(rater.rate, waveform, gap=_GAP, to_beat=float(np.exp(rated.logarithm)))
+    found = rate(most=_FEW, start=partial(rated.carried, origins))
+    if found.best is None or found.best.gap <= _GAP or found.logarithm > rated.logarithm + _NEAR:
+        return found
+    mixture = found.best.mixture
+    return rate(most=_MORE, start=lambda _: mixture)
 
 
 def _is_better(found: Rated, rated: Rated) -> bool:
-    sure = found.best is not None and found.best.gap <= _GAP
-    return sure and found.logarithm < rated.logarithm - _BETTER
+    return found.logarithm < rated.logarithm - _BETTER
