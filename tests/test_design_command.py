@@ -465,7 +465,16 @@ def _take_one_torque(monkeypatch: pytest.MonkeyPatch) -> None:
         (ASKED, ["--after", "no.csv"], "no.csv"),
         ("seeds: 2\n", [], "no case has a block `design`"),
         (ASKED, ["--case", "liquid_drop_3"], "found no case 'liquid_drop_3'"),
-        (ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""), [], "found neither, allowed is one of"),
+        (
+            ASKED.replace("largest_torque_Nm: 8.0e-9, ", ""),
+            [],
+            "found none, allowed is one of largest_torque_Nm and largest_voltage_V.",
+        ),
+        (
+            ASKED.replace("candidates: 128", "largest_voltage_V: 20.0"),
+            [],
+            "found largest_torque_Nm and largest_voltage_V, allowed is one of",
+        ),
         (
             ASKED.replace("candidates: 128", "quantities: [k, q]"),
             [],

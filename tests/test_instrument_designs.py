@@ -267,9 +267,9 @@ def test_after_a_trace_the_next_experiment_tells_more(found: Found, tmp_path: Pa
     ("design", "said"),
     [
         ({"noise_strain": None, "noise_rad": 1e-3}, "noise_rad: is not of stress that is held and"),
-        ({"noise_strain": None}, "allowed is one of noise_rad, or with another instrument of"),
+        ({"noise_strain": None}, "found none, allowed is noise_strain."),
         ({"largest_stress_Pa": None, "largest_torque_Nm": 1e-9}, "allowed is largest_stress_Pa"),
-        ({"largest_strain": 1.0}, "found largest_stress_Pa and largest_strain"),
+        ({"largest_strain": 1.0}, "largest_strain: is not of stress that is held and strain"),
         (
             {"sequence": {"cells": 2, "experiments": 2}, "ranges": {"k": [200.0, 400.0]}},
             "sequence: is of the gripper; leave it out with creep",

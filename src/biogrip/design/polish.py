@@ -32,7 +32,7 @@ def best_of(inputs: DesignInputs, torques: Sequence[Torque], most: int) -> list[
     rated = [
         (_rate(rater, train.waveform(inputs.limits)).logarithm, torque)
         for torque in torques
-        for train, phases in [_settled(inputs, torque)]
+        for train, phases in [_rounded(inputs, torque)]
         if presses(inputs, phases)
     ]
     rated.sort(key=lambda each: each[0])
@@ -55,7 +55,7 @@ def polish(inputs: DesignInputs, torque: Torque, tried: int, rng: np.random.Gene
     """
     limits = inputs.limits
     rater = Rater(inputs, margin=0.0)
-    train, _ = _settled(inputs, torque)
+    train, _ = _rounded(inputs, torque)
     rated = _rate(rater, train.waveform(limits))
     for _ in range(tried):
         other = drawn_neighbour(train, limits, rng)
@@ -65,18 +65,18 @@ def polish(inputs: DesignInputs, torque: Torque, tried: int, rng: np.random.Gene
         beside = partial(_rate_beside, rater, rated, other.origins)
         if not _is_better(beside(waveform), rated):
             continue
-        settled, phases = _settled(inputs, rater.torque(waveform))
-        found = beside(settled.waveform(limits))
+        rounded, phases = _rounded(inputs, rater.torque(waveform))
+        found = beside(rounded.waveform(limits))
         if _is_better(found, rated) and presses(inputs, phases):
-            train, rated = settled, found
+            train, rated = rounded, found
     return rater.torque(train.waveform(limits))
 
 
-def _settled(inputs: DesignInputs, torque: Torque) -> tuple[Train, tuple[Phase, ...]]:
-    """Return a train that can be set."""
+def _rounded(inputs: DesignInputs, torque: Torque) -> tuple[Train, tuple[Phase, ...]]:
+    """Return a train rounded to what can be set, and its phases."""
     phases = set_values(inputs, torque)
-    held = np.array([(phase.duration_s, phase.left.value_Nm) for phase in phases])
-    return train_of(hold(*held.T), inputs.limits), phases
+    steps = np.array([(phase.duration_s, phase.left.value_Nm) for phase in phases])
+    return train_of(hold(*steps.T), inputs.limits), phases
 
 
 def _rate(rater: Rater, waveform: Waveform) -> Rated:

@@ -126,29 +126,27 @@ class DesignSettings(Block):
         return value
 
     def instrument_problems(self, instrument: Instrument) -> Iterator[Problem]:
-        """Find keys in another unit than the instrument's."""
+        """Find keys in another unit than the instrument's, and a limit or noise not given once."""
         if instrument.relative:
             text = f"found readings of {instrument.read.name}, allowed with a design are those of "
             yield (), f"{text}{'stress' if instrument.deforms else 'strain'}."
             return
         own = [largest_key(instrument), *([_VOLTAGE] if instrument.has_jaws else [])]
         for keys, allowed in ((LARGEST, own), (NOISES, [noise_key(instrument)])):
-            for key in keys:
-                if getattr(self, key) is not None and key not in allowed:
-                    text = f"is not of {instrument.controlled.name} that is held and "
-                    text += f"{instrument.read.name} that is read; allowed is "
-                    yield (key,), f"{text}{' or '.join(allowed)}."
+            given = [key for key in keys if getattr(self, key) is not None]
+            others = [key for key in given if key not in allowed]
+            for key in others:
+                text = f"is not of {instrument.controlled.name} that is held and "
+                text += f"{instrument.read.name} that is read; allowed is "
+                yield (key,), f"{text}{' or '.join(allowed)}."
+            if not others and len(given) != 1:
+                text = f"found {' and '.join(given) or 'none'}, allowed is "
+                yield (), f"{text}{'one of ' * (len(allowed) > 1)}{' and '.join(allowed)}."
         if self.sequence and not instrument.has_jaws:
             yield ("sequence",), f"is of the gripper; leave it out with {instrument.kind}."
 
     def problems(self) -> Iterator[Problem]:
         """Find keys whose values conflict."""
-        for keys, ours in ((NOISES, 1), (LARGEST, 2)):
-            given = [key for key in keys if getattr(self, key) is not None]
-            if len(given) != 1:
-                text = f"found {' and '.join(given) or 'neither'}, allowed is one of "
-                text += f"{' and '.join(keys[:ours])}, or with another instrument of "
-                yield (), f"{text}{', '.join(keys[ours:])}."
         for key in ("sequence", "price"):
             if getattr(self, key) and not self.ranges:
                 text = "found no design.ranges, which cells are drawn from; allowed is one at "
