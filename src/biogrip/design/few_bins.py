@@ -16,7 +16,7 @@ from biogrip.arrays import Array
 from biogrip.design.criteria import whitened
 
 # Share by which the information may change in any direction.
-_AS_GOOD = 1e-3
+_AS_GOOD = 1e-5
 
 
 def in_few_bins(
