@@ -145,7 +145,17 @@ def inverted(information: Array) -> Array:
     """
     correlations, length = _correlations(information)
     size = length[:, :, None] * length[:, None, :]
-    return np.linalg.inv(correlations + _ROUNDING * np.eye(information.shape[1])) / size
+    identity = np.eye(information.shape[1])
+    try:
+        inverse = np.linalg.inv(correlations + _ROUNDING * identity)
+        diagonal = np.diagonal(inverse, axis1=1, axis2=2)
+        if diagonal.min() > 0 and diagonal.max() < 2 / _ROUNDING:
+            return inverse / size
+    except np.linalg.LinAlgError:
+        pass
+    # Rounding has made an eigenvalue about as negative as it was lifted, or more.
+    lift = _ROUNDING - np.minimum(_least_eigenvalues(correlations), 0)
+    return np.linalg.inv(correlations + lift[:, None, None] * identity) / size
 
 
 def whitened(information: Array, sensitivity: Array) -> Array:
@@ -154,10 +164,15 @@ def whitened(information: Array, sensitivity: Array) -> Array:
     In directions whose information is only rounding errors, they become tiny.
     """
     correlations, length = _correlations(information)
-    singular = np.linalg.eigvalsh(correlations)[:, 0] < _ROUNDING
-    lifted = np.where(singular, _ROUNDING, 0.0)[:, None, None] * np.eye(information.shape[1])
-    root = np.linalg.cholesky(correlations + lifted)
+    least = _least_eigenvalues(correlations)
+    lift = np.where(least < _ROUNDING, _ROUNDING - np.minimum(least, 0), 0)
+    identity = np.eye(information.shape[1])
+    root = np.linalg.cholesky(correlations + lift[:, None, None] * identity)
     return np.linalg.solve(root, sensitivity / length[:, :, None])
+
+
+def _least_eigenvalues(correlations: Array) -> Array:
+    return _eigenvalues(correlations)[:, 0]
 
 
 def _correlations(information: Array) -> tuple[Array, Array]:
