@@ -12,6 +12,7 @@ import pytest
 from biogrip.cli import main
 from biogrip.design import several, within_reach
 from biogrip.design.experiment import compute_information, relative_bounds
+from biogrip.own_design import at_a_price
 from biogrip.study.design_inputs import make_design_inputs, plausible
 from biogrip.study.load import load_study, read_configs
 from tests.helpers.places import CONFIG
@@ -44,6 +45,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         patch.setattr(within_reach, "climb", lambda inputs, torques, *_: list(torques))
         patch.setattr(several, "_DURATIONS", (1.0, 0.5))
         patch.setattr(several, "_READINGS", (1.0, 0.25))
+        patch.setattr(at_a_price, "_TRIED", 1)
         assert design(place) == 0
     return place, said.getvalue()
 
@@ -59,7 +61,7 @@ def test_the_chosen_experiments_tell_and_cost_what_is_said(finished: tuple[Path,
         files = [CONFIG, place / "asked.yaml", place / f"out_{number}.yaml"]
         case = load_study(read_configs(files), files).cases["endothelial_cell"]
         block = case.design
-        cells = plausible(case, replace(block, plausible_samples=8))
+        cells = plausible(case, replace(block, plausible_samples=40))[8:]
         inputs = replace(make_design_inputs(case), parameters=cells)
         torque = case.problem.torque
         time_s = case.sampling.over(torque.end_s)
@@ -67,7 +69,8 @@ def test_the_chosen_experiments_tell_and_cost_what_is_said(finished: tuple[Path,
         cost += often * (torque.end_s + 0.01 * len(time_s) + 2 * len(case.phases) + 5)
     assert cost == pytest.approx(float(chosen[1]), rel=1e-3)
     known = np.all(1.959964 * relative_bounds(total) <= np.log(1.12), axis=1)
-    assert known.sum() >= 6
+    # Of cells that they were not chosen for.
+    assert known.mean() >= 0.7
     assert not (place / f"out_{len(times) + 1}.yaml").exists()
 
 

@@ -32,7 +32,9 @@ def test_the_chosen_set_costs_what_is_said_and_tells_enough() -> None:
     assert share >= 95
     at_once = table[(table["way"] == "designed at once") & (table["share_percent"] >= 95)]
     assert cost == at_once["cost"].min()
+    # Of cells that are neither those that it was chosen for nor those that it was judged by.
     simulated = chosen["simulated_percent"].iloc[0]
+    assert chosen["simulated"].iloc[0] == CELLS
     assert abs(simulated - share) < 300 * np.sqrt(0.05 * 0.95 / CELLS)
 
 

@@ -50,6 +50,14 @@ def test_of_no_neighbours_it_is_what_can_be_set() -> None:
     assert set_values(SECOND, same) == set_values(SECOND, _found())
 
 
+def test_successive_steps_of_one_level_become_one() -> None:
+    first, *rest = KNOWN
+    apart = torque_of(SECOND, (hold(9.48, 8e-9), hold(70.0, 8e-9), *rest))
+    assert apart is not None
+    joined = polish(SECOND, apart, 0, np.random.default_rng(2))
+    assert set_values(SECOND, joined) == (first, *rest)
+
+
 def test_contact_is_kept_without_a_margin() -> None:
     """At the limit of contact, by bisection, a search with a margin would lose a train."""
     held, lost = 4000, 1000

@@ -38,7 +38,7 @@ FIGURE = FOLDER / "figures" / "price.png"
 TABLE = FOLDER / "tables" / "price.csv"
 SEQUENTIAL = ROOT / "results" / "published" / "sequential" / "tables" / "sequential.csv"
 ASKED = [CONFIG, ROOT / "config" / "sequential.yaml"]
-CELL, CELLS = "endothelial_cell", 100
+CELL, CELLS = "endothelial_cell", 500
 DESIGNED_AFTER = "each designed after those before"
 
 

@@ -22,7 +22,7 @@ from biogrip.experiment.sampling import Burst, Sampling
 from biogrip.instrument.gripper import Gripper
 from biogrip.response.jaw_force import jaw_force
 
-_GROWTH, _RINGING, _GAP, _FILLINGS = 1.03, 1.01, 0.001, 300
+_GROWTH, _RINGING, _GAP, _FILLINGS = 1.03, 1.01, 1e-4, 300
 # Shares by which steps are made smaller, until the jaws press at all instants.
 _SMALLER = (0.0, 1e-3, 2e-3, 5e-3, 1e-2)
 # Torques that are sampled finely, of which the best is taken.

@@ -13,7 +13,6 @@ References
    mixed-integer nonlinear programs, Mathematical Programming 36 (1986), 307-339.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -138,10 +137,10 @@ class SetProblem:
         return np.hstack((rows, -np.eye(self.information.shape[1])[cells]))
 
 
-def front(problem: SetProblem, shares: Sequence[float] = ()) -> list[ExperimentSet]:
-    """Return the cheapest sets for each tenth of the cells and more, and for other shares."""
+def front(problem: SetProblem) -> list[ExperimentSet]:
+    """Return the cheapest sets for each tenth of the cells and more."""
     population, found = problem.information.shape[1], list[ExperimentSet]()
-    for level in sorted({*np.arange(_STEP, 1 + _STEP / 2, _STEP).tolist(), *shares}):
+    for level in np.arange(_STEP, 1 + _STEP / 2, _STEP).tolist():
         needed = enough(level, population)
         if found and found[-1].known.sum() >= needed:
             continue

@@ -2,6 +2,9 @@
 
 Experiments to choose from are designed for some durations, numbers of steps and of readings; then
 anew, beside the one of the cheapest set that tells most, for the cells that it tells least of.
+
+The cheapest set for some cells tells enough of fewer other cells: it was chosen for what these
+happen to be. So sets are chosen for some cells, and judged by others.
 """
 
 import os
@@ -41,8 +44,10 @@ class Offer:
     cost: float
     """What it costs."""
     information: Array
-    """Information on the log-parameters of each cell, none where the jaws would not press it
-    throughout, (n_cells, n_parameters, n_parameters)."""
+    """Information on the log-parameters of each cell that sets are chosen for, none where the jaws
+    would not press it throughout, (n_cells, n_parameters, n_parameters)."""
+    of_others: Array
+    """The same of each cell that sets are judged by, (n_others, n_parameters, n_parameters)."""
 
 
 @dataclass(frozen=True)
@@ -66,13 +71,24 @@ class Several:
     offers: list[Offer]
     """Experiments to choose from."""
     at_once: list[ExperimentSet]
-    """The cheapest sets for more and more cells, up to the share asked for and beyond."""
+    """The cheapest sets for more and more cells, up to the share asked for and beyond; known are
+    cells that they were not chosen for."""
     chosen: ExperimentSet | None
-    """The cheapest with which enough cells are known; none if all are too few."""
+    """The cheapest of them with which enough cells are known; none if all are too few."""
     repeated: list[ExperimentSet]
-    """The cheapest sets of one experiment again and again."""
+    """The cheapest sets of one experiment again and again, likewise."""
     one_by_one: list[Round]
     """Experiments one after the other, after each number of them."""
+
+    @property
+    def cells(self) -> int:
+        """Number of cells that sets are chosen for."""
+        return len(self.offers[0].information)
+
+    @property
+    def others(self) -> int:
+        """Number of cells that they are judged by."""
+        return len(self.offers[0].of_others)
 
     def plans_of(self, chosen: ExperimentSet) -> list[Plan]:
         """Return the different experiments of a set."""
@@ -83,6 +99,7 @@ def choose_several(
     inputs: DesignInputs,
     settings: PriceSettings,
     cells: Array,
+    others: Array,
     ends: tuple[Array, Array],
     largest: float,
     tried: int,
@@ -98,7 +115,9 @@ def choose_several(
     settings
         Costs, and what is asked for.
     cells : (n_cells, n_parameters)
-        Parameters of the cells of the population.
+        Parameters of cells of the population, which sets are chosen for.
+    others : (n_others, n_parameters)
+        Parameters of other cells of it, which sets are judged by.
     ends
         Least and largest logarithms of the parameters, (n_parameters,) each.
     largest
@@ -117,21 +136,24 @@ def choose_several(
     """
     population = replace(inputs, parameters=cells)
 
-    def problem_of(offers: list[Offer]) -> SetProblem:
+    def problem_of(offers: list[Offer], information: list[Array]) -> SetProblem:
         return SetProblem(
-            np.stack([each.information for each in offers]),
+            np.stack(information),
             np.array([each.cost for each in offers]),
             inputs.criterion.targets,
             largest,
             settings.experiments,
         )
 
+    def choice(offers: list[Offer]) -> SetProblem:
+        return problem_of(offers, [each.information for each in offers])
+
     grid = list(_grid(inputs))
     searches, between = rng.spawn(2 * len(grid)), rng.spawn(1)[0]
 
     def groups(inputs: DesignInputs, rngs: list[np.random.Generator]) -> list[_Group]:
         return [
-            _Group(replace(inputs, limits=limits), population, settings, tried, one)
+            _Group(replace(inputs, limits=limits), population, others, settings, tried, one)
             for limits, one in zip(grid, rngs, strict=True)
         ]
 
@@ -143,7 +165,7 @@ def choose_several(
             "design.price: found no experiment with which the jaws press; allowed are more torques "
             "to be tried (`candidates`)."
         )
-    problem = problem_of(offers)
+    problem = choice(offers)
     chosen = problem.cheapest(enough(settings.share, len(cells)))
     first = _first(problem, chosen or _most(problem))
     hardest = _hardest(problem, first)[: len(inputs.parameters)]
@@ -156,14 +178,27 @@ def choose_several(
         groups(beside, searches[len(grid) :]),
         lambda done: progress(len(grid) + done, 2 * len(grid)),
     )
-    problem = problem_of(offers)
-    chosen = problem.cheapest(enough(settings.share, len(cells)))
+    problem, judged = choice(offers), problem_of(offers, [each.of_others for each in offers])
+    sets = [judged.made(one.counts) for one in _sets(problem, judged, settings.share)]
+    alone = repeated(judged)
+    # One repeated is a set, too.
+    at_once = nothing_beats([*sets, *alone])
+    chosen = next((one for one in at_once if one.share >= settings.share), None)
     first = _first(problem, chosen or _most(problem))
     rounds = _one_by_one(problem, population, offers, first, ends, between)
-    alone = repeated(problem)
-    # One repeated is a set too, with shares between those of the front.
-    at_once = nothing_beats([*front(problem, [settings.share]), *alone])
     return Several(settings, inputs.criterion.targets, offers, at_once, chosen, alone, rounds)
+
+
+def _sets(problem: SetProblem, judged: SetProblem, share: float) -> list[ExperimentSet]:
+    """Return the cheapest sets for more and more cells, until enough of others are known, too."""
+    found = front(problem)
+    needed = enough(share, problem.information.shape[1])
+    while one := problem.cheapest(needed):
+        found.append(one)
+        if judged.made(one.counts).share >= share:
+            break
+        needed = int(one.known.sum()) + 1
+    return found
 
 
 def _grid(inputs: DesignInputs) -> Iterator[Limits]:
@@ -185,6 +220,7 @@ class _Group:
 
     inputs: DesignInputs
     population: DesignInputs
+    others: Array
     settings: PriceSettings
     tried: int
     rng: np.random.Generator
@@ -215,12 +251,16 @@ def _offers(index: int) -> list[Offer]:
     counts = {max(_FEWEST_READINGS, round(share * inputs.samples)) for share in _READINGS}
     fewer = sorted(counts - {inputs.samples}, reverse=True)
     plans = [plan, *(sampled(replace(inputs, samples=count), plan.phases) for count in fewer)]
-    pressed = _pressed(group.population, plan)
+    several = [
+        replace(group.population, parameters=some)
+        for some in (group.population.parameters, group.others)
+    ]
+    pressed = [_pressed(some, plan)[:, None, None] for some in several]
     return [
         Offer(
             each,
             group.settings.cost(each.torque.end_s, len(each.time_s), len(each.phases)),
-            _information(group.population, each) * pressed[:, None, None],
+            *(_information(some, each) * here for some, here in zip(several, pressed, strict=True)),
         )
         for each in plans
     ]

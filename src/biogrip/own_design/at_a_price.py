@@ -18,6 +18,9 @@ WAYS = ("designed at once", "one repeated", "one after the other, mean")
 
 # Shares of cells in print, beside the one asked for.
 _SHARES = (0.5, 0.8, 0.9)
+# Cells that sets are judged by, and torques that are tried of each duration and number of steps,
+# for each that the config asks for.
+_OTHERS, _TRIED = 4, 5
 
 
 def several_of(case: Case, study_seed: int, progress: Callable[[int, int], None]) -> Several | None:
@@ -37,14 +40,16 @@ def several_of(case: Case, study_seed: int, progress: Callable[[int, int], None]
     assert block is not None
     if block.price is None:
         return None
-    population = replace(block, plausible_samples=block.price.cells)
+    count = block.price.cells
+    population = plausible(case, replace(block, plausible_samples=(1 + _OTHERS) * count))
     return choose_several(
         make_design_inputs(case),
         block.price,
-        plausible(case, population),
+        population[:count],
+        population[count:],
         plausible_ends(case),
         float(np.log1p(block.price.within) / ndtri(0.5 + case.confidence / 2)),
-        block.candidates,
+        _TRIED * block.candidates,
         stream(study_seed, case.name, 0, "price"),
         progress,
     )
@@ -57,8 +62,13 @@ def aim(case: Case, several: Several) -> str:
     listed = f"{', '.join(first)} and {last}" if first else last
     return (
         f"{listed} within {100 * settings.within:g} % ({100 * case.confidence:g} % intervals) in "
-        f"{100 * settings.share:g} % of {settings.cells} cells of the ranges"
+        f"{100 * settings.share:g} % of the cells of the ranges"
     )
+
+
+def judged_in_words(several: Several) -> str:
+    """Return which cells sets are chosen for, and which count."""
+    return f"(chosen for {several.cells}, judged by {several.others} others)"
 
 
 def points(several: Several) -> list[list[tuple[float, float]]]:
@@ -81,7 +91,7 @@ def _least_cost(way: list[tuple[float, float]], share: float) -> float | None:
 
 def in_lines(several: Several, aimed_at: str) -> list[str]:
     """Return a table of costs, and the chosen experiments, as lines of text."""
-    lines = [f"cost of {aimed_at}, and of fewer or more:"]
+    lines = [f"cost of {aimed_at}, and of fewer or more {judged_in_words(several)}:"]
     lines.append("  % of cells | " + " | ".join(WAYS))
     for share, row in costs(several):
         shown = [f"{in_print(cost):>{len(way)}}" for way, cost in zip(WAYS, row, strict=True)]

@@ -21,6 +21,7 @@ from biogrip.own_design.at_a_price import (
     aim,
     costs,
     in_print,
+    judged_in_words,
     price_in_words,
     set_in_words,
 )
@@ -166,6 +167,7 @@ def _several(found: Designed, several: Several) -> dict[str, Any]:
         "price": price_in_words(several.settings),
         "aim": aim(found.case, several),
         "offers": len(several.offers),
+        "judged": judged_in_words(several),
         "ways": WAYS,
         "rows": [(f"{100 * share:g}", *map(in_print, row)) for share, row in costs(several)],
         "chosen": [
