@@ -50,6 +50,16 @@ def test_against_responses(request: pytest.FixtureRequest, arms: str, name: str)
     view = moving.respond(np.arange(4))
     own = moving.respond(np.array([2]), elapsed[::3])
     np.testing.assert_allclose(own.force[:, 0], view.force[:, 2, ::3], rtol=1e-12)
+    # Steps at times of their own.
+    scales = np.array([[1.0], [0.5], [2.0]])
+    each = moving.respond(np.array([1, 2, 3]), scales * elapsed)
+    for k, scale in enumerate(scales):
+        alone = moving.respond(np.array([k + 1]), scale * elapsed)
+        np.testing.assert_allclose(each.force[:, k], alone.force[:, 0], rtol=1e-9)
+        largest = np.abs(alone.sensitivity).max()
+        np.testing.assert_allclose(
+            each.sensitivity[:, :, k], alone.sensitivity[:, :, 0], atol=1e-12 * largest
+        )
     torque = torque_history(phases_of(waveform))
     for k, start in enumerate(torque.time_s):
         times = start + elapsed

@@ -11,6 +11,8 @@ from biogrip.design.waveform import Waveform
 
 # Under sinusoids: parts of a period, and growth of the number of periods of a cell.
 _PARTS, _PERIODS = 12, 2.0
+# Cells at the end of a step, each half as long as the one before: readings are often best there.
+_ENDS = 6
 # Largest excess of a sinusoid over its value in the middle of the nearest part, per amplitude.
 _BETWEEN = 1 - np.cos(np.pi / _PARTS)
 
@@ -109,15 +111,39 @@ def _compute_responses(
     turned = float(np.max(np.abs(view.rotation), where=covered, initial=0.0))
     largest = np.max(view.force, axis=(1, 2), where=covered, initial=0.0)
     lowest = np.min(view.force, axis=2, where=covered, initial=np.inf)
+    of_each = (len(steps), len(after_s))
+    after_s, sensitivity = np.broadcast_to(after_s, of_each), view.sensitivity
     if swings:
         turned += _BETWEEN * float(np.ptp(view.rotation, axis=2).max()) / 2
         lowest -= _BETWEEN * np.ptp(view.force, axis=2) / 2
-    capacity = (np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered).astype(float)
-    rows, places = np.nonzero(capacity)
-    room = capacity.ravel()
-    sensitivity = view.sensitivity.reshape(*view.sensitivity.shape[:2], -1)
-    there = room > 0
-    found = sensitivity[..., there], room[there]
-    longest = np.maximum(time_bins.stride * time_bins.repeats, time_bins.slots) / fastest_Hz
-    at = (steps[rows], places), after_s[places], longest[places]
+        capacity = np.clip(slots - time_bins.first, 0, time_bins.capacity) * covered
+        longest = np.maximum(time_bins.stride * time_bins.repeats, time_bins.slots)
+        longest = np.broadcast_to(longest, of_each)
+    else:
+        whole = time_bins.first + time_bins.slots <= slots
+        first, lasting = _ends(time_bins, whole.sum(axis=1), slots)
+        ends_s = np.sqrt(first * (first + lasting - 1.0)) / fastest_Hz
+        sensitivity = np.append(sensitivity, moving.respond(steps, ends_s).sensitivity, axis=3)
+        after_s = np.append(after_s, ends_s, axis=1)
+        longest = capacity = np.append(time_bins.slots * whole, lasting, axis=1)
+    there = capacity > 0
+    rows, places = np.nonzero(there)
+    found = sensitivity[..., there], capacity[there].astype(float)
+    at = (steps[rows], places), after_s[there], longest[there] / fastest_Hz
     return _Part(steps, *at, *found, turned, largest, lowest)
+
+
+def _ends(time_bins: TimeBins, whole: IntArray, slots: IntArray) -> tuple[IntArray, IntArray]:
+    """Divide what is left of steps after their whole cells, halving it again and again.
+
+    Of steps with numbers of whole cells, (n_steps,), and of slots, (n_steps, 1).
+
+    Returns
+    -------
+    first, lasting : (n_steps, _ENDS)
+        First slot of each cell, and number of slots, which may be zero.
+    """
+    finishes = time_bins.first + time_bins.slots
+    begins = np.append(time_bins.first[:1], finishes)[whole, None]
+    left = (slots - begins) // 2 ** np.arange(_ENDS)
+    return slots - left, left - np.append(left[:, 1:], np.zeros_like(begins), axis=1)

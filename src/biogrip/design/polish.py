@@ -12,11 +12,11 @@ import numpy as np
 
 from biogrip.arrays import IntArray
 from biogrip.design.experiment import DesignInputs
-from biogrip.design.neighbours import Train, drawn_neighbour, train_of, without
+from biogrip.design.neighbours import Train, drawn_neighbour, train_of
 from biogrip.design.rating import LOST, Rated, Rater, Torque
 from biogrip.design.schedule import presses
 from biogrip.design.set_values import set_values
-from biogrip.design.waveform import Waveform, hold
+from biogrip.design.waveform import Waveform, hold, tidied
 from biogrip.experiment.protocol import Phase
 
 # Gap and most fillings of samplings; least decrease of a logarithm.
@@ -69,15 +69,7 @@ def polish(inputs: DesignInputs, torque: Torque, tried: int, rng: np.random.Gene
         found = beside(rounded.waveform(limits))
         if _is_better(found, rated) and presses(inputs, phases):
             train, rated = rounded, found
-    return rater.torque(_joined(train).waveform(limits))
-
-
-def _joined(train: Train) -> Train:
-    """Make one step of successive ones of the same level."""
-    for step in range(len(train.levels) - 1, 0, -1):
-        if train.levels[step] == train.levels[step - 1]:
-            train = without(train, step, step - 1).train
-    return train
+    return rater.torque(tidied(train.waveform(limits)))
 
 
 def _rounded(inputs: DesignInputs, torque: Torque) -> tuple[Train, tuple[Phase, ...]]:

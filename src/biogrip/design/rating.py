@@ -17,7 +17,7 @@ from biogrip.design.waveform import Waveform
 
 # Growth of cells, gap and fillings of samplings during the search; the final torque is sampled
 # more finely.
-_GROWTH, _GAP, _FILLINGS = 1.35, 0.03, 8
+_GROWTH, _GAP, _FILLINGS = 1.2, 0.03, 8
 # Least force between the jaws relative to the largest.
 _MARGIN = 2e-3
 # Decimals of a logarithm, so that the last bits of a processor decide nothing.

@@ -195,16 +195,17 @@ class Moving:
     def respond(self, steps: IntArray, elapsed_s: Array | None = None) -> View:
         """Compute the responses after steps of some indices, at times since each.
 
-        By default the times are those of all views.
+        The times are of all these steps, (n_times,), or of each, (n_steps, n_times). By default
+        they are those of all views.
         """
         views = self._views
         functions, averaged = views.functions, views.averaged
         if elapsed_s is None:
             elapsed_s = views.elapsed_s
         else:
-            functions = averaged = views.functions_at(elapsed_s)
+            functions = averaged = views.functions_at(elapsed_s.ravel())
             if views.exposure_s:
-                averaged = views.averaged_at(elapsed_s)
+                averaged = views.averaged_at(elapsed_s.ravel())
         growth, slope, pushed = (
             _Factors(*(part[steps].swapaxes(0, 1)[:, None] for part in vars(factors).values()))
             for factors in (self._growth, self._slope, self._pushed)
@@ -222,11 +223,15 @@ class Moving:
         # (n, rows, n_seen, 3 m): of e^(r e) - 1, e^(r e) and e e^(r e).
         mixing = np.concatenate([rows(name) for name in ("growing", "decaying", "lasting")], axis=3)
         parts = np.concatenate((mixing.real, mixing.imag), axis=-1)
-        count = len(steps)
-        read, now = (
-            (part.reshape(n, -1, 6 * m) @ by).reshape(n, -1, count, len(elapsed_s))
-            for part, by in ((parts[:, :p], averaged), (parts[:, p:], functions))
-        )
+        count, times = len(steps), elapsed_s.shape[-1]
+
+        def mixed(part: Array, by: Array) -> Array:
+            if elapsed_s.ndim == 1:
+                return (part.reshape(n, -1, 6 * m) @ by).reshape(n, -1, count, times)
+            of_each = by.reshape(n, 6 * m, count, times).swapaxes(1, 2)
+            return (part.swapaxes(1, 2) @ of_each).swapaxes(1, 2)
+
+        read, now = mixed(parts[:, :p], averaged), mixed(parts[:, p:], functions)
 
         def add(name: str, mean: Array, function: Array) -> None:
             scale = rows(name).sum(axis=-1).real[..., None]
