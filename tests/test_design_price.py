@@ -46,7 +46,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
         patch.setattr(several, "_DURATIONS", (1.0, 0.5))
         patch.setattr(several, "_READINGS", (1.0, 0.25))
         patch.setattr(at_a_price, "_TRIED", 1)
-        assert design(place) == 0
+        assert design(place, "--export", str(place / "bench")) == 0
     return place, said.getvalue()
 
 
@@ -67,11 +67,18 @@ def test_the_chosen_experiments_tell_and_cost_what_is_said(finished: tuple[Path,
         time_s = case.sampling.over(torque.end_s)
         total = total + often * compute_information(inputs.sensitivities(torque, time_s))
         cost += often * (torque.end_s + 0.01 * len(time_s) + 2 * len(case.phases) + 5)
+        assert f"endothelial_cell: # {often} × with each cell" in files[-1].read_text()
+        readings = (place / "bench" / f"endothelial_cell_{number}_readings.csv").read_text()
+        np.testing.assert_allclose(np.array(readings.splitlines()[2:], dtype=float), time_s)
+        protocol = (place / "bench" / f"endothelial_cell_{number}_protocol.csv").read_text()
+        last_s = float(protocol.splitlines()[-1].split(",")[0])
+        assert last_s == pytest.approx(torque.end_s)
     assert cost == pytest.approx(float(chosen[1]), rel=1e-3)
     known = np.all(1.959964 * relative_bounds(total) <= np.log(1.12), axis=1)
     # Of cells that they were not chosen for.
     assert known.mean() >= 0.7
     assert not (place / f"out_{len(times) + 1}.yaml").exists()
+    assert len(list((place / "bench").iterdir())) == 2 * (1 + len(times))
 
 
 def test_the_page_shows_the_front_and_the_chosen_experiments(finished: tuple[Path, str]) -> None:
@@ -92,6 +99,54 @@ def test_the_page_shows_the_front_and_the_chosen_experiments(finished: tuple[Pat
     # One of them again and again is a set, too.
     for once, again in re.findall(r"^ +\d+ \| +(\S+) \| +(\S+) \|", said, re.MULTILINE):
         assert again == "none" or float(once) <= float(again)
+
+
+SLOW = """
+design:
+  {noise_rad: 3.07e-6, readings: 300, fastest_Hz: 20.0, longest_s: 40.0,
+   largest_torque_Nm: 1.6e-9, most_steps: 4, candidates: 128, plausible_samples: 2,
+   ranges: {k: [30.0, 40.0], c: [150.0, 300.0], c_p: [0.5e-3, 1.0e-3]}, price: PRICE}
+only: [endothelial_cell]
+"""
+CREEP = """
+only: [cell]
+cases:
+  cell:
+    instrument: creep
+    sample: {model: zener_maxwell, k: 300.0, k_p: 200.0, c: 900.0}
+    protocol: {phases: [{duration_s: 30.0, stress_Pa: 40.0}]}
+    design:
+      {largest_stress_Pa: 40.0, noise_strain: 2.0e-4, readings: 60, fastest_Hz: 20.0,
+       longest_s: 40.0, most_steps: 4, candidates: 128, plausible_samples: 2,
+       ranges: {k: [200.0, 400.0]}, price: PRICE}
+"""
+
+
+@pytest.mark.parametrize(
+    ("asked", "named"),
+    [(SLOW, "k, k_p and c within"), (CREEP, "k, k_p and c within")],
+    ids=["c_p out of reach", "creep"],
+)
+def test_what_is_asked_of_a_set_is_what_can_be_told(
+    asked: str,
+    named: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(within_reach, "climb", lambda inputs, torques, *_: list(torques))
+    monkeypatch.setattr(several, "_DURATIONS", (1.0,))
+    monkeypatch.setattr(at_a_price, "_TRIED", 1)
+    # Of an earlier, larger set.
+    (tmp_path / "out_3.yaml").write_text("# written_by_biogrip")
+    (tmp_path / "asked.yaml").write_text(asked.replace("PRICE", PRICE.strip()))
+    files = [str(tmp_path / name) for name in ("asked.yaml", "out.yaml")]
+    assert main(["design", files[0], "--output", files[1]]) == 0
+    said = capsys.readouterr().out
+    assert named in said
+    assert "cheapest, for " in said
+    assert (tmp_path / "out_1.yaml").is_file()
+    assert f"Of an earlier set: {tmp_path / 'out_3.yaml'}." in said
 
 
 @pytest.mark.parametrize(

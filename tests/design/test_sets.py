@@ -66,14 +66,42 @@ def test_what_is_known_already_takes_no_experiment() -> None:
     assert (found.cost, found.share) == (0.0, 1.0)
 
 
-def test_the_front_goes_up_by_tenths() -> None:
-    problem = problem_of(1)
-    found = front(problem)
-    assert [one.cost for one in found] == sorted(one.cost for one in found)
-    shares = [one.share for one in found]
-    assert np.all(np.diff(shares) > 0)
-    best = max(known_by_inverse(problem, counts) for counts in every_set())
-    assert shares[-1] == best / CELLS
+def others_of(seed: int, cells: int = 200) -> tuple[SetProblem, SetProblem]:
+    """Return experiments with few cells, and the same with many others like them."""
+    rng = np.random.default_rng(seed)
+    shape = EXPERIMENTS, CELLS + cells, PARAMETERS, 2
+    slopes = rng.standard_normal((*shape[:1], 1, *shape[2:])) + 0.7 * rng.standard_normal(shape)
+    information = slopes @ slopes.swapaxes(2, 3)
+    costs = rng.integers(2, 12, EXPERIMENTS).astype(float)
+    both = (information[:, :CELLS], information[:, CELLS:])
+    problem, judged = (SetProblem(each, costs, (0, 1, 2), 0.9, 8) for each in both)
+    return problem, judged
+
+
+def test_sets_are_enough_for_cells_that_they_were_not_chosen_for() -> None:
+    """The cheapest for the cells alone are not, of most problems."""
+    short = 0
+    for seed in range(4):
+        problem, judged = others_of(seed)
+        for share in (0.5, 0.8, 0.95):
+            alone = problem.cheapest(enough(share, CELLS))
+            assert alone is not None
+            short += judged.made(alone.counts).share < share
+            found = front(problem, judged, [share])
+            assert found[0].cost == alone.cost
+            assert [one.share >= share for one in found[:-1]] == [False] * (len(found) - 1)
+            assert found[-1].share >= share
+            assert len(found[-1].known) == 200
+    assert short > 6
+
+
+def test_where_no_set_is_enough_all_that_were_tried_are_there() -> None:
+    problem, judged = others_of(0)
+    hardly = replace(judged, information=judged.information * 1e-3)
+    found = front(problem, hardly, [0.5])
+    assert found
+    assert max(one.share for one in found) < 0.5
+    assert front(replace(problem, largest=1e-3), judged, [0.5]) == []
 
 
 def test_repeating_one_is_beaten_by_no_other_repetition() -> None:

@@ -27,7 +27,7 @@ from biogrip.own_design.drawings import draw_price
 from biogrip.products.designed_cases import WELL
 from biogrip.products.figures.style import save_png, styled
 from biogrip.response.simulation import simulated_rotation
-from biogrip.study.design_inputs import plausible_ends
+from biogrip.study.design_inputs import make_design_inputs, plausible_ends
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Case, Study
 from tests.helpers.groups_campaign import write
@@ -141,7 +141,8 @@ def designed_after() -> pd.DataFrame:
 def main() -> None:
     """Write the table and the figure, and print the table."""
     case = _case()
-    several = several_of(case, _study().study_seed, lambda *_: None)
+    inputs = make_design_inputs(case)
+    several = several_of(case, inputs, _study().study_seed, lambda *_: None)
     assert several is not None
     assert several.chosen is not None
     plans = several.plans_of(several.chosen)

@@ -28,16 +28,35 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.criteria import Criterion, inverted
 
-# Iterations that improve a mixture before a filling is added.
-_MIXED = 15
-# Power p of the p-norm that replaces a maximum: at first, its growth per round, in the end.
-_BLUNT, _SHARPER, _SHARP = 10.0, 1.5, 1000.0
-# Where a search goes on from a sampling that was nearly as good.
-_KNOWN = 100.0
+# Power p of the p-norm that replaces a maximum, at first; and where a search goes on from a
+# sampling that was nearly as good.
+_BLUNT, _KNOWN = 10.0, 100.0
+# Powers that are tried for the least bound.
+_POWERS = 13
 # A filling with less than this share of a mixture is dropped.
 _DROPPED = 1e-9
 # Fillings of which a search goes on: those with the largest shares, above the least.
 _LEFT, _LEAST = 12, 1e-4
+
+
+@dataclass(frozen=True)
+class Mixing:
+    """How far a mixture of fillings is improved before the next filling is added."""
+
+    tries: int
+    """Most steps."""
+    settled: float
+    """Decrease of the criterion's logarithm in a step, with less than which it is the last."""
+    sharper: float
+    """Growth, with every filling, of the power p of the p-norm that replaces a maximum."""
+    sharpest: float
+    """Largest power: a logarithm is off by up to that of the number of values over it."""
+
+
+ROUGH = Mixing(tries=15, settled=1e-4, sharper=1.5, sharpest=1e3)
+"""For gaps down to a thousandth."""
+FINE = Mixing(tries=100, settled=1e-7, sharper=1.1, sharpest=1e4)
+"""For gaps down to a ten-thousandth."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +111,7 @@ def best_sampling(
     before: Array | float = 0.0,
     start: Mixture | None = None,
     to_beat: float = np.inf,
+    mixing: Mixing = ROUGH,
 ) -> Optimum:
     """Distribute readings over cells such that a criterion is minimal.
 
@@ -115,16 +135,17 @@ def best_sampling(
         Mixture of fillings of these cells to go on from; by default readings are even.
     to_beat
         Typical relative bound at which to stop when the best sampling cannot have it.
+    mixing
+        How far a mixture is improved.
     """
     room = min(float(samples), float(capacity.sum()))
     even = Mixture(fill_evenly(capacity, room)[None], np.ones(1))
     mixture = start.within(capacity, room) if start else even
     fillings, shares = list(mixture.fillings), mixture.shares
     known = np.stack([_information(rows, filling) for filling in fillings])
-    blunt = _KNOWN if start else _BLUNT
+    sharpness = _KNOWN if start else _BLUNT
     best: Optimum | None = None
-    for round_ in range(most):
-        sharpness = min(_SHARP, blunt * _SHARPER**round_)
+    for _ in range(most):
         information = np.tensordot(shares, known, 1)
         inverse = inverted(information + before)
         covariances, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
@@ -141,7 +162,8 @@ def best_sampling(
         fillings.append(filling)
         known = np.concatenate((known, _information(rows, filling)[None]))
         shares = np.append(shares * (1 - 1 / len(fillings)), 1 / len(fillings))
-        shares = _mixed(known, before, shares, criterion, sharpness)
+        sharpness = min(mixing.sharpest, sharpness * mixing.sharper)
+        shares = _mixed(known, before, shares, criterion, sharpness, mixing)
         kept = shares > _DROPPED
         fillings = [one for one, keep in zip(fillings, kept, strict=True) if keep]
         known, shares = known[kept], shares[kept] / shares[kept].sum()
@@ -175,16 +197,19 @@ def least_bound(
     """
     every = [(share, each) for share, several in rows.items() for each in several]
     information = _information(every[0][1], samples)
-    covariances, of_samples, sensitivity = compute_covariances(
-        inverted(information + before), criterion, _SHARP
-    )
-    worth = np.concatenate(
-        [of_samples @ np.einsum("npc,npc->nc", sensitivity @ each, each) for _, each in every]
-    )
+    inverse = inverted(information + before)
     room = np.concatenate([share * capacity for share, _ in every])
-    filling = fill(worth, room, min(float(total), float(capacity.sum())))
-    reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
-    missing = gap_of(criterion, covariances, float(worth @ filling) - reached, _SHARP)
+    missing = np.inf
+    # Any power gives a bound.
+    for sharpness in np.geomspace(_KNOWN, FINE.sharpest, _POWERS):
+        covariances, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
+        worth = np.concatenate(
+            [of_samples @ np.einsum("npc,npc->nc", sensitivity @ each, each) for _, each in every]
+        )
+        filling = fill(worth, room, min(float(total), float(capacity.sum())))
+        reached = float(np.einsum("n,npq,npq->", of_samples, sensitivity, information))
+        gain = float(worth @ filling) - reached
+        missing = min(missing, gap_of(criterion, covariances, gain, sharpness))
     return criterion.typical_bound(covariances) / (1 + missing)
 
 
@@ -242,7 +267,12 @@ def gap_of(criterion: Criterion, covariances: Array, gain: float, sharpness: flo
 
 
 def _mixed(
-    known: Array, before: Array | float, shares: Array, criterion: Criterion, sharpness: float
+    known: Array,
+    before: Array | float,
+    shares: Array,
+    criterion: Criterion,
+    sharpness: float,
+    mixing: Mixing,
 ) -> Array:
     """Improve the shares of fillings, given their information, (n_fillings, n, p, p)."""
     flat = known.reshape(len(known), -1)
@@ -256,13 +286,13 @@ def _mixed(
         _, of_samples, sensitivity = compute_covariances(inverse, criterion, sharpness)
         return np.einsum("n,npq,fnpq->f", of_samples, sensitivity, known)
 
-    return improve_shares(shares, criterion, _MIXED, at)
+    return improve_shares(shares, criterion, mixing, at)
 
 
 def improve_shares(
     shares: Array,
     criterion: Criterion,
-    tries: int,
+    mixing: Mixing,
     at: Callable[[Array], tuple[float, Callable[[], Array]]],
 ) -> Array:
     """Improve shares of fillings, by steps that only ever make the criterion smaller.
@@ -273,8 +303,8 @@ def improve_shares(
         Shares to begin with.
     criterion
         Criterion to be minimized.
-    tries
-        Number of steps that are tried.
+    mixing
+        When to stop.
     at
         Function of shares. It returns the criterion, and a function that computes what each filling
         is worth there, (n_fillings,).
@@ -283,7 +313,7 @@ def improve_shares(
     value, worth_there = at(shares)
     # Of singular information, rounding errors may have any sign.
     worth = np.maximum(worth_there(), 0.0)
-    for _ in range(tries):
+    for _ in range(mixing.tries):
         largest = worth.max()
         if not largest > 0:
             break
@@ -291,7 +321,11 @@ def improve_shares(
         tried /= tried.sum()
         new_value, worth_there = at(tried)
         if new_value <= value:
-            shares, value, worth = tried, new_value, np.maximum(worth_there(), 0.0)
+            decrease = value - new_value
+            shares, value = tried, new_value
+            if decrease < mixing.settled:
+                break
+            worth = np.maximum(worth_there(), 0.0)
             power *= 1.2
         else:
             power *= 0.4

@@ -11,7 +11,7 @@ from biogrip.design.exchange import exchanged
 from biogrip.design.experiment import DesignInputs
 from biogrip.design.few_bins import in_few_bins
 from biogrip.design.rating import Torque
-from biogrip.design.sampling import Optimum, best_sampling, least_bound
+from biogrip.design.sampling import FINE, Optimum, best_sampling, least_bound
 from biogrip.design.set_values import set_values
 from biogrip.design.spread_readings import CellNoise, spread_readings, whole_along
 from biogrip.design.time_bins import TimeBins, periodic_time_bins, time_bins, with_fine_end
@@ -191,6 +191,7 @@ def sampled(inputs: DesignInputs, phases: tuple[Phase, ...]) -> Plan:
         gap=_GAP,
         most=_FILLINGS,
         before=inputs.before_along,
+        mixing=FINE,
     )
     plan = _in_bursts(inputs, phases, problem, _in_few(inputs, problem, best.samples))
     if not inputs.noise.has_memory:

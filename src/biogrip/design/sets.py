@@ -7,13 +7,17 @@ is linear in how often each experiment is made. An integer linear program [1]_ w
 has a solution that costs no more than the cheapest set; with the u of each cell that it calls known
 and is not, it is solved again until there is none. What it finds then is the cheapest set.
 
+The cheapest set for a share of some cells is enough for a smaller share of other cells: it was
+chosen for what these happen to be. So sets are chosen for some cells and judged by others.
+
 References
 ----------
 .. [1] M. A. Duran and I. E. Grossmann, An outer-approximation algorithm for a class of
    mixed-integer nonlinear programs, Mathematical Programming 36 (1986), 307-339.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,8 +28,9 @@ from biogrip.design.criteria import inverted
 _TOLERANCE = 1e-5
 # Coefficients below this are nothing to the linear program.
 _NOTHING = 1e-9
-# Steps of the share of cells in which a front is found.
-_STEP = 0.1
+# Share by which variances are to be smaller, again and again, where sets for all cells are too
+# little for the others; and how often.
+_SMALLER, _OFTEN = 0.1, 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,18 +142,45 @@ class SetProblem:
         return np.hstack((rows, -np.eye(self.information.shape[1])[cells]))
 
 
-def front(problem: SetProblem) -> list[ExperimentSet]:
-    """Return the cheapest sets for each tenth of the cells and more."""
-    population, found = problem.information.shape[1], list[ExperimentSet]()
-    for level in np.arange(_STEP, 1 + _STEP / 2, _STEP).tolist():
-        needed = enough(level, population)
-        if found and found[-1].known.sum() >= needed:
-            continue
-        one = problem.cheapest(needed)
-        if one is None:
+def front(problem: SetProblem, judged: SetProblem, shares: Iterable[float]) -> list[ExperimentSet]:
+    """Return cheap sets for some shares of cells, as other cells judge them.
+
+    Parameters
+    ----------
+    problem
+        Cells that sets are chosen for.
+    judged
+        The same experiments with other cells.
+    shares
+        Shares of cells that are to be known.
+
+    Returns
+    -------
+    list of ExperimentSet
+        For each share the cheapest for as many of the first cells, for one more, and so on, until
+        as many of the others are known; none for larger shares than one that was not reached.
+    """
+    found: list[ExperimentSet] = []
+    for share in sorted(shares):
+        found += [judged.made(one.counts) for one in _chosen(problem, judged, share)]
+        if not found or found[-1].share < share:
             break
-        found.append(one)
     return found
+
+
+def _chosen(problem: SetProblem, judged: SetProblem, share: float) -> Iterator[ExperimentSet]:
+    cells = problem.information.shape[1]
+    for _ in range(_OFTEN):
+        needed = enough(share, cells)
+        one = None
+        while needed <= cells and (one := problem.cheapest(needed)):
+            yield one
+            if judged.made(one.counts).share >= share:
+                return
+            needed = int(one.known.sum()) + 1
+        if one is None:
+            return
+        problem = replace(problem, largest=problem.largest * (1 - _SMALLER) ** 0.5)
 
 
 def repeated(problem: SetProblem) -> list[ExperimentSet]:

@@ -2,9 +2,6 @@
 
 Experiments to choose from are designed for some durations, numbers of steps and of readings; then
 anew, beside the one of the cheapest set that tells most, for the cells that it tells least of.
-
-The cheapest set for some cells tells enough of fewer other cells: it was chosen for what these
-happen to be. So sets are chosen for some cells, and judged by others.
 """
 
 import os
@@ -17,7 +14,7 @@ import numpy as np
 
 from biogrip.arrays import Array, BoolArray, IntArray
 from biogrip.design.criteria import inverted
-from biogrip.design.experiment import DesignInputs, compute_information
+from biogrip.design.experiment import NO_BOUND, DesignInputs, compute_information
 from biogrip.design.price import PriceSettings
 from biogrip.design.schedule import Plan, planned, presses_each, sampled
 from biogrip.design.search import best_torques
@@ -31,6 +28,8 @@ from biogrip.worker_processes import worker_processes
 _DURATIONS, _STEPS, _READINGS = (1.0, 0.25, 0.0625), (1.0, 0.25), (1.0, 0.25, 0.0625)
 # Fewest steps and readings of an experiment.
 _FEWEST_STEPS, _FEWEST_READINGS = 4, 10
+# Shares of cells for which cheap sets are found, beside the one asked for.
+_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 # Cells whose responses are computed at once.
 _AT_ONCE = 16
 
@@ -57,7 +56,7 @@ class Round:
     cost: float
     """Mean of what they cost so far."""
     share: float
-    """Share of cells whose estimates are known well enough, which have no further ones."""
+    """Share of cells that are known; a cell has no further ones once its estimate would be."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +70,8 @@ class Several:
     offers: list[Offer]
     """Experiments to choose from."""
     at_once: list[ExperimentSet]
-    """The cheapest sets for more and more cells, up to the share asked for and beyond; known are
-    cells that they were not chosen for."""
+    """Sets that are cheap for more and more cells, up to the share asked for and beyond; known are
+    cells that judge them."""
     chosen: ExperimentSet | None
     """The cheapest of them with which enough cells are known; none if all are too few."""
     repeated: list[ExperimentSet]
@@ -143,6 +142,7 @@ def choose_several(
             inputs.criterion.targets,
             largest,
             settings.experiments,
+            inputs.before,
         )
 
     def choice(offers: list[Offer]) -> SetProblem:
@@ -179,26 +179,23 @@ def choose_several(
         lambda done: progress(len(grid) + done, 2 * len(grid)),
     )
     problem, judged = choice(offers), problem_of(offers, [each.of_others for each in offers])
-    sets = [judged.made(one.counts) for one in _sets(problem, judged, settings.share)]
-    alone = repeated(judged)
+    alone = nothing_beats([judged.made(one.counts) for one in repeated(problem)])
+    shares = sorted({*_SHARES, settings.share})
     # One repeated is a set, too.
-    at_once = nothing_beats([*sets, *alone])
+    at_once = nothing_beats([*front(problem, judged, shares), *alone])
     chosen = next((one for one in at_once if one.share >= settings.share), None)
     first = _first(problem, chosen or _most(problem))
-    rounds = _one_by_one(problem, population, offers, first, ends, between)
+    # As many of the others, for this takes long.
+    some = slice(len(cells))
+    rounds = _one_by_one(
+        replace(judged, information=judged.information[:, some]),
+        replace(inputs, parameters=others[some]),
+        offers,
+        first,
+        ends,
+        between,
+    )
     return Several(settings, inputs.criterion.targets, offers, at_once, chosen, alone, rounds)
-
-
-def _sets(problem: SetProblem, judged: SetProblem, share: float) -> list[ExperimentSet]:
-    """Return the cheapest sets for more and more cells, until enough of others are known, too."""
-    found = front(problem)
-    needed = enough(share, problem.information.shape[1])
-    while one := problem.cheapest(needed):
-        found.append(one)
-        if judged.made(one.counts).share >= share:
-            break
-        needed = int(one.known.sum()) + 1
-    return found
 
 
 def _grid(inputs: DesignInputs) -> Iterator[Limits]:
@@ -331,30 +328,34 @@ def _one_by_one(
 
     Estimates scatter as information says, within the ranges. The first experiment is given;
     the next is the one that tells most of the cheapest set that would be enough for the estimate. A
-    cell has no more experiments once its estimate is known well enough.
+    cell has no more experiments once it would be known if it were as estimated.
     """
     truth = np.log(population.parameters)
+    # Whether the jaws press is seen, whatever the estimate.
+    pressed: BoolArray = np.any(problem.information != 0, axis=(2, 3))
     counts = np.zeros((len(truth), len(offers)), dtype=np.intp)
     counts[:, first] = 1
     unknown = np.arange(len(truth))
     rounds: list[Round] = []
     for done in range(1, problem.most + 1):
-        here = counts[unknown]
-        before = np.einsum("ce,ecpq->cpq", here, problem.information[:, unknown])
-        estimates = _estimates(truth[unknown], before + problem.before, ends, rng)
+        told = np.einsum("ce,ecpq->cpq", counts, problem.information) + problem.before
+        cost = float((counts @ problem.costs).mean())
+        rounds.append(Round(cost, float(problem.are_known(inverted(told)).mean())))
+        if done == problem.most:
+            break
+        estimates = _estimates(truth[unknown], told[unknown], ends, rng)
         own = replace(population, parameters=np.exp(estimates))
         information = np.stack([_information(own, each.plan) for each in offers])
-        there = np.einsum("ce,ecpq->cpq", here, information) + problem.before
+        information *= pressed[:, unknown, None, None]
+        there = np.einsum("ce,ecpq->cpq", counts[unknown], information) + problem.before
         going = np.flatnonzero(~problem.are_known(inverted(there)))
-        cost = float((counts @ problem.costs).mean())
-        rounds.append(Round(cost, 1 - len(going) / len(truth)))
         if not len(going):
             break
         for row in going:
             further = replace(
                 problem,
                 information=information[:, [row]],
-                most=max(problem.most - done, 1),
+                most=problem.most - done,
                 before=there[[row]],
             )
             best = further.cheapest(1)
@@ -368,6 +369,8 @@ def _estimates(
     truth: Array, information: Array, ends: tuple[Array, Array], rng: np.random.Generator
 ) -> Array:
     """Draw estimates of log-parameters, (n, n_parameters), within the ranges."""
-    roots = np.linalg.cholesky(inverted(information))
-    scatter = roots @ rng.standard_normal((*truth.shape, 1))
+    # Where nothing is told, anything within the ranges may be estimated.
+    least = NO_BOUND**-2 * np.eye(truth.shape[1])
+    roots = np.linalg.cholesky(information + least).swapaxes(1, 2)
+    scatter = np.linalg.solve(roots, rng.standard_normal((*truth.shape, 1)))
     return np.clip(truth + scatter[..., 0], *ends)

@@ -27,6 +27,7 @@ import numpy as np
 from biogrip.arrays import Array, IntArray
 from biogrip.design.criteria import Criterion, inverted
 from biogrip.design.sampling import (
+    Mixing,
     compute_covariances,
     fill,
     fill_evenly,
@@ -34,10 +35,11 @@ from biogrip.design.sampling import (
     improve_shares,
 )
 
-# Fillings, at most, and improvements of their mixture after each; gap at which to stop.
-_FILLINGS, _MIXED, _GAP = 60, 4, 0.005
-# Power of the p-norm that replaces a maximum, at first and in the end, and its growth.
-_BLUNT, _SHARPER, _SHARP = 10.0, 1.3, 300.0
+# Fillings, at most; gap at which to stop; improvements of their mixture after each.
+_FILLINGS, _GAP = 60, 0.005
+_MIXING = Mixing(tries=4, settled=0.0, sharper=1.3, sharpest=300.0)
+# Power of the p-norm that replaces a maximum, at first.
+_BLUNT = 10.0
 # Readings of a cell that has none, and least share of independent noise in a cell.
 _NONE, _INDEPENDENT = 1e-7, 1e-3
 # Lengths of a cell over relaxation times from which on its mean is correlated with no other.
@@ -123,7 +125,7 @@ def spread_readings(
     fillings, shares = [fill_evenly(capacity, room)], np.ones(1)
     best, lowest = fillings[0], np.inf
     for round_ in range(_FILLINGS):
-        sharpness = min(_SHARP, _BLUNT * _SHARPER**round_)
+        sharpness = min(_MIXING.sharpest, _BLUNT * _MIXING.sharper**round_)
         shares = _mixed(np.array(fillings), shares, rows, noise, criterion, before, sharpness)
         readings = shares @ np.array(fillings)
         covariances, worth = _rate(readings, rows, noise, criterion, before, sharpness)
@@ -170,7 +172,7 @@ def _mixed(
         covariances, worth = _rate(shares @ fillings, rows, noise, criterion, before, sharpness)
         return criterion.smooth(covariances, sharpness), lambda: fillings @ worth
 
-    return improve_shares(shares, criterion, _MIXED, at)
+    return improve_shares(shares, criterion, _MIXING, at)
 
 
 def whole_along(readings: Array) -> IntArray:

@@ -25,16 +25,25 @@ def as_config(designs: Iterable[Designed]) -> str:
 
 def of_sets(designs: Iterable[Designed]) -> list[list[Designed]]:
     """Return the first experiment of each chosen set, the second, and so on."""
-    plans = [
-        [replace(found, plan=plan) for plan in found.several.plans_of(found.several.chosen)]
-        for found in designs
-        if found.several and found.several.chosen
+    return [[one for one in row if one] for row in zip_longest(*map(of_set, designs))]
+
+
+def of_set(found: Designed) -> list[Designed]:
+    """Return each experiment of the chosen set, if there is one."""
+    several = found.several
+    if not several or not several.chosen:
+        return []
+    plans, counts = several.plans_of(several.chosen), several.chosen.counts
+    pairs = zip(plans, counts[counts > 0].tolist(), strict=True)
+    return [
+        replace(found, plan=plan, number=number, times=times)
+        for number, (plan, times) in enumerate(pairs, 1)
     ]
-    return [[one for one in row if one] for row in zip_longest(*plans)]
 
 
 def _case(found: Designed) -> Iterator[str]:
-    yield f"  {found.case.name}:"
+    note = f" # {found.times} × with each cell" if found.number else ""
+    yield f"  {found.case.name}:{note}"
     yield "    protocol:"
     yield "      phases:"
     base = found.case.instrument.controlled.column

@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from biogrip.design.experiment import DesignInputs
 from biogrip.design.price import PriceSettings
 from biogrip.design.sets import ExperimentSet
 from biogrip.design.several import Several, choose_several
 from biogrip.digits import counted
 from biogrip.experiment.random_streams import stream
-from biogrip.study.design_inputs import make_design_inputs, plausible, plausible_ends
+from biogrip.study.design_inputs import plausible, plausible_ends
 from biogrip.study.study import Case
 
 WAYS = ("designed at once", "one repeated", "one after the other, mean")
@@ -23,10 +24,13 @@ _SHARES = (0.5, 0.8, 0.9)
 _OTHERS, _TRIED = 4, 5
 
 
-def several_of(case: Case, study_seed: int, progress: Callable[[int, int], None]) -> Several | None:
+def several_of(
+    case: Case, inputs: DesignInputs, study_seed: int, progress: Callable[[int, int], None]
+) -> Several | None:
     """Choose experiments of a case whose block `design` has a price; else return nothing.
 
-    The callback gets the numbers of experiments designed and to be designed.
+    The inputs are those of a design, without parameters that no torque determines. The callback
+    gets the numbers of experiments designed and to be designed.
 
     Raises
     ------
@@ -43,7 +47,7 @@ def several_of(case: Case, study_seed: int, progress: Callable[[int, int], None]
     count = block.price.cells
     population = plausible(case, replace(block, plausible_samples=(1 + _OTHERS) * count))
     return choose_several(
-        make_design_inputs(case),
+        inputs,
         block.price,
         population[:count],
         population[count:],
@@ -67,8 +71,8 @@ def aim(case: Case, several: Several) -> str:
 
 
 def judged_in_words(several: Several) -> str:
-    """Return which cells sets are chosen for, and which count."""
-    return f"(chosen for {several.cells}, judged by {several.others} others)"
+    """Return which cells sets are chosen for, and which judge them."""
+    return f"(chosen for {several.cells} cells, judged by {several.others} others)"
 
 
 def points(several: Several) -> list[list[tuple[float, float]]]:
@@ -100,8 +104,8 @@ def in_lines(several: Several, aimed_at: str) -> list[str]:
         most = several.settings.experiments
         best = several.at_once[-1].share if several.at_once else 0.0
         lines.append(
-            f"no set of up to {counted(most, 'experiment')} is enough for that, but for "
-            f"{100 * best:.3g} % of cells; more `experiments`, readings or torque may be."
+            f"no set of up to {counted(most, 'experiment')} that was tried is enough for that, but "
+            f"for {100 * best:.3g} % of cells; more `experiments`, readings or torque may be."
         )
     else:
         listed = "; ".join(set_in_words(several, several.chosen))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from biogrip.errors import BiogripError, nearest
 from biogrip.files import refuse_inputs, write_text
-from biogrip.own_design.as_config import as_config, of_sets
+from biogrip.own_design.as_config import as_config, of_set, of_sets
 from biogrip.own_design.at_a_price import several_of
 from biogrip.own_design.designed import designed, in_words, percent
 from biogrip.own_design.earlier import Recorded, estimate_from_recordings
@@ -77,12 +77,15 @@ def design(
             )
     if read_as != ReadAs() and not after:
         raise BiogripError("found options of a trace, allowed are these with --after only.")
-    exported = export_paths(export, chosen) if export else []
+    numbers = range(1, _most(chosen) + 1)
+    numbered = [output.with_stem(f"{output.stem}_{number}") for number in numbers]
+    exported = (
+        [path for number in (0, *numbers) for path in export_paths(export, chosen, number)]
+        if export
+        else []
+    )
     if output in exported:
         raise BiogripError(f"{output}: is a file of --export, too; allowed is another name.")
-    numbered = [
-        output.with_stem(f"{output.stem}_{number}") for number in range(1, _most(chosen) + 1)
-    ]
     refuse_inputs([output, page, *numbered, *exported], [*configs, *chain.from_iterable(after)])
     for path in (output, page, *numbered):
         check_output(path, force=force)
@@ -104,25 +107,27 @@ def design(
             def grouped(count: int, many: int, title: str = case.title) -> None:
                 progress.doing(f"{title}: {count} of {many} groups of experiments designed")
 
-            several = several_of(case, study.study_seed, grouped)
+            several = several_of(case, one.inputs, study.study_seed, grouped)
             found.append(replace(one, several=several))
-            if export:
-                check_limits(found[-1])
+            for each in [found[-1], *of_set(found[-1])] if export else []:
+                check_limits(each)
             progress.done()
     # Imported lazily: Matplotlib takes a second.
     from biogrip.own_design.page import write_page
 
     write_text(output, as_config(found))
-    written = [output, page, *exported]
+    written = [output, page]
     for path, own in zip(numbered, of_sets(found), strict=False):
         write_text(path, as_config(own))
         written.append(path)
     write_page(found, page)
-    for each in found:
-        if export:
-            write_export(each, export)
+    if export:
+        for each in chain(found, *map(of_set, found)):
+            written += write_export(each, export)
     print(visible_lines("\n".join(map(in_words, found))))
     print(visible_lines(f"Written to {', '.join(map(str, written))}."))
+    if left := [path for path in (*numbered, *exported) if path not in written and path.exists()]:
+        print(visible_lines(f"Of an earlier set: {', '.join(map(str, left))}."))
 
 
 def _most(chosen: Sequence[Case]) -> int:

@@ -44,6 +44,10 @@ class Designed:
     """Jaw force under the plan, (n, n_times)."""
     several: Several | None = None
     """Several experiments with each cell of a population, if they have a price."""
+    number: int = 0
+    """Number of the experiment in a chosen set, from one; zero if it is of none."""
+    times: int = 1
+    """How often it is made with each cell."""
 
 
 def designed(

@@ -10,6 +10,7 @@ import numpy as np
 
 from biogrip import __version__
 from biogrip.arrays import Array
+from biogrip.design.schedule import forces
 from biogrip.design.settings import largest_key
 from biogrip.errors import BiogripError
 from biogrip.experiment.protocol import largest_load
@@ -29,9 +30,13 @@ _TIME_DIGITS, _DIGITS = 15, 9
 _ROUNDING = 1e-9
 
 
-def export_paths(folder: Path, cases: Iterable[Case]) -> list[Path]:
-    """Return the files of cases: of each that of breakpoints, and that of instants of readings."""
-    return [folder / f"{case.name}_{what}.csv" for case in cases for what in _FILES]
+def export_paths(folder: Path, cases: Iterable[Case], number: int = 0) -> list[Path]:
+    """Return the files of cases: of each that of breakpoints, and that of instants of readings.
+
+    The number is that of an experiment in a chosen set, from one.
+    """
+    of_set = f"_{number}" if number else ""
+    return [folder / f"{case.name}{of_set}_{what}.csv" for case in cases for what in _FILES]
 
 
 def check_export(folder: Path, paths: Iterable[Path], *, force: bool) -> None:
@@ -64,7 +69,8 @@ def check_limits(found: Designed) -> None:
         Names the key of the limit.
     """
     case, inputs = found.case, found.inputs
-    place, largest = f"--export: {case.name}", largest_load(found.plan.phases)
+    of_set = f", experiment {found.number}" if found.number else ""
+    place, largest = f"--export: {case.name}{of_set}", largest_load(found.plan.phases)
     if abs(largest) > inputs.largest_Nm * (1 + _ROUNDING):
         key, unit = largest_key(case.instrument), case.instrument.controlled.unit
         values = np.array([abs(largest), inputs.largest_Nm])
@@ -82,6 +88,8 @@ def check_limits(found: Designed) -> None:
 def _turned(found: Designed) -> float:
     """Return the largest rotation of either arm, both of which are driven alike, in rad."""
     inputs = found.inputs
+    network = inputs.model.network(inputs.parameters)
+    time_s, _ = forces(inputs.gripper, network, found.plan.phases)
     left = inputs.gripper
     right = replace(left, left=left.right, right=left.left)
     rotations = (
@@ -89,7 +97,7 @@ def _turned(found: Designed) -> float:
             arms,
             inputs.model,
             inputs.history(found.plan.phases),
-            found.force_time_s,
+            time_s,
             inputs.parameters,
             inertia=True,
             slopes=False,
@@ -99,9 +107,9 @@ def _turned(found: Designed) -> float:
     return max(float(np.abs(rows[:, 0]).max()) for rows in rotations)
 
 
-def write_export(found: Designed, folder: Path) -> None:
+def write_export(found: Designed, folder: Path) -> list[Path]:
     """Write the breakpoints and the instants of readings of a design, as CSV files."""
-    protocol, readings = export_paths(folder, [found.case])
+    protocol, readings = export_paths(folder, [found.case], found.number)
     if found.inputs.instrument.has_jaws:
         drawn = "volts on both comb drives from contact by equation (9)"
     else:
@@ -109,6 +117,7 @@ def write_export(found: Designed, folder: Path) -> None:
     said = f"{drawn}; linear between rows; two rows of the same time are a jump"
     _write(protocol, said, ["time_s", *_columns(found)], _rows(found))
     _write(readings, "when to read", ["time_s"], _texts(found.plan.time_s))
+    return [protocol, readings]
 
 
 def _columns(found: Designed) -> dict[str, Callable[[Array], Array]]:
