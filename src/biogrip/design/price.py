@@ -32,7 +32,7 @@ class PriceSettings(Block):
     share: Annotated[float, Field(gt=0, le=1)] = 0.95
     """Share of cells of which all quantities are to be determined. By default 0.95."""
     cells: Annotated[int, Field(ge=2, le=1024)] = 128
-    """Cells that sets are chosen for, spread evenly over `design.ranges`; each set is judged by four
+    """Cells that sets are chosen for, spread evenly over `design.ranges`; sets are judged by four
     times as many others. By default 128."""
     experiments: Annotated[int, Field(ge=1, le=20)] = 8
     """Most experiments with a cell. By default 8."""
