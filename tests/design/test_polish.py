@@ -33,15 +33,17 @@ def _bound(torque: Torque) -> float:
 
 
 def test_it_is_better_can_be_set_and_is_the_same_again() -> None:
-    polished = polish(SECOND, _found(), 100, np.random.default_rng(2))
-    assert _bound(polished) < _bound(_found()) - 5e-4
+    begun = torque_of(SECOND, (hold(100.0, 8e-9), hold(300.0, 7.5e-9)))
+    assert begun is not None
+    polished = polish(SECOND, begun, 100, np.random.default_rng(2))
+    assert _bound(polished) < _bound(begun) - 0.05
     phases = set_values(SECOND, polished)
     assert presses(SECOND, phases)
     again = torque_of(SECOND, phases)
     assert again is not None
     assert set_values(SECOND, again) == phases
     assert _bound(again) == pytest.approx(_bound(polished), abs=1e-6)
-    other = polish(SECOND, _found(), 100, np.random.default_rng(2))
+    other = polish(SECOND, begun, 100, np.random.default_rng(2))
     np.testing.assert_array_equal(other.waveform.levels, polished.waveform.levels)
 
 
@@ -80,7 +82,8 @@ def test_the_best_come_first() -> None:
     best = best_of(SECOND, torques[::-1], 3)
     bounds = [_bound(each) for each in best]
     assert len(best) == 3
-    assert bounds == sorted(bounds)
+    # Those of what can be set differ by the gap of a rating.
+    assert np.all(np.diff(bounds) > -1e-3)
 
 
 def test_a_configured_train_is_where_a_design_goes_on() -> None:

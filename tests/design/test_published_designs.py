@@ -16,8 +16,8 @@ from tests.helpers.designs_campaign import (
 )
 
 CASES = ["liquid_drop_1", "liquid_drop_2", "endothelial_cell"]
-# Readings of a list are whole and in few bursts, and those rated are in coarser bins of time.
-ROUNDED = 1e-3
+# Ratings are in coarser bins of time than lists; of neighbours their errors are alike.
+ROUNDED = 3e-3
 
 
 @pytest.mark.parametrize("case_name", CASES)
