@@ -1,4 +1,4 @@
-"""What several experiments with each cell of config/sequential.yaml cost, and whether they tell.
+"""What several experiments with each cell cost by config/price.yaml, and whether they tell.
 
 ``python -m tests.helpers.price_campaign`` takes some ten minutes, and writes the table and the
 figure of docs/design.md. With cells that are drawn anew, the chosen set is simulated, and all
@@ -37,7 +37,7 @@ FOLDER = ROOT / "results" / "published" / "price"
 FIGURE = FOLDER / "figures" / "price.png"
 TABLE = FOLDER / "tables" / "price.csv"
 SEQUENTIAL = ROOT / "results" / "published" / "sequential" / "tables" / "sequential.csv"
-ASKED = [CONFIG, ROOT / "config" / "sequential.yaml"]
+ASKED = [CONFIG, *(ROOT / "config" / name for name in ("sequential.yaml", "price.yaml"))]
 CELL, CELLS = "endothelial_cell", 500
 DESIGNED_AFTER = "each designed after those before"
 
