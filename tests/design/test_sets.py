@@ -83,7 +83,7 @@ def test_sets_are_enough_for_cells_that_they_were_not_chosen_for() -> None:
     short = 0
     for seed in range(4):
         problem, judged = others_of(seed)
-        for share in (0.5, 0.8, 0.95):
+        for share in (0.5, 0.8, 0.9):
             alone = problem.cheapest(enough(share, CELLS))
             assert alone is not None
             short += judged.made(alone.counts).share < share
@@ -92,7 +92,7 @@ def test_sets_are_enough_for_cells_that_they_were_not_chosen_for() -> None:
             assert [one.share >= share for one in found[:-1]] == [False] * (len(found) - 1)
             assert found[-1].share >= share
             assert len(found[-1].known) == 200
-    assert short > 6
+    assert short > 5
 
 
 def test_where_no_set_is_enough_all_that_were_tried_are_there() -> None:

@@ -45,17 +45,17 @@ class Mixing:
 
     tries: int
     """Most steps."""
-    settled: float
-    """Decrease of the criterion's logarithm in a step, with less than which it is the last."""
+    least_decrease: float
+    """Decrease of the criterion's logarithm in a step; one with less is the last."""
     sharper: float
     """Growth, with every filling, of the power p of the p-norm that replaces a maximum."""
     sharpest: float
     """Largest power: a logarithm is off by up to that of the number of values over it."""
 
 
-ROUGH = Mixing(tries=15, settled=1e-4, sharper=1.5, sharpest=1e3)
+ROUGH = Mixing(tries=15, least_decrease=1e-4, sharper=1.5, sharpest=1e3)
 """For gaps down to a thousandth."""
-FINE = Mixing(tries=100, settled=1e-7, sharper=1.1, sharpest=1e4)
+FINE = Mixing(tries=100, least_decrease=1e-7, sharper=1.1, sharpest=1e4)
 """For gaps down to a ten-thousandth."""
 
 
@@ -323,7 +323,7 @@ def improve_shares(
         if new_value <= value:
             decrease = value - new_value
             shares, value = tried, new_value
-            if decrease < mixing.settled:
+            if decrease < mixing.least_decrease:
                 break
             worth = np.maximum(worth_there(), 0.0)
             power *= 1.2

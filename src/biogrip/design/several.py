@@ -338,12 +338,12 @@ def _one_by_one(
     unknown = np.arange(len(truth))
     rounds: list[Round] = []
     for done in range(1, problem.most + 1):
-        told = np.einsum("ce,ecpq->cpq", counts, problem.information) + problem.before
+        so_far = np.einsum("ce,ecpq->cpq", counts, problem.information) + problem.before
         cost = float((counts @ problem.costs).mean())
-        rounds.append(Round(cost, float(problem.are_known(inverted(told)).mean())))
+        rounds.append(Round(cost, float(problem.are_known(inverted(so_far)).mean())))
         if done == problem.most:
             break
-        estimates = _estimates(truth[unknown], told[unknown], ends, rng)
+        estimates = _estimates(truth[unknown], so_far[unknown], ends, rng)
         own = replace(population, parameters=np.exp(estimates))
         information = np.stack([_information(own, each.plan) for each in offers])
         information *= pressed[:, unknown, None, None]

@@ -37,7 +37,7 @@ from biogrip.design.sampling import (
 
 # Fillings, at most; gap at which to stop; improvements of their mixture after each.
 _FILLINGS, _GAP = 60, 0.005
-_MIXING = Mixing(tries=4, settled=0.0, sharper=1.3, sharpest=300.0)
+_MIXING = Mixing(tries=4, least_decrease=0.0, sharper=1.3, sharpest=300.0)
 # Power of the p-norm that replaces a maximum, at first.
 _BLUNT = 10.0
 # Readings of a cell that has none, and least share of independent noise in a cell.
