@@ -119,7 +119,7 @@ def test_sheets_and_traces_may_be_mixed(here: Path, capsys: pytest.CaptureFixtur
         table = list(csv.DictReader(stream))
     assert [[row[name] for name in ("trace", "cell", "dish", "fit")] for row in table] == [
         ["usual.csv", "", "", "ok"],
-        ["bad.csv", "lost", "left", "none"],
+        ["bad.csv", "lost", "left", "failed"],
     ]
     assert "cell" not in found("usual.csv")
 

@@ -23,17 +23,21 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.errors import BiogripError
 from biogrip.experiment.sample import CANDIDATES, MODELS
+from biogrip.identifiability.fit_status import Note
 from biogrip.identifiability.profiles import Profile
 from biogrip.identifiability.quantities import parameters_and_sum
 from biogrip.identifiability.verdicts import Finding
 from biogrip.identify.answer import History, Identification
+from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.model_choice import ranked
+from biogrip.own_traces import one_trace
 from biogrip.own_traces.fitted_models import FittedModels
 from biogrip.own_traces.many_traces import Outcome, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, identify_trace
 from biogrip.own_traces.outputs import WRITTEN_BY, check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.words import for_a_paper, side_by_side
+from biogrip.traces.late_onset import note_late_onset
 from tests.helpers.places import EXAMPLE, ROOT
 from tests.helpers.problems import clean
 
@@ -442,6 +446,40 @@ def test_nobody_reading_on_is_no_error(tmp_path: Path) -> None:
     assert done.stderr == ""
 
 
+def test_a_trace_whose_fit_fails_costs_no_other_its_result(
+    tmp_path: Path, few: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A fault of ours, here of a test that only adds notes: a row says why, alone one message."""
+    whole, whole_length = note_late_onset, len(pd.read_csv(EXAMPLE))
+
+    def fails(problem: CaseProblem, time_s: Array, values: Array, near: Array) -> list[Note]:
+        if len(time_s) < whole_length:
+            raise ValueError("min() arg is an empty sequence")
+        return whole(problem, time_s, values, near)
+
+    monkeypatch.setattr(one_trace, "note_late_onset", fails)
+    good, bad = (tmp_path / name for name in ("good.csv", "bad.csv"))
+    shutil.copy(EXAMPLE, good)
+    bad.write_text("".join(EXAMPLE.read_text().splitlines(keepends=True)[:-1]))
+    table = tmp_path / "found.csv"
+    for traces in ((good, bad), (bad, good)):
+        given = ("identify", *map(str, traces), "--config", few, "--csv", str(table))
+        assert main([*given, "--force"]) == 1
+        said = capsys.readouterr()
+        assert "Traceback" not in said.err
+        assert f"{bad}: the fit failed" in said.out
+        rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
+        assert list(rows.index) == [str(good), str(bad)]
+        assert list(rows["fit"]) == ["ok", "failed"]
+        (why,) = rows.loc[[str(bad)], "failed"]
+        assert "ValueError: min() arg is an empty sequence" in why
+        assert rows.loc[str(good), "failed"] == ""
+        assert good.with_suffix(".identified.json").exists()
+        assert not bad.with_suffix(".identified.json").exists()
+    assert main(["identify", str(bad), "--config", few]) == 1
+    assert "the fit failed, which is a fault of biogrip" in capsys.readouterr().err
+
+
 def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) -> None:
     """The bad are skipped, listed with their reasons, and make the status 1."""
     good = [shutil.copy(EXAMPLE, tmp_path / name) for name in ("a.csv", "b.csv")]
@@ -456,14 +494,16 @@ def test_several_traces_come_in_a_table_and_on_a_page(tmp_path: Path, few: str) 
     assert "Traceback" not in done.stderr
     rows = pd.read_csv(table, keep_default_na=False).set_index("trace")
     assert list(rows.index) == [*map(str, good), str(bad), str(missing), "/"]
-    assert list(rows["fit"]) == ["ok", "ok", "none", "none", "none"]
+    assert list(rows["fit"]) == ["ok", "ok", "failed", "failed", "failed"]
     told = json.loads((tmp_path / "a.identified.json").read_text())
     assert rows.loc[str(good[0]), "k value (N/m)"] == str(told["quantities"][0]["value"])
     assert rows.loc[str(good[0]), "c + c_p high (N s/m)"] == str(told["quantities"][-1]["high"])
     (lowest,) = (row["model"] for row in told["models"] if row["delta_bic"] == 0)
     assert rows.loc[str(good[0]), "preferred_model"] == lowest
     # Cells are numbers or names, and a verdict is at most three words.
-    longest = rows.drop(columns="written_by_biogrip").map(lambda cell: len(str(cell).split()))
+    longest = rows.drop(columns=["written_by_biogrip", "failed"]).map(
+        lambda cell: len(str(cell).split())
+    )
     assert longest.max().max() <= 3
     # The same trace under another name is the same trace.
     assert list(rows.loc[str(good[0])]) == list(rows.loc[str(good[1])])

@@ -14,6 +14,7 @@ from biogrip.arrays import Array
 from biogrip.cli import main
 from biogrip.experiment.protocol import Phase, hold, load
 from biogrip.identify.fitted_onset import OnsetFits
+from biogrip.instrument.instruments import INSTRUMENTS
 from biogrip.library import Sample, set_up, simulate
 from biogrip.products.stages import judgement, recording
 from biogrip.study.defaults import default_config
@@ -130,6 +131,43 @@ def test_a_fitted_onset_has_the_lowest_misfit() -> None:
     assert best.onset_s == pytest.approx(ONSET_S, abs=0.1)
     for onset_s in np.linspace(7.8, 8.4, 31):
         assert fits.at(onset_s, best.log_parameters).misfit_rad >= best.misfit_rad
+
+
+# The protocol starts at 0 of clocks whose median interval tells nothing of the onset.
+CLOCKS = {
+    "eight decades": np.geomspace(1e-4, 1e4, 161),
+    "six decades": np.geomspace(1e-3, 1e3, 1001),
+    "later than the step": np.arange(5, 601) / 10,
+    "log-spaced and later": np.geomspace(0.05, 60.0, 400),
+}
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_an_onset_is_fitted_on_any_clock(clock: str) -> None:
+    """Its misfit is no higher than with the onset of the simulation."""
+    times = CLOCKS[clock]
+    protocol = (hold(float(times[-1]), 1.0),)
+    creep = set_up(INSTRUMENTS["strain"], protocol, Sample("zener_maxwell"))
+    truth = {"k": 300.0, "k_p": 200.0, "c": 3000.0}
+    exact = simulate(creep, truth, times)
+    noise = 0.02 * exact.max() * np.random.default_rng(0).standard_normal(len(times))
+    fits = OnsetFits(creep, times, exact + noise)
+    best = fits.best(float(times[0]))
+    true = fits.at(0.0, np.log(list(truth.values())))
+    assert best.misfit_rad <= true.misfit_rad * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("last_s", [1e3, 1e4])
+def test_a_trace_over_many_decades_of_time_has_an_answer(tmp_path: Path, last_s: float) -> None:
+    """A liquid on which no reading of the first decades moves, and exact times."""
+    times = np.geomspace(1e-4, last_s, 161)
+    trace = tmp_path / "liquid.csv"
+    trace.write_text("time_s,strain\n" + "".join(f"{t},{1.0 + t}\n" for t in times))
+    given = ("--reading", "strain=strain", "--hold", "1", "--model", "maxwell")
+    assert main(["identify", str(trace), *given]) == 0
+    found = json.loads((tmp_path / "liquid.identified.json").read_text())
+    for quantity in found["quantities"]:
+        assert quantity["value"] == pytest.approx(1.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("flat", [True, False])

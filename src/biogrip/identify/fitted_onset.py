@@ -21,8 +21,10 @@ from biogrip.identify.multi_start import fit_from
 _BUDGET = LeastSquaresSettings(candidates=1000, starts=16)
 # Steps of the pattern search in sampling intervals: first, and last, and most of them.
 _FIRST_STEP, _LAST_STEP, _MOST_STEPS = 8.0, 0.5, 200
-# Intervals that are looked at around the onset of that search, and those of rounding errors.
-_NEAR, _ROUNDING = 3.0, 1e-6
+# Readings on either side of the onset of that search between which the misfit is minimised.
+_NEAR = 3
+# Instants that differ by less, relative to the latest, are one.
+_ROUNDING = 1e-14
 # Fits in each interval at first, and the share of their spread by which more may lower the misfit:
 # a search has by then come within a tenth of the interval of where the misfit is lowest.
 _FEW, _DROP = 6, 0.5
@@ -76,10 +78,14 @@ class OnsetFits:
         return OnsetFit(onset_s, fit.x[0], float(fit.misfit_rad[0]))
 
     def _searched(self, best: OnsetFit) -> OnsetFit:
-        """Search the onset in steps, halved where neither direction is better."""
+        """Search the onset in steps, halved where neither direction is better.
+
+        The last steps are half as long as the readings are apart where the onset is, which of
+        times with equal ratios is much less than the median.
+        """
         step_s = _FIRST_STEP * self.interval_s
         for _ in range(_MOST_STEPS):
-            if step_s < _LAST_STEP * self.interval_s:
+            if step_s < _LAST_STEP * min(self.interval_s, self._apart_s(best.onset_s)):
                 break
             sides = (self.at(best.onset_s + s, best.log_parameters) for s in (-step_s, step_s))
             lower = min(sides, key=_misfit_rad)
@@ -118,12 +124,24 @@ class OnsetFits:
         minimize_scalar(misfit_rad, bounds=bounds, method="bounded", options={"maxiter": most})
         return list(known.values())
 
+    def _apart_s(self, onset_s: float) -> float:
+        """Return how far readings are apart at an onset, in s."""
+        after = int(np.clip(np.searchsorted(self._time_s, onset_s), 1, len(self._time_s) - 1))
+        return float(self._time_s[after] - self._time_s[after - 1])
+
     def _smooth_intervals(self, onset_s: float) -> Iterator[tuple[float, float]]:
-        """Yield intervals of onsets within which no reading passes a change of torque."""
+        """Yield intervals of onsets around one, within which no reading passes a change of torque.
+
+        An onset before the first reading passes none, however early: the first interval then
+        begins as far before it as a search that has come near may be off.
+        """
         torque = self._case_problem.torque
         changes_s = np.unique([start for start, *_ in (*torque.jumps, *torque.swings)])
         edges = np.unique(np.subtract.outer(self._time_s, changes_s))
-        near = edges[np.abs(edges - onset_s) < _NEAR * self.interval_s]
-        yield from (
-            (low, high) for low, high in pairwise(near) if high - low > _ROUNDING * self.interval_s
-        )
+        equal_s = _ROUNDING * max(np.abs(self._time_s).max(), np.abs(changes_s).max())
+        edges = edges[np.diff(edges, prepend=-np.inf) > equal_s]
+        after = int(np.searchsorted(edges, onset_s))
+        if after < _NEAR:
+            before_s = min(onset_s, edges[0]) - _NEAR * self.interval_s
+            yield before_s, float(edges[0])
+        yield from pairwise(edges[max(after - _NEAR, 0) : after + _NEAR].tolist())

@@ -2,11 +2,14 @@
 
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import traceback
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
+from biogrip import __version__
 from biogrip.digits import rounded_numbers, with_unit
 from biogrip.errors import BiogripError
 from biogrip.instrument.gripper import ROTATION
@@ -24,12 +27,17 @@ from biogrip.own_traces.trace_case import TraceCase
 from biogrip.products.files.rows import write_rows
 from biogrip.progress import Progress
 from biogrip.study.sheet import Row
-from biogrip.terminal import visible
+from biogrip.terminal import visible, visible_lines
 from biogrip.worker_processes import worker_processes
 
 # Most traces of a batch, and most readings of traces that are fitted together.
 _MOST_IN_BATCH, _MOST_READINGS = 25, 200_000
 _OF_QUANTITY = ("verdict", "value", "low", "high")
+FAILED = "failed"
+"""Status of a trace that could not be read, or whose fit failed; and the column that says why."""
+
+T = TypeVar("T")
+
 _OF_TRACE = "trace", "fit", "model", "samples", "noise_rad", "misfit_rad", "fixed", "reads"
 
 
@@ -42,7 +50,7 @@ class Outcome:
     found
         Result of each usable trace, as data of `identify_trace`.
     refused
-        Error message of each other trace, by file.
+        Message of each other trace, which could not be read or whose fit failed, by file.
     on_page
         What a page shows of each usable trace, if there is to be one.
     """
@@ -55,7 +63,7 @@ class Outcome:
 def identify_traces(
     options: Sequence[IdentifyOptions], outputs: Sequence[Path], *, page: bool
 ) -> Outcome:
-    """Identify traces in batches, and collect the errors of those that cannot be used.
+    """Identify traces in batches, and collect the errors of those that fail.
 
     The result of a trace is the same, to the last bit, in any batch and alone.
 
@@ -104,10 +112,7 @@ def identify_batch(
     """
     results: dict[int, Identified | BiogripError] = {}
     if len(options) == 1 and outputs is not None:
-        try:
-            results[0] = identify_trace(options[0], outputs[0])
-        except BiogripError as error:
-            results[0] = error
+        results[0] = _tried(options[0].trace, lambda: identify_trace(options[0], outputs[0]))
     else:
         results = _results(options, outputs)
     outcome = Outcome([], {})
@@ -133,30 +138,53 @@ def _results(
     traces: dict[int, TraceCase] = {}
     progress = Progress("", 0, quiet=True)
     for index, own in enumerate(options):
-        try:
-            traces[index] = read(own, case_of(own), progress)
-        except BiogripError as error:
-            results[index] = error
+        read_or_not = _tried(own.trace, partial(_read, own, progress))
+        if isinstance(read_or_not, BiogripError):
+            results[index] = read_or_not
+        else:
+            traces[index] = read_or_not
 
     def identify(group: Sequence[int]) -> None:
-        try:
-            found = identify_alike(
+        found = _tried(
+            options[group[0]].trace,
+            lambda: identify_alike(
                 [options[index] for index in group],
                 [traces[index] for index in group],
                 None if outputs is None else [outputs[index] for index in group],
                 progress,
-            )
+            ),
+        )
+        if not isinstance(found, BiogripError):
             results.update(zip(group, found, strict=True))
-        except BiogripError as error:
-            if len(group) == 1:
-                results[group[0]] = error
+        elif len(group) == 1:
+            results[group[0]] = found
+        else:
             # The error is of one of them.
-            for index in group if len(group) > 1 else []:
+            for index in group:
                 identify([index])
 
     for group in _alike(traces):
         identify(group)
     return results
+
+
+def _read(options: IdentifyOptions, progress: Progress) -> TraceCase:
+    return read(options, case_of(options), progress)
+
+
+def _tried(trace: Path, work: Callable[[], T]) -> T | BiogripError:
+    """Return what work on a trace gives, or the error by which it fails, whatever that is."""
+    try:
+        return work()
+    except BiogripError as error:
+        return error
+    except Exception as error:
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        return BiogripError(
+            f"{visible(trace)}: the fit failed, which is a fault of biogrip and not of the trace: "
+            f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno}). "
+            "Please report it, with the trace if it may be shared."
+        )
 
 
 def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
@@ -174,7 +202,7 @@ def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
 
 
 def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None = None) -> None:
-    """Write one row per trace as CSV: numbers, their units in the header, and no sentences.
+    """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
 
     Traces that sheets list, by file, have columns for cell and factors.
     """
@@ -193,7 +221,7 @@ def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None
     ]
     rows_of = rows_of or {}
     factors = list(dict.fromkeys(name for row in rows_of.values() for name in row.factors))
-    header = [*columns, WRITTEN_BY]
+    header = [*columns, FAILED, WRITTEN_BY]
     of_row = ["cell", *(f"factor {name}" if name in header else name for name in factors)]
     header[1:1] = of_row if rows_of else []
     rows = [
@@ -208,13 +236,17 @@ def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None
             *(each["samples"], each["noise_rad"], each["misfit_rad"]),
             *(["; ".join(each["fixed"])] if fixed else []),
             *_of_quantities(each, units),
+            "",
             each[WRITTEN_BY],
         )
         for each in map(rounded_numbers, outcome.found)
     ]
     rows += [
-        (trace, *_of_row(rows_of, trace, factors), "none", *[""] * (len(columns) - 1))
-        for trace in outcome.refused
+        (
+            *(trace, *_of_row(rows_of, trace, factors), FAILED, *[""] * (len(columns) - 2)),
+            *(visible_lines(why).replace("\n", " "), __version__),
+        )
+        for trace, why in outcome.refused.items()
     ]
     write_rows(table, header, rows)
 
