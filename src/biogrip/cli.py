@@ -143,7 +143,6 @@ def _parser() -> argparse.ArgumentParser:
         ("batch", "batch of seeds, e.g. seeds_0-49"),
         ("sweep", "name of the sweep"),
         ("seed", "number of the seed"),
-        ("rows", "first row of a batch of the sheet of traces, from 0"),
     ):
         make.add_argument(f"--{name}", help=text)
     make.add_argument("--made-for", help=argparse.SUPPRESS)
@@ -207,8 +206,8 @@ def _identify_parser(stages: Any) -> None:
         type=Path,
         nargs="+",
         metavar="TRACE",
-        help="CSV file with a header, or a sheet: a table whose header has the column file, with a "
-        "row for each trace, its cell, factors and keys of the config",
+        help="CSV file with a header, or a table of traces: its header has the column file, and "
+        "others that are keys of the config, with dots, or copied to the CSV",
     )
     _trace_options(identify)
     identify.add_argument(
@@ -222,37 +221,29 @@ def _identify_parser(stages: Any) -> None:
     )
     identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, one row per trace")
     identify.add_argument(
+        "--rows",
+        type=_rows,
+        metavar="FIRST-LAST",
+        help="some rows of a table, from 0, without JSON files [all]",
+    )
+    identify.add_argument(
         "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
     )
 
 
 def _groups_parser(stages: Any) -> None:
-    text = "identify the cells of several groups in recorded traces, and compare the groups"
+    text = "compare groups of cells, from the table that identify --csv wrote"
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
     groups.examples = _examples(
-        "groups dishes.csv --config my_gripper.yaml",
-        "groups dishes.csv --config my_gripper.yaml --by treatment --exclude c07",
-        cost="A cell takes some seconds.",
+        "groups found.csv --by dish", "groups found.csv --by treatment --csv compared.csv"
     )
+    groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
+    groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
+    groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
     groups.add_argument(
-        "table",
-        type=Path,
-        help="sheet: CSV or TSV file with the columns file, cell and group, one line per trace; "
-        "other columns are factors, or keys of the config",
+        "--force", action="store_true", help="replace a file that biogrip did not write"
     )
-    _trace_options(groups)
-    groups.add_argument(
-        "--by", metavar="FACTOR", help="column that makes the groups [group, or the only factor]"
-    )
-    groups.add_argument(
-        "--exclude",
-        action="append",
-        default=[],
-        metavar="CELL",
-        help="leave a cell out of all groups; repeat for more",
-    )
-    groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
 
 
 def _design_parser(stages: Any) -> None:
@@ -371,6 +362,14 @@ def _start(text: str) -> float | str:
     raise argparse.ArgumentTypeError(f"found '{text}', allowed are seconds, or {FIT}")
 
 
+def _rows(text: str) -> tuple[int, int]:
+    """Read the value of ``--rows``."""
+    first, _, last = text.partition("-")
+    if first.isdecimal() and last.isdecimal() and int(first) <= int(last):
+        return int(first), int(last)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is FIRST-LAST, as in 0-99")
+
+
 def _fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
     """Return the values of all ``--fix`` by name, each of which may come once."""
     for number, (name, _) in enumerate(given):
@@ -427,7 +426,7 @@ def _trace_options(command: _Parser) -> None:
 def _make(options: argparse.Namespace) -> None:
     from biogrip.running.make import make
 
-    names = ("case", "method", "batch", "sweep", "seed", "rows")
+    names = ("case", "method", "batch", "sweep", "seed")
     given = {name: getattr(options, name) for name in names}
     job = {name: text for name, text in given.items() if text}
     make(options.products, job, RESULTS, options.made_for)
@@ -444,6 +443,7 @@ def _identify(options: argparse.Namespace) -> None:
         output=options.output,
         report=options.report,
         table=options.csv,
+        rows=options.rows,
         posterior=options.posterior,
         fixed=_fixed(options.fix),
         strict=options.strict,
@@ -452,19 +452,9 @@ def _identify(options: argparse.Namespace) -> None:
 
 
 def _groups(options: argparse.Namespace) -> None:
-    from biogrip.own_traces.groups_of_cells import groups
+    from biogrip.groups import groups
 
-    options.status = groups(
-        options.table,
-        options.model,
-        _read_as(options),
-        options.config,
-        by=options.by,
-        exclude=options.exclude,
-        fixed=_fixed(options.fix),
-        output=options.output,
-        force=options.force,
-    )
+    groups(options.found, options.by, options.csv, force=options.force)
 
 
 def _design(options: argparse.Namespace) -> None:

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
-from biogrip.own_traces.fitted_cells import check_sheet
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -17,7 +16,6 @@ from biogrip.running.resolved import read_study, write_study
 from biogrip.running.rules import (
     GROUPS,
     ProductRule,
-    all_written,
     files_of,
     make_rules,
 )
@@ -49,9 +47,8 @@ with message_only():
             command_line=workflow.config_settings.config,
         )
         check_traces(STUDY)
-        check_sheet(STUDY)
     else:
-        # On another node: what the run was planned with, without reading a long sheet again.
+        # On another node: what the run was planned with.
         STUDY = read_study(RESULTS)
 
 PLAN = Plan(STUDY, RESULTS)
@@ -120,7 +117,7 @@ def begin():
 def end():
     """Record what the jobs have written, and say what else there is."""
     CLAIM.end()
-    say_what_else_is_there(RESULTS, all_written(RULES))
+    say_what_else_is_there(RESULTS, files_of(RULES))
 
 
 onstart:

@@ -58,7 +58,7 @@ def estimate_from_traces(
 ) -> Earlier:
     """Fit a trace, or several at once, and draw plausible samples from the likelihood.
 
-    Several are a problem of `biogrip.groups.replicates.joint_problem`, whose noise is their common
+    Several are a problem of `biogrip.design.replicates.joint_problem`, whose noise is their common
     one, see `compute_common_noise`. A function identifies the global optimum. Parameters that are
     badly determined are drawn within their lowest and highest logarithms, (n_parameters,) each.
     Fewer samples are returned than asked for if too few draws are kept. From the samples of earlier

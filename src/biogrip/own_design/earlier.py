@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from biogrip.design.earlier_traces import Earlier, estimate_from_traces
+from biogrip.design.replicates import compute_common_noise, joint_problem
 from biogrip.design.settings import noise_key
 from biogrip.errors import BiogripError
 from biogrip.experiment.random_streams import stream
-from biogrip.groups.replicates import compute_common_noise, joint_problem
 from biogrip.identify.answer import Identification, silent
 from biogrip.identify.identifier import best_fit
 from biogrip.identify.problem import Problem

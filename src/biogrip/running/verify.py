@@ -11,7 +11,7 @@ from biogrip.running.manifest import OF_NO_RULE, Manifest
 from biogrip.running.provenance import Provenance, name_of
 from biogrip.running.resolved import NAME as STUDY
 from biogrip.running.resolved import read_study
-from biogrip.running.rules import all_written, make_rules
+from biogrip.running.rules import files_of, make_rules
 
 
 def verify(results: Path) -> str:
@@ -47,7 +47,7 @@ def verify(results: Path) -> str:
             for name in sorted(Provenance(results, manifest).outdated(rules))
             if manifest.knows(name)
         ]
-        others = len(manifest.others([*map(name_of, all_written(rules)), *OF_NO_RULE]))
+        others = len(manifest.others([*map(name_of, files_of(rules)), *OF_NO_RULE]))
     if problems:
         raise BiogripError("\n".join([*problems, "The next run makes them again."]))
     also = f" Of other studies than {results / STUDY}: {others}." if others else ""

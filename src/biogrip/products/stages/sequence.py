@@ -11,11 +11,11 @@ import numpy as np
 from biogrip.arrays import Array
 from biogrip.design.earlier_traces import Earlier, estimate_from_traces
 from biogrip.design.experiment import DesignInputs, Experiment
+from biogrip.design.replicates import joint_problem
 from biogrip.design.schedule import presses
 from biogrip.design.within_reach import plan_within_reach
 from biogrip.experiment.random_streams import stream
 from biogrip.experiment.sampling import Sampling
-from biogrip.groups.replicates import joint_problem
 from biogrip.identifiability.likelihood import MISSED, make_likelihood
 from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.quantities import parameters_and_sum
