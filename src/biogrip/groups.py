@@ -39,7 +39,6 @@ COLUMNS = "cells", "determined", "median", "low", "high", "ratio", "ratio_low", 
 """What is said of a quantity in a group."""
 
 Compared = dict[tuple[str, str], dict[str, Any]]
-"""That, by quantity and group."""
 
 _VALUE = re.compile(r"(.*) value(?: \((.*)\))?")
 _ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
@@ -81,7 +80,7 @@ class Estimate:
     @property
     def p_value(self) -> float:
         """Two-sided p value of a mean of 0."""
-        return float(2 * stdtr(self.freedom, -abs(self.mean) / self.error))
+        return 2 * float(stdtr(self.freedom, -abs(self.mean) / self.error))
 
 
 def estimate(values: Array, errors: Array) -> Estimate:
@@ -108,7 +107,7 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 
 
 def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> Compared:
-    """Return the median of each quantity in each group and, against the first, ratio and p value.
+    """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
 
     A median takes `FEWEST_CELLS` that determine the quantity, and no fewer than do not.
     """
@@ -155,10 +154,9 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
     header, *rows = read_rows(found)
     traces = [dict(zip(header, row, strict=False)) for row in rows]
     if missing := [name for name in ("trace", "fit", "confidence", by) if name not in header]:
-        what = f"--by: found '{by}'" if missing == [by] else f"found no '{missing[0]}'"
         raise BiogripError(
-            f"{what} among the columns of {visible(found)}; allowed is a column of a table that "
-            f"`biogrip identify --csv` wrote.{nearest(missing[0], header)}"
+            f"{visible(found)}: found no column '{missing[0]}'; allowed is a table that `biogrip "
+            f"identify --csv` wrote, and of --by a column of it.{nearest(missing[0], header)}"
         )
     if table is not None:
         refuse_inputs([table], [found])
@@ -170,24 +168,22 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
             f"{visible(found)}: found limits of {' and '.join(levels) or 'no trace of a group'}; "
             "allowed are those of one confidence, of traces whose fits are not rejected."
         )
-    confidence, names = float(levels[0]), list(dict.fromkeys(o[by] for o in traces if o[by]))
+    confidence = float(levels[0])
+    names = list(dict.fromkeys(own[by] for own in traces if own[by]))
     units = {it[1]: it[2] or "" for name in header if (it := _VALUE.fullmatch(name))}
     cells = _cells(used, by, units, confidence)
     compared = compare(cells, names, confidence)
     lines = [f"{visible(found)}: {counted(len(cells), 'cell')}, {100 * confidence:g} % limits"]
-    lines += [_printed(compared, names[0], units), *_left_out(traces, by, cells)]
-    lines += _not_known(cells, compared)
+    lines += [_printed(compared, names[0], units)]
+    lines += [*_left_out(traces, by, cells), *_not_known(cells, compared)]
     if doubtful := [cell.name for cell in cells if cell.doubtful]:
         again = compare([cell for cell in cells if not cell.doubtful], names, confidence)
         lines += [f"Without the doubtful {', '.join(doubtful)}:", _printed(again, names[0], units)]
     print(visible_lines("\n".join(lines)))
     if table is not None:
-        written = [
-            (name, units[name], group, *(row.get(each, "") for each in COLUMNS), __version__)
-            for (name, group), row in compared.items()
-        ]
-        header = ["quantity", "unit", "group", *COLUMNS, WRITTEN_BY]
-        write_rows(table, header, map(rounded_numbers, map(list, written)))
+        own = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
+        names = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
+        write_rows(table, names, ([*rounded_numbers(row), __version__] for row in own))
         print(f"Written to {visible(table)}.")
 
 

@@ -101,7 +101,12 @@ if workflow.exec_mode == ExecMode.DEFAULT and not preparation.done:
 # A Snakefile that takes this one in as a module calls `begin` and `end` in hooks of its own.
 def begin():
     """Refuse what is not the study's before jobs replace it, and say what the study is."""
-    jobs = list(workflow.dag.needrun_jobs())
+    # Tables of the user's traces are not on record.
+    jobs = [
+        job
+        for job in workflow.dag.needrun_jobs()
+        if job.rule.name not in ("traces_batch", "traces")
+    ]
     with message_only():
         CLAIM.begin(
             [Path(file) for job in jobs for file in job.output],

@@ -24,7 +24,7 @@ from biogrip.study.case_blocks import CaseBlock
 from biogrip.study.schema import Schema, schema_of
 from biogrip.study.source import overlaid
 from biogrip.study.study import Case
-from biogrip.study.validation import some_case_problems
+from biogrip.study.validation import brackets_problem, some_case_problems
 from biogrip.study.yaml_text import scalar_problem
 from biogrip.terminal import visible
 from biogrip.traces.cells import SEPARATORS, cells_or_none
@@ -71,13 +71,15 @@ def is_table(path: Path) -> bool:
     return any(name.lower() == FILE for each in SEPARATORS for name in cells_or_none(first, each))
 
 
-def read_table(path: Path) -> list[Row]:
+def read_table(path: Path, *, for_workflow: bool = False) -> list[Row]:
     """Read a table, and check all of it but the traces.
 
     Parameters
     ----------
     path
         Text in UTF-8 with a header: `.tsv` is separated by tabs, another by what its header has.
+    for_workflow
+        If true, refuse names of traces that Snakemake would read as wildcards.
 
     Raises
     ------
@@ -107,6 +109,8 @@ def read_table(path: Path) -> list[Row]:
         elif before != line:
             text = f"found '{visible(by_name[FILE])}' again, as on line {before}; allowed is each"
             problems.append(f"{place(path, line, FILE)}: {text} trace once.")
+        elif for_workflow and (problem := brackets_problem(str(file))):
+            problems.append(f"{place(path, line, FILE)}: {problem}")
         for name, schema in settings.items():
             if by_name[name]:
                 value, problem = _value(name, schema, by_name[name])
