@@ -209,7 +209,28 @@ def _identify_parser(stages: Any) -> None:
         help="CSV file with a header, or a table of traces: its header has the column file, and "
         "others that are keys of the config, with dots, or copied to the CSV",
     )
-    _trace_options(identify)
+    identify.lists_models = True
+    _reading_options(identify)
+    identify.add_argument(
+        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
+    )
+    identify.add_argument(
+        "--fix",
+        type=_parameter,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="known parameter, SI units; 0 leaves an element out; repeat for more",
+    )
+    identify.add_argument(
+        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
+    )
+    identify.add_argument(
+        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
+    )
+    identify.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
     identify.add_argument(
         "--posterior", action="store_true", help="also sample the posterior: some seconds per trace"
     )
@@ -394,32 +415,6 @@ def _reading(text: str) -> tuple[str, str]:
         return quantity, column
     raise argparse.ArgumentTypeError(
         f"found '{text}', allowed is QUANTITY=COLUMN, as in compliance=J"
-    )
-
-
-def _trace_options(command: _Parser) -> None:
-    """Add options for reading and identifying recorded traces."""
-    command.lists_models = True
-    _reading_options(command)
-    command.add_argument(
-        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
-    )
-    command.add_argument(
-        "--fix",
-        type=_parameter,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="known parameter, SI units; 0 leaves an element out; repeat for more",
-    )
-    command.add_argument(
-        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
-    )
-    command.add_argument(
-        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
-    )
-    command.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
     )
 
 

@@ -152,7 +152,7 @@ def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
         If the file is no such table, or has no such column.
     """
     header, *rows = read_rows(found)
-    traces = [dict(zip(header, row, strict=False)) for row in rows]
+    traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
     if missing := [name for name in ("trace", "fit", "confidence", by) if name not in header]:
         raise BiogripError(
             f"{visible(found)}: found no column '{missing[0]}'; allowed is a table that `biogrip "

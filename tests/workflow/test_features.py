@@ -186,5 +186,5 @@ def test_shipped_configurations_are_valid(file: Path, monkeypatch: pytest.Monkey
     if file.stem == "soft_designed":
         over = overlaid(read_config(file.with_name("soft.yaml")), over)
     inputs, outputs = inputs_and_outputs(study_of(yaml.safe_dump(over)))
-    assert len(outputs) > (10 if file.stem == "dishes" else 50)
+    assert len(outputs) > 50
     assert [read for read in inputs - outputs if not Path(read).is_file()] == []

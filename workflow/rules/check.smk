@@ -19,7 +19,6 @@ OVERLAYS = {
     "moduli": (["moduli"], "all_moduli", "modulus_bands*"),
     "moduli_recorded": (["recorded", "moduli"], "all_moduli", "modulus_bands*"),
     "moduli_measured": (["measured", "moduli"], "all_moduli", "modulus_bands*"),
-    "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
     "soft_design": (["soft", "soft_designed"], "designed", "designed"),

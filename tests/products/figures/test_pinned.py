@@ -19,7 +19,6 @@ from PIL import Image
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS
-from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
 from biogrip.products.figures import declared, designed_map, modulus_bands, sequential
 from biogrip.products.figures import robustness as heat_map
@@ -77,7 +76,6 @@ OTHERS = {
     "posterior_made_up": "posterior_figure",
     "designed_map": "designed_map",
     "sequential": "sequential_figure",
-    "groups_made_up": "groups_figure",
     "modulus_bands_made_up": "modulus_bands_figure",
 }
 NAMES = [*JOBS, *OTHERS]
@@ -164,29 +162,9 @@ def figure(
             cell = STUDY.cases["endothelial_cell"]
             rows = made_up(tmp_path_factory.mktemp("cells"))
             return sequential.draw(cell, rows)
-        if request.param == "groups_made_up":
-            return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
         if request.param == "modulus_bands_made_up":
             return _bands(tmp_path_factory.mktemp("moduli") / "moduli.json")
         return _corner()
-
-
-def _groups(data: Path) -> Figure:
-    """Two groups of cells: determined, bounded, doubtful and rejected ones, made up."""
-    rng = np.random.default_rng(1)
-    cells, groups = [], []
-    for group, by in (("control", 1.0), ("treated", 1.5)):
-        values = by * 20 * np.exp(0.2 * rng.standard_normal(6))
-        for number, value in enumerate(values.tolist()):
-            limits = {"low": value / 1.1, "high": None if number == 5 else value * 1.1}
-            quantity = {"quantity": "k", "symbol": "$k$", "value": value, **limits}
-            fit = {3: "doubtful", 4: "rejected"}.get(number, "ok")
-            cells.append({"group": group, "fit": fit, "quantities": [quantity]})
-        middle = float(np.exp(np.mean(np.log(values))))
-        median = {"median": middle, "low": middle / 1.2, "high": middle * 1.2}
-        groups.append({"group": group, "quantity": "k", "unit": "N/m", **median})
-    data.write_text(json.dumps({"cells": cells, "groups": groups}))
-    return groups_of_study.draw_groups(None, data)
 
 
 def _bands(limits: Path) -> Figure:
