@@ -143,7 +143,8 @@ def _cells(path: Path) -> list[list[str]]:
             encoding="utf-8-sig",
         )
     except (OSError, ValueError) as error:
-        raise BiogripError(f"{place(path)}: cannot be read as a table: {error}.") from error
+        found = " ".join(str(error).split())
+        raise BiogripError(f"{place(path)}: cannot be read as a table: {found}.") from error
     return [[str(cell).strip() for cell in row] for row in frame.fillna("").to_numpy()]
 
 
