@@ -319,6 +319,8 @@ def test_identify_and_groups_say_the_same_of_a_cell(
     assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
     table = tmp_path / "compared.csv"
     found = said(capsys, tmp_path / "found.csv", "--by", "treatment", "--csv", table)
+    documented = (ROOT / "docs" / "groups.md").read_text(encoding="utf-8")
+    assert found.partition("\n")[2].partition("Left out")[0] in documented
     assert f"Left out, the fit is rejected: {folder / 'b5.csv'}." in found
     assert "Averages of several traces: a2 (2)." in found
     ratios = pd.read_csv(table).query("group == 'treated'").set_index("quantity")

@@ -1,4 +1,4 @@
-"""Registry of all products, collected from the modules of some packages."""
+"""Registry of all products, collected from the modules of a package."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -10,7 +10,7 @@ from pkgutil import walk_packages
 from biogrip.errors import BiogripError, nearest
 from biogrip.products.product import Product
 
-_PACKAGES = "biogrip.products", "biogrip.own_traces"
+_PACKAGE = "biogrip.products"
 
 
 @cache
@@ -52,10 +52,8 @@ def _product(name: str) -> Product:
 
 @cache
 def _modules() -> tuple[str, ...]:
-    paths = {name: import_module(name).__path__ for name in _PACKAGES}
-    return tuple(
-        module.name for name, path in paths.items() for module in walk_packages(path, f"{name}.")
-    )
+    path = import_module(_PACKAGE).__path__
+    return tuple(module.name for module in walk_packages(path, f"{_PACKAGE}."))
 
 
 @cache

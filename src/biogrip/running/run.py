@@ -196,7 +196,7 @@ def _to_open(folder: Path, arguments: list[str]) -> str:
         # Pages that are older were made for the study before, and were not asked for now.
         pages = [
             page
-            for page in (results / "report.html", results / "traces.html", *pages)
+            for page in (results / "report.html", *pages)
             if page.is_file() and page.stat().st_mtime_ns >= begun_ns
         ]
     requested = [folder / word for word in arguments if word.startswith("results/")]
