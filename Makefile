@@ -31,7 +31,7 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study article test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs citation site notebook pinned lock clean
+.PHONY: study article test test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site notebook pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -74,6 +74,11 @@ verify: $(READY)
 
 check: $(READY)
 	$(BIN)/snakemake -j$(JOBS) check
+
+# The same for every overlay that is published, each as long as a study or longer: nightly, not in CI.
+check-overlays: $(READY)
+	overlays=$$($(BIN)/snakemake --list-rules | grep ^check_) && \
+	  $(BIN)/snakemake -j$(JOBS) --keep-going $$overlays
 
 publish: $(READY)
 	$(BIN)/snakemake -j$(JOBS) publish

@@ -183,6 +183,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     compare.add_argument("published", type=Path, help="folder of published tables")
     compare.add_argument("now", type=Path, help="folder of regenerated tables")
+    compare.add_argument("--only", default="*", help="pattern of names, e.g. readings*")
     return parser
 
 
@@ -545,4 +546,4 @@ def _publish(options: argparse.Namespace) -> None:
 def _compare(options: argparse.Namespace) -> None:
     from biogrip.running.comparison import compare
 
-    print(visible_lines(compare(options.published, options.now)))
+    print(visible_lines(compare(options.published, options.now, options.only)))

@@ -15,7 +15,10 @@ OVERLAYS = {
     "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
+    "calibration": (["calibration"], "all_tables", "*"),
     "measured": (["measured"], "all", "*"),
+    "power_law": (["power_law"], "all_tables", "*"),
+    "recorded": (["recorded"], "all_tables", "*"),
     "moduli": (["moduli"], "all_moduli", "modulus_bands*"),
     "moduli_recorded": (["recorded", "moduli"], "all_moduli", "modulus_bands*"),
     "moduli_measured": (["measured", "moduli"], "all_moduli", "modulus_bands*"),
@@ -36,7 +39,7 @@ RUN_AFRESH = (
 )
 
 
-# Neither has an output, so that neither is ever taken for done.
+# None of these has an output, so that none is ever taken for done.
 rule check:
     input:
         published=PUBLISHED / "tables",
@@ -89,4 +92,24 @@ for overlay, (configs, target, only) in OVERLAYS.items():
         shell:
             f"{RUN_AFRESH}; "
             'biogrip publish "$scratch/results" {params.published:q} --only {params.only:q} '
+            "2>> {log:q} | tee -a {log:q}"
+
+    rule:
+        name:
+            f"check_{overlay}"
+        input:
+            published=PUBLISHED / overlay / "tables",
+        log:
+            f"results/logs/check_{overlay}.log",
+        threads: lambda _: workflow.cores
+        params:
+            snakefile=workflow.main_snakefile,
+            config=f"--configfile {' '.join(f'{CONFIGS / name}.yaml' for name in configs)}",
+            targets=target,
+            only=only,
+        message:
+            f"Running {' and '.join(configs)} afresh and comparing its tables with the published ones"
+        shell:
+            f"{RUN_AFRESH}; "
+            'biogrip compare {input.published:q} "$scratch/results/tables" --only {params.only:q} '
             "2>> {log:q} | tee -a {log:q}"
