@@ -99,14 +99,11 @@ format: $(TEST_READY)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-# All of it, or only what SECTIONS names, the rest of the report staying as it is.
 bench: $(BENCH_READY)
-	$(BENCH_BIN)/python -m pytest -q tests/test_benchmarks.py
-	$(BENCH_BIN)/python -m benchmarks $(SECTIONS)
+	$(BENCH_BIN)/python -m benchmarks
 
-# All of it, or with SECTIONS=measured only the measured traces, with SECTIONS=dish only the dish.
 bench-field: $(FIELD_READY)
-	$(FIELD_BIN)/python -m benchmarks.field $(SECTIONS)
+	$(FIELD_BIN)/python -m benchmarks.field
 
 report: $(READY)
 	$(BIN)/snakemake -j$(JOBS) --report report.html --report-metadata workflow/report/results.yaml

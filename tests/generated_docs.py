@@ -31,8 +31,6 @@ ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
 VERDICTS = PUBLISHED / "tables"
-NOISE = PUBLISHED / "noise" / "tables" / "noise.csv"
-STATUS = PUBLISHED / "status" / "tables" / "status.csv"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 RANKS = DISHES.with_name("ranks.csv")
 POPULATIONS = DISHES.with_name("populations.csv")
@@ -163,46 +161,6 @@ def cells_needed_table() -> str:
         }
         for spread in (0.1, 0.2, 0.3, 0.5)
     )
-
-
-def simulated_noise() -> str:
-    """How often intervals held the truth in noise of several kinds, over the quantities."""
-    noise = pd.read_csv(NOISE)
-    return _table(
-        {
-            "noise": kind,
-            "sample": str(case).replace("_", " "),
-            "flagged": f"{rows['flagged_percent'].max():.1f} %",
-            "truth inside, white noise assumed": _range(
-                rows["white_coverage_percent"], ".1f", " %"
-            ),
-            "truth inside, coloured noise assumed": _range(rows["coverage_percent"], ".1f", " %"),
-            "times as wide": _range(rows["times_wider"], ".2g"),
-        }
-        for (kind, case), rows in noise.groupby(["noise", "case"], sort=False)
-    )
-
-
-def simulated_statuses() -> str:
-    """Statuses of fits and coverage of limits, over the quantities, by set-up."""
-    return _table(
-        {"set-up": str(title), "traces": str(rows["traces"].max())} | _statuses(rows)
-        for title, rows in pd.read_csv(STATUS).groupby("set_up", sort=False)
-    )
-
-
-def _statuses(rows: pd.DataFrame) -> dict[str, str]:
-    white, coloured = (rows[rows["noise_model"] == name] for name in ("white", "coloured"))
-    found = {}
-    for name, of in (("white", white), ("coloured", coloured)):
-        one = of.iloc[0]
-        wrong = one["rejected_percent"] + one["refused_percent"]
-        shares = (one["ok_percent"], one["doubtful_percent"], wrong)
-        found[f"ok / doubtful / rejected, {name}"] = "/".join(f"{share:.0f}" for share in shares)
-    for name, of in (("white", white), ("coloured", coloured)):
-        held = of["coverage_percent"].dropna()
-        found[f"truth inside, {name}"] = _range(held, ".1f", " %") if len(held) else ""
-    return found
 
 
 def errors_by_noise() -> str:
@@ -457,11 +415,7 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "README.md": {"answer": answer, "example": identified_example},
     ROOT / "docs" / "reference" / "command.md": {"help": command_help},
     ROOT / "docs" / "reference" / "files.md": {"columns": file_columns, "products": product_files},
-    ROOT / "docs" / "identifiability.md": {
-        "noise": simulated_noise,
-        "status": simulated_statuses,
-        "methods": methods_compared,
-    },
+    ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
     ROOT / "docs" / "groups.md": {

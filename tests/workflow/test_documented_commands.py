@@ -16,7 +16,6 @@ from pathlib import Path
 from tempfile import TemporaryFile
 
 import pytest
-import yaml
 
 from tests.helpers import loaded
 from tests.helpers.places import ROOT
@@ -45,7 +44,6 @@ LEFT = {
     ],
     "howto/crate.md": ["study.zip"],
     "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
-    "howto/fork.md": ["published/SHA256SUMS", "published/tables/errors_my_cell.csv"],
     "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
     # These change the copy's code.
     "howto/noise_kind.md": ["results/tables/verdicts_laplace_drop.md"],
@@ -116,21 +114,6 @@ def test_what_is_said_can_be_done(
         elif language == "python":
             _run(content, place)
     assert [name for name in LEFT[document] if not (place.root / name).is_file()] == []
-
-
-@pytest.mark.parametrize("document", ["howto/fork.md"])
-def test_what_a_workflow_of_github_runs_is_typed_above(document: str) -> None:
-    """Its file cannot be run here; its commands are those of the page, and have been."""
-    text = (ROOT / "docs" / document).read_text(encoding="utf-8")
-    blocks = BLOCK.findall(text)
-    typed = {line for language, _, code in blocks if language == "sh" for line in code.splitlines()}
-    (workflow,) = (yaml.safe_load(code) for _, title, code in blocks if ".github" in title)
-    steps = [step for job in workflow["jobs"].values() for step in job["steps"]]
-    commands = [step["run"] for step in steps if "run" in step]
-    assert {command for command in commands if command.startswith("biogrip")} <= typed
-    locks = re.findall(r"-r (\S+)", " ".join(commands))
-    assert [lock for lock in locks if not (ROOT / lock).is_file()] == []
-    assert all("uses" in step or "run" in step for step in steps)
 
 
 def _typed(arguments: list[str]) -> list[str]:

@@ -2,20 +2,14 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
 
-from benchmarks.sheet import write_sheet
 from biogrip.errors import BiogripError
-from biogrip.own_traces import fitted_traces
 from biogrip.own_traces.fitted_cells import check_sheet
-from biogrip.own_traces.fitted_traces import TraceToFit, trace_of
+from biogrip.own_traces.fitted_traces import trace_of
 from biogrip.own_traces.one_trace import case_of
-from biogrip.products.catalogue import products
-from biogrip.products.plan import Plan
-from biogrip.running.rules import make_rules, needed_for, with_losses
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.study import Study
 from tests.helpers.drops import write_trace
@@ -207,33 +201,3 @@ def test_a_study_names_the_columns_of_all_its_traces_once(
     assert {each.reading for each in columns} == {"phi_rad"}
     with pytest.raises(BiogripError, match=r"lab.yaml, line 4: measurement.sd: found 1, allowed"):
         study_with("{sd: 1}")
-
-
-def test_planning_looks_at_every_row_a_fixed_number_of_times(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Not once more for every job: planning 100,000 rows would take hours."""
-    monkeypatch.chdir(tmp_path)
-    made: list[int] = []
-
-    def count(*given: Any) -> TraceToFit:
-        made.append(1)
-        return TraceToFit(*given)
-
-    monkeypatch.setattr(fitted_traces, "TraceToFit", count)
-    for rows in (100, 400):
-        sheet = write_sheet(tmp_path, rows)
-        given = {"traces": str(sheet)}
-        config = read_configs([CONFIG_FILE]) | given
-        study = load_study(config, [CONFIG_FILE], command_line=given)
-        made.clear()
-        check_sheet(study)
-        rules = make_rules(products().values(), Plan(study, Path("results")))
-        jobs = {rule.name: rule.jobs for rule in rules}
-        assert len(jobs["fitted_traces"]) == len(jobs["fitted_cells"]) == rows // 25
-        needed_for([], rules)
-        with_losses(rules)
-        for rule in rules:
-            for job in rule.jobs:
-                rule.digest(job)
-        assert len(made) < 20 * rows

@@ -1,11 +1,6 @@
-"""Confidence limits against their definition, on very many traces.
-
-``python -m tests.helpers.limits_campaign [traces [case ...]]`` takes some 10 minutes for
-100 traces of a case, one for the ``example`` under twenty names. The test suite has a few.
-"""
+"""Confidence limits against their definition."""
 
 import functools
-import sys
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,18 +10,18 @@ from biogrip.experiment.random_streams import stream
 from biogrip.identifiability.likelihood import Likelihood, make_likelihood
 from biogrip.identifiability.limits import find_limits
 from biogrip.identifiability.profiles import compute_profiles
-from biogrip.identifiability.quantities import Quantity, parameters_and_sum
+from biogrip.identifiability.quantities import Quantity
 from biogrip.identify.answer import silent
 from biogrip.identify.identifier import identifier
 from biogrip.identify.problem import Problem
 from tests.helpers.default import STUDY
 from tests.helpers.definition import rise_at, rises_along
 from tests.helpers.places import EXAMPLE
-from tests.helpers.problems import MODEL, SAMPLES, posed_for, problem, run
+from tests.helpers.problems import MODEL, posed_for, problem, run
 
 ALLOWED = 0.01
 # Random starts at a limit; steps on the way to one.
-THOROUGH = (24, 24)
+STARTS, STEPS = 6, 8
 ALIKE = 1e-3
 NAMES = ("example_trace", *(f"trace_{year}" for year in range(2006, 2021)), "a", "b", "zz", "cell")
 
@@ -55,27 +50,26 @@ def example(name: str) -> Likelihood:
 
 
 def misses(
-    likelihood: Likelihood, quantities: Sequence[Quantity], effort: tuple[int, int] = THOROUGH
+    likelihood: Likelihood, quantities: Sequence[Quantity]
 ) -> Iterator[tuple[str, str, float, float]]:
     """Quantity, whose limit, its logarithm, and by what share of the threshold the rise misses."""
     rng = np.random.default_rng(0)
-    starts, steps = effort
     (profiles,) = compute_profiles([likelihood], quantities)
     (near,) = find_limits([likelihood], quantities)[0]
     for quantity, found, limits in zip(quantities, profiles, near, strict=True):
         for limit in (found.low, found.high):
             if limit is not None:
-                increase = rise_at(likelihood, quantity, limit, rng, starts)
+                increase = rise_at(likelihood, quantity, limit, rng, STARTS)
                 yield quantity.label, "profile", limit, increase / likelihood.threshold - 1
         for limit in limits:
             if np.isfinite(limit):
-                increases = list(rises_along(likelihood, quantity, limit, steps))
+                increases = list(rises_along(likelihood, quantity, limit, STEPS))
                 if (
                     min(abs(increase / likelihood.threshold - 1) for increase in increases)
                     > ALLOWED
                 ):
                     # Where the optimum's basin leads over into a lower one, it is that one's.
-                    increases.append(rise_at(likelihood, quantity, limit, rng, starts))
+                    increases.append(rise_at(likelihood, quantity, limit, rng, STARTS))
                 miss = min((increase / likelihood.threshold - 1 for increase in increases), key=abs)
                 yield quantity.label, "near", limit, float(miss)
 
@@ -104,30 +98,3 @@ def limits_of(likelihood: Likelihood, quantities: Sequence[Quantity]) -> list[tu
     return [
         (np.nan if p.low is None else p.low, np.nan if p.high is None else p.high) for p in found
     ]
-
-
-def main(traces: int, cases: list[str]) -> None:
-    """Print what misses its definition, and how far the worst of the others are from it."""
-    quantities = parameters_and_sum(MODEL)
-    for case in cases:
-        if case == "example":
-            apart = differences(np.array([limits_of(example(n), quantities) for n in NAMES]))
-            print(f"example: {len(NAMES)} names, limits differ by {apart.max():.1e} of the width")
-            continue
-        limits, failed, worst = 0, 0, 0.0
-        for seed in range(traces):
-            for label, whose, limit, miss in misses(likelihood_for(case, seed), quantities):
-                limits += 1
-                if abs(miss) <= ALLOWED:
-                    worst = max(worst, abs(miss))
-                    continue
-                failed += 1
-                print(f"{case} {seed}: {label} ({whose}) {np.exp(limit):.6g}: {miss:+.2%}")
-        print(f"{case}: {traces} traces, {limits} limits, {failed} miss; the others by {worst:.3%}")
-
-
-if __name__ == "__main__":
-    main(
-        int(sys.argv[1]) if len(sys.argv) > 1 else 100,
-        sys.argv[2:] or ["example", *SAMPLES],
-    )
