@@ -31,7 +31,7 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs citation site notebook pinned lock clean
+.PHONY: study test test-lowest test-pythons check verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
@@ -118,10 +118,6 @@ site: $(SITE_READY)
 	$(SITE_BIN)/cffconvert --format codemeta | cmp - codemeta.json
 	$(SITE_BIN)/cffconvert --format zenodo | cmp - .zenodo.json
 	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
-
-# The notebook with what it puts out; look at it before committing it.
-notebook: $(TEST_READY)
-	$(BIN)/python -m tests.helpers.notebook
 
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(TEST_READY)

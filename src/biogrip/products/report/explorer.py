@@ -71,10 +71,9 @@ def explorer(cases: Sequence[tuple[str, Sequence[tuple[Method, Fit]]]]) -> str:
         visible = [each is own for each in lines for _ in each]
         change = [{"visible": visible}, _axes(fits[0][1])]
         buttons.append({"label": escape(title), "method": "update", "args": change})
-    first, axes = buttons[0]["args"]
-    for line, visible in zip(drawn.data, first["visible"], strict=True):
-        line.visible = visible
-    for key, value in axes.items():
+    for line in drawn.data[len(lines[0]) :]:
+        line.visible = False
+    for key, value in _axes(cases[0][1][0][1]).items():
         drawn.layout[key] = value
     menu = {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
     drawn.update_layout(updatemenus=[menu])

@@ -5,6 +5,7 @@ import platform
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from importlib.metadata import version
 from io import BytesIO
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any
 
 import jinja2
 import yaml
-from markupsafe import Markup, escape
 
 from biogrip.errors import BiogripError
 from biogrip.files import atomic_write
@@ -196,7 +196,7 @@ def _in_few_colours(path: Path) -> bytes:
     return packed.getvalue()
 
 
-def _table(path: Path, caption: str) -> Markup:
+def _table(path: Path, caption: str) -> str:
     """Return the table element of an HTML file written by `biogrip.products.tables.layout`."""
     try:
         text = path.read_text(encoding="utf-8")
@@ -206,7 +206,7 @@ def _table(path: Path, caption: str) -> Markup:
     if found is None:
         raise BiogripError(f"{path}: holds no table.")
     columns = found[0].replace("<th>", '<th scope="col">')
-    return Markup(re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns))
+    return re.sub("(<table[^>]*>)", rf"\1<caption>{escape(caption)}</caption>", columns)
 
 
 def _download(path: Path) -> str:
