@@ -124,7 +124,7 @@ def name_of(file: str) -> str:
     return PurePosixPath(file).relative_to(_RESULTS).as_posix()
 
 
-def finished(results: Path, manifest: Manifest, only: str = "*") -> list[str]:
+def finished(results: Path, manifest: Manifest, only: str) -> list[str]:
     """Return all results of a finished study, except batches.
 
     Parameters
