@@ -31,14 +31,10 @@ counted = $$(grep -o '^[a-z][^=]*' $(1) | sort -u | wc -l)
 QUICK := $(filter-out tests/workflow tests/helpers tests/__init__.py tests/conftest.py tests/generated_docs.py tests/__pycache__, \
   $(wildcard tests/*)) tests/workflow/test_results.py
 
-.PHONY: study article test test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site notebook pinned lock clean
+.PHONY: study test test-lowest test-pythons check check-overlays verify publish publish-overlays lint format bench bench-field report docs citation site pinned lock clean
 
 study: $(READY)
 	$(BIN)/biogrip run -j$(JOBS)
-
-# The study as an article, results/article.pdf; `make study` makes it, too.
-article: $(READY)
-	$(BIN)/biogrip run -j$(JOBS) article
 
 # One worker more than there are processors: some wait for the programs that they have started.
 test: $(TEST_READY)
@@ -124,10 +120,6 @@ site: $(SITE_READY)
 	$(SITE_BIN)/cffconvert --format codemeta | cmp - codemeta.json
 	$(SITE_BIN)/cffconvert --format zenodo | cmp - .zenodo.json
 	NO_MKDOCS_2_WARNING=1 $(SITE_BIN)/mkdocs build --strict --clean
-
-# The notebook with what it puts out; look at it before committing it.
-notebook: $(TEST_READY)
-	$(BIN)/python -m tests.helpers.notebook
 
 # The pictures that figures are compared with; look at what has changed before committing them.
 pinned: $(TEST_READY)

@@ -85,7 +85,8 @@ def _verdicts() -> list[dict[str, str]]:
 
 def answer() -> str:
     """In how many of the paper's samples a trace determines which quantity."""
-    sentence = say_what_traces_tell(_verdicts(), " of the paper's experiment")
+    sentence = say_what_traces_tell(_verdicts())
+    sentence = sentence.replace("A trace", "A trace of the paper's experiment", 1)
     told, _, where = sentence.partition(": ")
     return f"**{told}**: {where}"
 

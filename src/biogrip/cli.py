@@ -6,7 +6,7 @@ import re
 import signal
 import sys
 from collections.abc import Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -39,10 +39,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Matrices are small: BLAS threads cost more than they bring.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        # Protect only files inside a study's results.
-        with watch_writes(_refuse_others) if options.recorded else nullcontext():
-            options.command(options)
-            sys.stdout.flush()
+        options.command(options)
+        sys.stdout.flush()
     except BiogripError as error:
         print(f"biogrip: {visible_lines(error)}", file=sys.stderr)
         return 1
@@ -99,7 +97,7 @@ def _models() -> str:
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="biogrip", description=__doc__)
-    parser.set_defaults(recorded=False, status=0)
+    parser.set_defaults(status=0)
     parser.add_argument("--version", action="version", version=f"biogrip {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
@@ -129,7 +127,7 @@ def _parser() -> argparse.ArgumentParser:
 
     text = "make products of the study that was last run here, as its jobs do"
     make = commands.add_parser("make", help=text, description=text)
-    make.set_defaults(command=_make, recorded=True)
+    make.set_defaults(command=_make)
     make.examples = _examples(
         "make errors_of_case --case liquid_drop_1",
         "make identification --case liquid_drop_1 --method genetic --batch seeds_0-49",
@@ -158,14 +156,6 @@ def _parser() -> argparse.ArgumentParser:
         parser_of.add_argument(
             "results", type=Path, nargs="?", default=RESULTS, help="folder [%(default)s]"
         )
-
-    text = "pack a finished study, with what it was run on, as a Workflow Run RO-Crate"
-    crate = commands.add_parser("crate", help=text, description=text)
-    crate.set_defaults(command=_crate, recorded=True)
-    crate.examples = _examples("crate", "crate --output study.zip")
-    crate.add_argument(
-        "--output", type=Path, default=RESULTS / "crate.zip", help="ZIP file [%(default)s]"
-    )
 
     publish = commands.add_parser("publish", help="renew published tables and figures")
     publish.set_defaults(command=_publish)
@@ -431,7 +421,8 @@ def _make(options: argparse.Namespace) -> None:
     names = ("case", "method", "batch", "sweep", "seed", "rows")
     given = {name: getattr(options, name) for name in names}
     job = {name: text for name, text in given.items() if text}
-    make(options.products, job, RESULTS, options.made_for)
+    with watch_writes(_refuse_others):
+        make(options.products, job, RESULTS, options.made_for)
 
 
 def _identify(options: argparse.Namespace) -> None:
@@ -526,15 +517,6 @@ def _clean(options: argparse.Namespace) -> None:
     from biogrip.running.clean import clean
 
     print(visible_lines(clean(options.results)))
-
-
-def _crate(options: argparse.Namespace) -> None:
-    from biogrip.running.crate import write_crate
-    from biogrip.running.journal import recorded_in
-
-    with recorded_in(RESULTS):
-        said = write_crate(RESULTS, options.output)
-    print(visible_lines(said))
 
 
 def _publish(options: argparse.Namespace) -> None:

@@ -42,7 +42,6 @@ LEFT = {
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
     ],
-    "howto/crate.md": ["study.zip"],
     "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
     "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
     # These change the copy's code.
@@ -81,13 +80,8 @@ def test_every_howto_is_followed() -> None:
 
 
 @pytest.mark.parametrize("document", LEFT)
-def test_what_is_said_can_be_done(
-    document: str, place: Tree, request: pytest.FixtureRequest
-) -> None:
+def test_what_is_said_can_be_done(document: str, place: Tree) -> None:
     shutil.rmtree(place.root / "results", ignore_errors=True)
-    if document == "howto/crate.md":
-        finished: Path = request.getfixturevalue("tiny")
-        shutil.copytree(finished / "results", place.root / "results")
     text = (ROOT / "docs" / document).read_text(encoding="utf-8")
     # Most bring a case of their own.
     needed = "cases:" not in text or "[liquid_drop_2]" in text

@@ -6,8 +6,6 @@ from math import exp
 from pathlib import Path
 from typing import Any
 
-from tabulate import tabulate
-
 from biogrip import __version__
 from biogrip.digits import rounded_numbers
 from biogrip.errors import BiogripError, nearest
@@ -34,7 +32,7 @@ from biogrip.study.named_blocks import read_named_blocks
 from biogrip.study.sheet import Cell, cells_of, read_sheet
 from biogrip.study.study import Case
 from biogrip.study.trace_file import trace_file_problem
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import aligned, visible, visible_lines
 
 _LIMITS = (
     "Limits are statistical only: all cells share the gripper, whose uncertainty changes their "
@@ -378,7 +376,7 @@ def _cell_in_words(cell: dict[str, Any], found: dict[str, Any]) -> str:
 
 def _groups_in_words(rows: list[dict[str, Any]], percent: str) -> str:
     header, table = group_rows(rows, percent)
-    return _table(table, header)
+    return aligned(table, header)
 
 
 def group_rows(rows: Iterable[dict[str, Any]], percent: str) -> tuple[list[str], list[list[str]]]:
@@ -430,7 +428,7 @@ def _not_determined_in_words(rows: list[dict[str, Any]]) -> list[str]:
 
 def _differences_in_words(rows: list[dict[str, Any]], percent: str) -> str:
     header, table = difference_rows(rows, percent)
-    return _table(table, header)
+    return aligned(table, header)
 
 
 def difference_rows(
@@ -460,7 +458,3 @@ def difference_rows(
         *("by ranks", f"ratio found in {100 * USUAL_POWER:g} %"),
     ]
     return header, table
-
-
-def _table(rows: list[list[str]], header: list[str]) -> str:
-    return str(tabulate(rows, header, disable_numparse=True))

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from tabulate import tabulate
 
 from biogrip.digits import with_unit
 from biogrip.identifiability.fit_status import OK, REJECTED
@@ -19,7 +18,7 @@ from biogrip.identifiability.verdicts import (
 )
 from biogrip.products.files.verdicts import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
-from biogrip.terminal import visible, visible_lines
+from biogrip.terminal import aligned, visible, visible_lines
 
 STRONG = 3.0
 """Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
@@ -185,7 +184,7 @@ def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str])
         rows = [[visible(each["trace"]), each["fit"], *_cells(each, labels)] for each in found]
         units = {q["quantity"]: q["unit"] for each in found for q in each["quantities"]}
         header = ["trace", "fit", *(with_unit(label, units[label]) for label in labels)]
-        lines.append(tabulate(rows, header, tablefmt="simple", disable_numparse=True))
+        lines.append(aligned(rows, header))
         lines.append(f"{100 * found[0]['confidence']:g} % limits; ? where the trace tells nothing.")
         lines += [*one_sided_in_words(found), *_once(found, lambda each: [each["limits"]])]
         lines += _once(found, _provided)
