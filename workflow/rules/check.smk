@@ -13,7 +13,6 @@ OVERLAYS = {
     ),
     "design": (["design", "designed"], "all_designs", "designed*"),
     "sequential": (["sequential"], "all_sequences", "sequential*"),
-    "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     "measured": (["measured"], "all", "*"),
     "moduli": (["moduli"], "all_moduli", "modulus_bands*"),

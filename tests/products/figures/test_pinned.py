@@ -18,12 +18,10 @@ from matplotlib.image import imread
 from PIL import Image
 
 from biogrip.arrays import Array
-from biogrip.experiment.sample import MODELS
 from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
 from biogrip.products.figures import declared, designed_map, modulus_bands, sequential
 from biogrip.products.figures import robustness as heat_map
-from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
@@ -74,7 +72,6 @@ HEAT_MAPS = "robustness_level"
 # Those of overlays, by what they are drawn from here.
 OTHERS = {
     HEAT_MAPS: "robustness_figure",
-    "posterior_made_up": "posterior_figure",
     "designed_map": "designed_map",
     "sequential": "sequential_figure",
     "groups_made_up": "groups_figure",
@@ -166,9 +163,7 @@ def figure(
             return sequential.draw(cell, rows)
         if request.param == "groups_made_up":
             return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
-        if request.param == "modulus_bands_made_up":
-            return _bands(tmp_path_factory.mktemp("moduli") / "moduli.json")
-        return _corner()
+        return _bands(tmp_path_factory.mktemp("moduli") / "moduli.json")
 
 
 def _groups(data: Path) -> Figure:
@@ -201,23 +196,6 @@ def _bands(limits: Path) -> Figure:
     said = {"fit": "ok", "unit": "N/m", "confidence": 0.95, "moduli": moduli}
     limits.write_text(json.dumps(said))
     return modulus_bands.draw(STUDY.cases["liquid_drop_2"], limits)
-
-
-def _corner() -> Figure:
-    """Two parameters that trade, and one of which nothing is known, made up."""
-    rng = np.random.default_rng(0)
-    first, second = rng.standard_normal((2, 4000))
-    logs = np.stack((first, 0.3 * second - first, rng.uniform(-9, 0, 4000)), axis=1)
-    parameters = MODELS["liquid_drop"].parameters
-    told = [
-        {"quantity": p.name, "median": m, "low": low, "high": high}
-        for p, (low, m, high) in zip(
-            parameters, np.exp(np.quantile(logs, (0.025, 0.5, 0.975), axis=0)).T, strict=True
-        )
-    ]
-    truth = {p.name: 1.0 for p in parameters[:2]}
-    said = {"quantities": told, "confidence": 0.95}
-    return draw_corner(parameters, np.exp(logs), said, truth, "made up")
 
 
 @pytest.fixture
