@@ -49,7 +49,6 @@ OVERLAYS = [
 ] + [
     ("design.yaml", "designed.yaml"),
     ("soft.yaml", "soft_designed.yaml"),
-    ("measured.yaml", "moduli.yaml"),
 ]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 

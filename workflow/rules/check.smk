@@ -15,9 +15,6 @@ OVERLAYS = {
     "sequential": (["sequential"], "all_sequences", "sequential*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     "measured": (["measured"], "all", "*"),
-    "moduli": (["moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_recorded": (["recorded", "moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_measured": (["measured", "moduli"], "all_moduli", "modulus_bands*"),
     "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),

@@ -84,9 +84,6 @@ class Identifiability(Block):
     verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 25
     """One in so many of these seeds also gets the verdicts that users are shown, from whole
     profiles. By default 25; with 1 a table counts them."""
-    moduli: bool = False
-    """True for the limits that the first trace sets storage and loss modulus over frequency, as a
-    figure and a table: some seconds a case. By default false."""
 
 
 class Shared(Checked, BaseModel):

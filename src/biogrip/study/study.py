@@ -87,8 +87,6 @@ class Case:
     """Confidence level of all intervals."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     """Seeds of the coverage test that are multiples of this get verdicts, too."""
-    profiles_moduli = _of_case(lambda case: case.block.identifiability.moduli)
-    """True if the limits of moduli over frequency are computed."""
 
     @property
     def title(self) -> str:
@@ -422,11 +420,6 @@ class Study:
     def covered(self) -> list[str]:
         """Names of cases whose intervals are tested for coverage."""
         return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
-
-    @property
-    def with_moduli(self) -> list[str]:
-        """Names of cases whose moduli over frequency get limits."""
-        return [name for name, case in self.cases.items() if case.profiles_moduli]
 
     @property
     def published(self) -> list[str]:

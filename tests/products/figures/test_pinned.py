@@ -20,7 +20,7 @@ from PIL import Image
 from biogrip.arrays import Array
 from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared, designed_map, modulus_bands, sequential
+from biogrip.products.figures import declared, designed_map, sequential
 from biogrip.products.figures import robustness as heat_map
 from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
@@ -75,7 +75,6 @@ OTHERS = {
     "designed_map": "designed_map",
     "sequential": "sequential_figure",
     "groups_made_up": "groups_figure",
-    "modulus_bands_made_up": "modulus_bands_figure",
 }
 NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
@@ -161,9 +160,7 @@ def figure(
             cell = STUDY.cases["endothelial_cell"]
             rows = made_up(tmp_path_factory.mktemp("cells"))
             return sequential.draw(cell, rows)
-        if request.param == "groups_made_up":
-            return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
-        return _bands(tmp_path_factory.mktemp("moduli") / "moduli.json")
+        return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
 
 
 def _groups(data: Path) -> Figure:
@@ -182,20 +179,6 @@ def _groups(data: Path) -> Figure:
         groups.append({"group": group, "quantity": "k", "unit": "N/m", **median})
     data.write_text(json.dumps({"cells": cells, "groups": groups}))
     return groups_of_study.draw_groups(None, data)
-
-
-def _bands(limits: Path) -> Figure:
-    """Moduli with limits on both sides, on one and on none, made up."""
-    moduli = [
-        {"part": part, "rad_per_s": omega, "value": value}
-        | {"low": value / 2 if place < 5 else None, "high": 3 * value if place > 1 else None}
-        for part in ("storage", "loss")
-        for place, omega in enumerate(np.geomspace(1e-3, 1e2, 8).tolist())
-        for value in [0.5 + omega ** {"storage": 0.2, "loss": 0.7}[part]]
-    ]
-    said = {"fit": "ok", "unit": "N/m", "confidence": 0.95, "moduli": moduli}
-    limits.write_text(json.dumps(said))
-    return modulus_bands.draw(STUDY.cases["liquid_drop_2"], limits)
 
 
 @pytest.fixture
