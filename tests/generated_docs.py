@@ -39,7 +39,6 @@ ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
 SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
 MEMORY = PUBLISHED / "design_memory" / "tables" / "design_memory.csv"
-CALIBRATION = PUBLISHED / "posterior_calibration" / "tables" / "posterior_calibration.csv"
 
 _CASES = {
     "endothelial_cell": "the cell",
@@ -316,23 +315,6 @@ def unequal_dishes() -> str:
     )
 
 
-def posterior_calibration() -> str:
-    """Whether ranks of true values among samples of posteriors are uniform."""
-    if not CALIBRATION.is_file():
-        return "(Not yet published.)"
-    return _table(
-        {
-            "draws": f"{row['part']}, {row['draws']}",
-            "quantity": row["quantity"],
-            "p-value": f"{row['p_value']:.2g}",
-            "in bins": f"{row['p_value_binned']:.2g}",
-            "in the 50 % interval": f"{row['coverage_50_percent']:.3g} %",
-            "in the 95 % interval": f"{row['coverage_95_percent']:.3g} %",
-        }
-        for row in pd.read_csv(CALIBRATION).to_dict("records")
-    )
-
-
 def identified_example() -> str:
     """What `biogrip identify` prints of the quantities of the example."""
     with TemporaryDirectory() as folder, redirect_stdout(StringIO()) as said:
@@ -430,7 +412,6 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
         "shapes": bounds_by_shape,
         "memory": bounds_by_memory,
     },
-    ROOT / "docs" / "posterior.md": {"calibration": posterior_calibration},
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }
 """Parts of documents that are written, by what."""

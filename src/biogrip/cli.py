@@ -190,8 +190,7 @@ def _identify_parser(stages: Any) -> None:
     identify.examples = _examples(
         "identify cell.csv --config my_gripper.yaml --model liquid_drop --report page.html",
         "identify cells.tsv --config my_gripper.yaml --csv found.csv",
-        cost="A trace takes seconds, most of them for comparing the sample models; --posterior "
-        "takes some more.",
+        cost="A trace takes seconds, most of them for comparing the sample models.",
     )
     identify.add_argument(
         "traces",
@@ -202,9 +201,6 @@ def _identify_parser(stages: Any) -> None:
         "row for each trace, its cell, factors and keys of the config",
     )
     _trace_options(identify)
-    identify.add_argument(
-        "--posterior", action="store_true", help="also sample the posterior: some seconds per trace"
-    )
     identify.add_argument(
         "--strict", action="store_true", help="end with status 1 if a fit is rejected"
     )
@@ -436,7 +432,6 @@ def _identify(options: argparse.Namespace) -> None:
         output=options.output,
         report=options.report,
         table=options.csv,
-        posterior=options.posterior,
         fixed=_fixed(options.fix),
         strict=options.strict,
         force=options.force,

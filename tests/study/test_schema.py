@@ -102,7 +102,7 @@ def test_the_schema_marks_what_the_study_refuses(text: str) -> None:
         ("gripper.left", "1"),
         ("measurement.file", "b.csv"),
         ("measurement.rate_Hz", "1"),
-        ("posterior.draws", "1"),
+        ("identifiability.confidence", "0.9"),
     ],
 )
 def test_the_schema_of_a_row_allows_what_the_reader_does(

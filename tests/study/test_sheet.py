@@ -169,7 +169,10 @@ def test_a_key_is_laid_over_the_block_that_its_row_names(folder: Path) -> None:
         ),
         ("file,measurement.file\na.csv,1\n", "is said by the column 'file'."),
         ("file,measurement.rate_Hz\na.csv,1\n", "is of simulated traces; leave it out."),
-        ("file,posterior.draws\na.csv,1\n", "is for all traces; allowed is to say it in the conf"),
+        (
+            "file,identifiability.confidence\na.csv,0.9\n",
+            "is for all traces; allowed is to say it in the conf",
+        ),
         ("file,fix.k,fixed.k\na.csv,1,1\n", "column 'fixed.k': says the same as 'fix.k'"),
         (
             "file,measurement.noise_rad\na.csv,-1\n",

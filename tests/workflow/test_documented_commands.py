@@ -33,7 +33,7 @@ LEFT = {
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
-        *("maxwell.json", "uncertain.json", "posterior.json", "posterior.parquet"),
+        *("maxwell.json", "uncertain.json"),
     ],
     "howto/dish.md": ["results/traces.html", "results/tables/group_differences.csv"],
     "howto/creep.md": ["mucus.json", "hl60.json"],
@@ -42,6 +42,7 @@ LEFT = {
         *("results/tables/verdicts_noisy_drop.md", "results/figures/robustness_levels.png"),
         "results/tables/robustness_levels.md",
     ],
+    "howto/posterior.md": [],
     "howto/doubts.md": ["found.json", "page.html", "coloured.json"],
     "howto/module.md": ["lab/mine.csv", "lab/results/tables/errors_my_cell.csv"],
     # These change the copy's code.
@@ -54,12 +55,11 @@ LOOKED_AT = {
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
 # A trace fitted from few starts, with few models, of which the chosen one has two parameters unless
-# the document says which; where it is asked for, a short posterior.
+# the document says which.
 TINY_FIT = """
 least_squares: {candidates: 50, starts: 3}
 model_selection: {models: [damper, maxwell]}
 """
-SHORT = "posterior: {walkers: 20, most_steps: 1000}\n"
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,6 @@ def test_what_is_said_can_be_done(document: str, place: Tree) -> None:
     needed = "cases:" not in text or "[liquid_drop_2]" in text
     (place.root / "tiny.yaml").write_text(TINY if needed else f"{TINY}  liquid_drop_2: null\n")
     (place.root / "tiny_fit.yaml").write_text(TINY_FIT)
-    (place.root / "short.yaml").write_text(TINY_FIT + SHORT)
     blocks = BLOCK.findall(text)
     # Else the copy's code is the repository's, which is loaded already.
     own_code = any(title.endswith((".py", ".diff")) for _, title, _ in blocks)
@@ -115,9 +114,8 @@ def _typed(arguments: list[str]) -> list[str]:
     if arguments[0] == "run":
         return ["run", "tiny.yaml", *arguments[1:], *LOOKED_AT.get(arguments[-1], [])]
     if arguments[0] == "identify" and "--config" not in arguments:
-        config = "short.yaml" if "--posterior" in arguments else "tiny_fit.yaml"
         model = [] if "--model" in arguments else ["--model", "maxwell"]
-        return [*arguments, *model, "--config", config]
+        return [*arguments, *model, "--config", "tiny_fit.yaml"]
     return arguments
 
 

@@ -13,16 +13,12 @@ OVERLAYS = {
     ),
     "design": (["design", "designed"], "all_designs", "designed*"),
     "sequential": (["sequential"], "all_sequences", "sequential*"),
-    "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     # Errors, verdicts and coverage.
     "calibration": (["calibration"], "all_tables", "[cev][eor][rv]*"),
     "measured": (["measured"], "all", "*"),
     "power_law": (["power_law"], "all_tables", "[cev][eor][rv]*"),
     "recorded": (["recorded"], "all_tables", "[cev][eor][rv]*"),
-    "moduli": (["moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_recorded": (["recorded", "moduli"], "all_moduli", "modulus_bands*"),
-    "moduli_measured": (["measured", "moduli"], "all_moduli", "modulus_bands*"),
     "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),

@@ -9,7 +9,7 @@ from biogrip.files import refuse_inputs
 from biogrip.identifiability.fit_status import REJECTED
 from biogrip.own_traces.many_traces import Outcome, identify_traces, write_table
 from biogrip.own_traces.one_trace import IdentifyOptions, check_trace_file
-from biogrip.own_traces.outputs import SAMPLES, check_output
+from biogrip.own_traces.outputs import check_output
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.own_traces.rows_of_sheets import cases_of, with_row
 from biogrip.own_traces.words import in_words, side_by_side
@@ -29,7 +29,6 @@ def identify(
     output: Path | None,
     report: Path | None,
     table: Path | None,
-    posterior: bool,
     fixed: Mapping[str, float],
     strict: bool,
     force: bool,
@@ -46,8 +45,8 @@ def identify(
         JSON file of a single trace. By default each trace has one beside it.
     report, table
         HTML and CSV file to write, if any.
-    posterior, fixed
-        Fields of `IdentifyOptions`.
+    fixed
+        Field of `IdentifyOptions`.
     strict
         If true, a rejected fit counts as a failure.
     force
@@ -68,19 +67,17 @@ def identify(
     problems = {trace: trace_file_problem(trace) for trace in traces}
     absent = {str(trace): f"TRACE: {words}" for trace, words in problems.items() if words}
     there = [trace for trace in dict.fromkeys(traces) if str(trace) not in absent]
-    options = IdentifyOptions((there or traces)[0], model, read_as, config, posterior, fixed)
+    options = IdentifyOptions((there or traces)[0], model, read_as, config, fixed)
     sheets = [trace for trace in there if is_sheet(trace)]
     every = _with_rows(options, there, sheets)
     alone = len(every) + len(absent) == 1
     if output is not None and not alone:
         raise BiogripError("--output: only for one trace; each of several gets its own file.")
-    samples = posterior
     if every and (sheets or not alone or config is not None):
         # Errors of options and config concern all traces: raise them once, here.
-        samples = cases_of(every)[0].posterior is not None
+        cases_of(every)
     outputs = [output or each.trace.with_suffix(".identified.json") for each in every]
-    drawn = [path.with_suffix(SAMPLES) for path in outputs] if samples else []
-    written = [*outputs, *drawn, *filter(None, (report, table))]
+    written = [*outputs, *filter(None, (report, table))]
     if len({path.absolute() for path in written}) < len(written):
         raise BiogripError("found the same file to be written twice; allowed are different ones.")
     read = [*traces, *(each.trace for each in every), *filter(None, [config])]
@@ -100,7 +97,6 @@ def identify(
     print(in_words(outcome.found[0]) if alone else _of_many(outcome))
     by_trace = {str(each.trace): path for each, path in zip(every, outputs, strict=True)}
     said = [by_trace[each["trace"]] for each in outcome.found]
-    said += [path.with_suffix(SAMPLES) for path in said if samples]
     said += [path for path in (report, table) if path is not None]
     print(f"Written to {', '.join(map(visible, said))}.")
     rejected = strict and any(each["fit"] == REJECTED for each in outcome.found)

@@ -5,11 +5,9 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
 
 from biogrip.digits import with_unit
 from biogrip.identifiability.fit_status import OK, REJECTED
-from biogrip.identifiability.marginals import AGREES
 from biogrip.identifiability.verdicts import (
     BOUNDED_ABOVE,
     BOUNDED_BELOW,
@@ -19,14 +17,6 @@ from biogrip.identifiability.verdicts import (
 from biogrip.products.files.verdicts import FIT_REJECTED
 from biogrip.study.measurement_block import KNOWN_NOISE
 from biogrip.terminal import aligned, visible, visible_lines
-
-STRONG = 3.0
-"""Natural logarithm of a ratio of evidences that counts as strong (Kass and Raftery 1995)."""
-
-POSTERIOR_OF_REJECTED = (
-    "The posterior assumes the model and set-up that are rejected, so it is not shown."
-)
-"""Sentence in the place of the posterior of a rejected fit."""
 
 _COLOURS = {
     DETERMINED: 32,
@@ -63,9 +53,6 @@ def in_words(found: Mapping[str, Any]) -> str:
         lines.append(f"Drift of the instrument: {in_unit(found['drift_rad_per_s'], found)}/s")
     lines += [f"Note: {visible(text)}" for text in further_notes(found)]
     lines += [found["advice"]] if found["advice"] else []
-    if "posterior" in found:
-        rejected = found["fit"] == REJECTED
-        lines += [POSTERIOR_OF_REJECTED] if rejected else _posterior(found["posterior"])
     lines += [taken_for_granted(found)] if found["by_default"] else []
     return "\n".join(lines)
 
@@ -139,41 +126,6 @@ def _number_in_latex(value: float) -> str:
 def further_notes(found: Mapping[str, Any]) -> list[str]:
     """Return the texts of the notes that are no reasons for the fit's status."""
     return [note["text"] for note in found["notes"] if note["text"] not in found["reasons"]]
-
-
-def _posterior(posterior: Mapping[str, Any]) -> list[str]:
-    """Return sentences and a table about the posterior samples."""
-    width = max(len(item["quantity"]) for item in posterior["quantities"])
-    prior = (
-        f"prior: {', '.join(posterior['prior'])} as given, else log-uniform over the search range"
-        if posterior["prior"]
-        else "prior: log-uniform over the search range"
-    )
-    return [
-        f"Posterior, median and {100 * posterior['confidence']:g} % interval ({prior}):",
-        *(f"  {item['quantity']:<{width}}  {item['in_words']}" for item in posterior["quantities"]),
-        *(
-            f"  {item['why']}"
-            for item in posterior["quantities"]
-            if item["against_profile"] != AGREES
-        ),
-        posterior["in_words"],
-        posterior["prior_in_words"],
-        *evidence_in_words(posterior["evidence"]),
-    ]
-
-
-def evidence_in_words(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a sentence on the models with the highest evidence; nothing if none was computed."""
-    if not rows:
-        return []
-    best = min(rows, key=lambda row: row["delta_log_evidence"])
-    close = [row for row in rows if row is not best and row["delta_log_evidence"] < STRONG]
-    near = ", ".join(row["title"] for row in close)
-    also = f"; less than {np.exp(STRONG):.2g} times lower is that of {near}" if near else ""
-    unreliable = [row["title"] for row in rows if not row["reliable"]]
-    but = f" Not to be relied on: {', '.join(unreliable)}." if unreliable else ""
-    return [f"The evidence is highest for the {best['title']}{also}.{but}"]
 
 
 def side_by_side(found: Sequence[Mapping[str, Any]], refused: Mapping[str, str]) -> str:

@@ -28,8 +28,6 @@ GROUPS = {
     "maps": "robustness_*",
     "designs": "designed*",
     "sequences": "sequential*",
-    "posteriors": "posterior*",
-    "moduli": "modulus_bands*",
 }
 """Patterns of results that a rule asks for together, see `pathlib.PurePath.match`."""
 

@@ -17,7 +17,6 @@ from biogrip.errors import BiogripError, nearest
 from biogrip.experiment.sample import Parameter
 from biogrip.experiment.springpot import LONGEST_S, SHORTEST_S
 from biogrip.experiment.truth import Published
-from biogrip.identifiability.posterior_settings import PosteriorSettings
 from biogrip.identify.genome import GeneRange
 from biogrip.identify.methods import METHODS, block_class
 from biogrip.instrument.actuator import CombDrive
@@ -85,9 +84,6 @@ class Identifiability(Block):
     verdicts_every: Annotated[int, Field(ge=1, le=1_000_000)] = 25
     """One in so many of these seeds also gets the verdicts that users are shown, from whole
     profiles. By default 25; with 1 a table counts them."""
-    moduli: bool = False
-    """True for the limits that the first trace sets storage and loss modulus over frequency, as a
-    figure and a table: some seconds a case. By default false."""
 
 
 class Shared(Checked, BaseModel):
@@ -122,13 +118,6 @@ class Shared(Checked, BaseModel):
     ]
     identifiability: Identifiability
     design: DesignSettings | None = None
-    posterior: Annotated[
-        PosteriorSettings | None,
-        Field(
-            description="Settings of posterior sampling for the first trace; it is sampled if this "
-            "block is there, even an empty one, `{}`."
-        ),
-    ] = None
     fixed: Annotated[
         Mapping[str, Annotated[float, Field(ge=0, le=LARGEST_PARAMETER)]] | None,
         Field(
@@ -248,7 +237,6 @@ class CaseBlock(Shared):
         yield from self._exposure_problems()
         yield from self._design_problems()
         yield from self._method_problems()
-        yield from self._posterior_problems()
         if self.sample.sample.model.power_law:
             yield from self._band_problems()
         if not self.recorded:
@@ -353,16 +341,6 @@ class CaseBlock(Shared):
             if hasattr(settings, "problems_of"):
                 for path, text in settings.problems_of(self._genes):
                     yield (name, *path), text
-
-    def _posterior_problems(self) -> Iterator[Problem]:
-        if self.posterior is None:
-            return
-        if self.models.identification != "linear":
-            text = "is sampled with hundreds of thousands of responses; allowed with it is "
-            yield ("posterior",), f"{text}models.identification: linear."
-        model = self.sample.sample.model
-        for path, text in self.posterior.problems_of(model, list(self.known)):
-            yield ("posterior", *path), text
 
     def _unreachable_problems(self) -> Iterator[Problem]:
         """Find true values outside the decades that are searched."""

@@ -85,12 +85,8 @@ class Case:
     """Settings of the calibration test without sample."""
     confidence = _of_case(lambda case: case.block.identifiability.confidence)
     """Confidence level of all intervals."""
-    posterior = _of_case(lambda case: case.block.posterior)
-    """Settings of posterior sampling, if the posterior is sampled."""
     verdicts_every = _of_case(lambda case: case.block.identifiability.verdicts_every)
     """Seeds of the coverage test that are multiples of this get verdicts, too."""
-    profiles_moduli = _of_case(lambda case: case.block.identifiability.moduli)
-    """True if the limits of moduli over frequency are computed."""
 
     @property
     def title(self) -> str:
@@ -246,12 +242,6 @@ class Case:
         names = (*self.study.config.model_selection.models, self.sample.candidate)
         per_area = self.instrument.per_area
         return {name: replace(CANDIDATES[name], per_area=per_area) for name in names}
-
-    @property
-    def compared_models(self) -> dict[str, Sample]:
-        """Sample models whose evidence is compared, by name; none if it is not asked for."""
-        compared = self.posterior and self.posterior.evidence and not self.fixed
-        return self.models if compared else {}
 
     @property
     def coverage_seeds(self) -> int:
@@ -430,16 +420,6 @@ class Study:
     def covered(self) -> list[str]:
         """Names of cases whose intervals are tested for coverage."""
         return [name for name, case in self.cases.items() if case.coverage_seeds > 0]
-
-    @property
-    def sampled(self) -> list[str]:
-        """Names of cases whose posterior is sampled."""
-        return [name for name, case in self.cases.items() if case.posterior is not None]
-
-    @property
-    def with_moduli(self) -> list[str]:
-        """Names of cases whose moduli over frequency get limits."""
-        return [name for name, case in self.cases.items() if case.profiles_moduli]
 
     @property
     def published(self) -> list[str]:
