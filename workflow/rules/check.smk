@@ -11,8 +11,6 @@ OVERLAYS = {
         "interpretations interpretations_jointly",
         "interpretations*",
     ),
-    "design": (["design", "designed"], "all_designs", "designed*"),
-    "sequential": (["sequential"], "all_sequences", "sequential*"),
     "posterior": (["posterior"], "all_posteriors", "posterior*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     "measured": (["measured"], "all", "*"),
@@ -22,7 +20,6 @@ OVERLAYS = {
     "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
-    "soft_design": (["soft", "soft_designed"], "designed", "designed"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 

@@ -26,8 +26,6 @@ _CONSTRAINTS = {
 GROUPS = {
     "tables": "results/tables/*",
     "maps": "robustness_*",
-    "designs": "designed*",
-    "sequences": "sequential*",
     "posteriors": "posterior*",
     "moduli": "modulus_bands*",
 }

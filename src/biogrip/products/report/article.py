@@ -34,15 +34,12 @@ PUBLISHED = "results/published"
 # By the folder that they are published in, which names the rule that makes them.
 SWEEP_TABLES = (
     "coverage/tables/verdict_counts.csv",
-    "design/tables/designed.csv",
     "interpretations/tables/interpretations.csv",
     "interpretations/tables/interpretations_jointly.csv",
     "robustness/tables/robustness_gripper.csv",
     "robustness/tables/robustness_noise.csv",
-    "sequential/tables/sequential.csv",
 )
 SWEEP_FIGURES = (
-    "design/figures/designed_map_endothelial_cell.pdf",
     "robustness/figures/robustness_noise.pdf",
 )
 BENCHMARKS = "benchmarks/results/benchmarks.json"
