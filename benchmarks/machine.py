@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import psutil
 
-PEERS = ("clarabel", "cvxpy", "deap", "lmfit", "pygad", "pymoo", "pypesto")
+PEERS = ("deap", "lmfit", "pygad", "pymoo", "pypesto")
 
 
 def machine(peers: Sequence[str] = PEERS) -> dict[str, str]:

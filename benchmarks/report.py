@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import identification, misfit
-from benchmarks.designed_sampling import sampling_section
-from benchmarks.designs import designs_section
 from benchmarks.growth import growth_section
 from benchmarks.identification import identification_section
 from benchmarks.limit import limit_section
@@ -33,8 +31,6 @@ SECTIONS: Mapping[str, Callable[[], Section]] = {
     "nonlinear": nonlinear_section,
     "local_fits": local_fits_section,
     "profiles": profiles_section,
-    "sampling": sampling_section,
-    "designs": designs_section,
     "metaheuristics": metaheuristics_section,
     "growth": growth_section,
     "limit": limit_section,

@@ -14,14 +14,9 @@ import yaml
 
 from benchmarks.batch import in_batch
 from benchmarks.budget import Search, Spent, evaluations_99
-from benchmarks.designs import CYCLES, TRAINS
-from benchmarks.designs import FAMILY as NOT_CLIMBED
-from benchmarks.designs import OURS as CLIMBED
-from benchmarks.designs import compared as compared_designs
 from benchmarks.limit import watch_writes, watched_fits, watched_identification
 from benchmarks.misfit import by_lsim, by_radau, in_blocks, misfit_50_digits, vectorised
 from benchmarks.nonlinear import by_radau as nonlinear_by_radau
-from benchmarks.sampling_gap import feasible, gap_of, typical_bound
 from benchmarks.scale import watch_writes as watched_processes
 from benchmarks.section import Section, number, renewed
 from benchmarks.setup import CONFIG, Problem, evolve, problem
@@ -29,14 +24,11 @@ from benchmarks.starts import fitted, started
 from benchmarks.study import by_rule, in_order, processor_s
 from benchmarks.timing import Timed, alternate
 from biogrip.arrays import Array, IntArray
-from biogrip.design.criteria import Criterion
-from biogrip.design.sampling import best_sampling
 from biogrip.identify.genome import Genome
 from biogrip.response.misfit_series import SeriesMisfit
 from biogrip.response.nonlinear import nonlinear_rotation
 from biogrip.study.load import load_study
 from biogrip.study.study import Study
-from tests.design.test_plan import DROP
 
 if TYPE_CHECKING:
     from benchmarks.genetic_peers import Task
@@ -220,32 +212,6 @@ def test_numbers_are_printed_short(value: float, printed: str) -> None:
     assert number(value) == printed
 
 
-@pytest.mark.parametrize(("criterion", "weights"), [("D", (1, 1, 1)), ("A", (3, 6, 3))])
-def test_the_gap_of_a_sampling(criterion: str, weights: tuple[int, int, int]) -> None:
-    """A parabola on [-1, 1]: the best weights are known (Pukelsheim, section 9.5)."""
-    x = np.linspace(-1, 1, 21)
-    told, capacity = np.stack((np.ones_like(x), x, x**2)), np.full(21, 12.0)
-    best, worse = np.zeros((2, 21))
-    best[[0, 10, 20]] = np.array(weights) * 12 / sum(weights)
-    worse[[0, 4, 10, 20]] = 3.0
-    assert gap_of(told, capacity, best, criterion) == pytest.approx(0.0, abs=1e-9)
-    excess = typical_bound(told, worse, criterion) / typical_bound(told, best, criterion) - 1
-    assert 0.001 < excess <= gap_of(told, capacity, worse, criterion)
-    full = feasible(np.full(21, 30.0), capacity, 100)
-    assert full.sum() == pytest.approx(100)
-    assert full.max() <= 12
-
-
-def test_random_designs_are_rated_as_designs_are() -> None:
-    """Two of four ways search, two draw; none has more than the design that is climbed to."""
-    rows = compared_designs("drop", DROP, 1, 128, 60)
-    assert [row["way"] for row in rows] == [CLIMBED, NOT_CLIMBED, TRAINS, CYCLES]
-    assert [row["torques"] for row in rows[:2]] == [188, 128]
-    assert rows[0]["times_ours"] == 1
-    assert all(row["times_ours"] == row["bound"] / rows[0]["bound"] >= 1 for row in rows)
-    assert all(row["processor_s"] >= rows[0]["processor_s"] for row in rows[2:])
-
-
 def test_a_section_takes_its_place_in_the_report() -> None:
     def section(name: str, value: str) -> Section:
         return Section(
@@ -372,25 +338,6 @@ class TestPeers:
         assert [row["library"] for row in rows] == [OURS, SIDE_BY_SIDE, *PEERS]
         assert all(row["largest_chi2_above_best"] < 0.1 for row in rows)
         assert rows[0]["times_ours"] == rows[1]["times_side_by_side"] == 1.0
-
-    def test_samplings_are_as_good(self) -> None:
-        """Of random sensitivities, by Clarabel and by ours: the same to both gaps."""
-        pytest.importorskip("cvxpy")
-        from benchmarks.sampling_peers import by_cvxpy
-
-        rng = np.random.default_rng(4)
-        time_s = np.linspace(0.05, 4, 60)
-        told = 10 * np.exp(-rng.uniform(0.3, 3.0, (3, 1)) * time_s)
-        capacity = rng.integers(1, 8, 60).astype(float)
-        for name in ("D", "A"):
-            ours = best_sampling(
-                told[None], capacity, 80, Criterion(name, "worst", (0, 1, 2)), gap=1e-4, most=2000
-            ).samples
-            theirs = feasible(by_cvxpy(told, capacity, 80, name)[0], capacity, 80)
-            gaps = [gap_of(told, capacity, one, name) for one in (ours, theirs)]
-            assert max(gaps) < 1e-3
-            ratio = typical_bound(told, ours, name) / typical_bound(told, theirs, name)
-            assert 1 / (1 + gaps[1]) <= ratio * (1 + 1e-9) <= 1 + gaps[0] + 2e-9
 
     def test_limits_agree(self) -> None:
         pytest.importorskip("lmfit")

@@ -9,8 +9,8 @@ ROOT = Path(__file__).parents[1]
 SECTION = (ROOT / "CONTRIBUTING.md").read_text().partition("## Words\n")[2].partition("\n## ")[0]
 # Where a retired word has its plain meaning: a drift rises, figures and pages have colours.
 PLAIN = {
-    "rise": ("experiment", "design"),
-    "colour": ("figures", "own_design", "pages"),
+    "rise": ("experiment",),
+    "colour": ("figures", "pages"),
     "held": ("tables",),
 }
 

@@ -46,12 +46,8 @@ cases:
 OVERLAYS = [
     (file.name,)
     for file in sorted((ROOT / "config").glob("*.yaml"))
-    if file.name not in ("config.yaml", "designed.yaml", "soft_designed.yaml")
-] + [
-    ("design.yaml", "designed.yaml"),
-    ("soft.yaml", "soft_designed.yaml"),
-    ("measured.yaml", "moduli.yaml"),
-]
+    if file.name != "config.yaml"
+] + [("measured.yaml", "moduli.yaml")]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
 

@@ -21,7 +21,7 @@ from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS
 from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared, designed_map, modulus_bands, sequential
+from biogrip.products.figures import declared, modulus_bands
 from biogrip.products.figures import robustness as heat_map
 from biogrip.products.figures.corner import draw_corner
 from biogrip.products.figures.style import lay_out, styled
@@ -30,8 +30,6 @@ from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
 from tests.helpers.default import STUDY, plan_of, study_of
 from tests.helpers.runs import SMALL
-from tests.products.tables.test_designed import OVERLAY
-from tests.products.tables.test_sequential import made_up
 
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures, in which a line is still a line.
@@ -75,8 +73,6 @@ HEAT_MAPS = "robustness_level"
 OTHERS = {
     HEAT_MAPS: "robustness_figure",
     "posterior_made_up": "posterior_figure",
-    "designed_map": "designed_map",
-    "sequential": "sequential_figure",
     "groups_made_up": "groups_figure",
     "modulus_bands_made_up": "modulus_bands_figure",
 }
@@ -157,13 +153,6 @@ def figure(
         if request.param == HEAT_MAPS:
             study = study_of(SWEEP)
             return heat_map.draw(heat_maps(study, {"sweep": "level"}), judged)
-        if request.param == "designed_map":
-            designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed.case("endothelial_cell"))
-        if request.param == "sequential":
-            cell = STUDY.cases["endothelial_cell"]
-            rows = made_up(tmp_path_factory.mktemp("cells"))
-            return sequential.draw(cell, rows)
         if request.param == "groups_made_up":
             return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
         if request.param == "modulus_bands_made_up":
