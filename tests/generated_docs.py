@@ -34,11 +34,8 @@ VERDICTS = PUBLISHED / "tables"
 DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
 RANKS = DISHES.with_name("ranks.csv")
 POPULATIONS = DISHES.with_name("populations.csv")
-SEQUENTIAL = PUBLISHED / "sequential" / "tables" / "sequential.csv"
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
-SHAPES = PUBLISHED / "shapes" / "tables" / "designed_shapes.csv"
-MEMORY = PUBLISHED / "design_memory" / "tables" / "design_memory.csv"
 
 _CASES = {
     "endothelial_cell": "the cell",
@@ -52,12 +49,6 @@ _JUDGED_IN_NOISE = (
     (("endothelial_cell",), "k"),
     (("endothelial_cell",), "k_p"),
 )
-_WAYS = {
-    "the study's, repeated": "the paper's, repeated",
-    "each designed after those before": "the paper's, then each designed after those before",
-    "designed for the ranges, repeated": "one designed for all these cells, repeated",
-    "designed for the true cell, repeated": "one designed for the true cell, repeated",
-}
 # Of the independent fit of HL60's stretch, and of pyRheo's demonstrations.
 _MEASURED = {
     "hl60": {"alpha": 0.701},
@@ -211,55 +202,6 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
     return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
 
 
-def experiments_needed() -> str:
-    """In how many cells all parameters are known after some experiments, way by way."""
-    table = pd.read_csv(SEQUENTIAL).query("quantity == 'all'")
-    return _table(
-        {"all four determined, % of cells, after": _WAYS[way]}
-        | {
-            f"{row['experiments']} experiment{'s' * (row['experiments'] > 1)}": (
-                f"{row['determined_percent']:.0f}"
-            )
-            for row in rows.to_dict("records")
-        }
-        for way, rows in table.groupby("way", sort=False)
-    )
-
-
-def bounds_by_shape() -> str:
-    """What steps, sinusoids and ramps tell."""
-    table = pd.read_csv(SHAPES)
-    return _table(
-        {"torques": shape if shape != "ramps" else f"ramps of {shortest:g} ms and more"}
-        | {
-            f"{quantity} of {_CASES[case]} (%)": _bound(row["bound_percent"])
-            for row in rows.to_dict("records")
-            for case, quantity in [(row["case"], row["quantity"])]
-            if case == "endothelial_cell" or quantity == "c_p"
-        }
-        for (shape, shortest), rows in table.groupby(["shape", "shortest_ms"], sort=False)
-    )
-
-
-def bounds_by_memory() -> str:
-    """Worst bounds of the published designs by the memory of the noise."""
-    table = pd.read_csv(MEMORY).query("not along")
-    worst = table.groupby(["memory_s", "readings", "case"])["bound_percent"].max()
-    return _table(
-        {"memory": f"{memory:g} s" if memory else "none"}
-        | {
-            f"{name}, {readings} (%)": _bound(worst[memory, readings, case])
-            for case, name in _CASES.items()
-            for readings in ("published", "spread")
-        }
-        for memory in table["memory_s"].unique()
-    )
-
-
-def _bound(percent: float) -> str:
-    return "none" if math.isnan(percent) else f"{float(f'{percent:.2g}'):g}"
-
-
 def simulated_dishes() -> str:
     """How often differences between simulated dishes held the truth, and were found."""
     return _table(
@@ -406,11 +348,6 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
         "dishes": simulated_dishes,
         "populations": simulated_populations,
         "ranks": unequal_dishes,
-    },
-    ROOT / "docs" / "design.md": {
-        "sequential": experiments_needed,
-        "shapes": bounds_by_shape,
-        "memory": bounds_by_memory,
     },
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }

@@ -243,47 +243,15 @@ def _groups_parser(stages: Any) -> None:
 
 
 def _design_parser(stages: Any) -> None:
-    text = "design what to hold, and when to read, so that every parameter is determined"
+    text = "search for a train of steps that determines the samples of a config better"
     design = stages.add_parser("design", help=text, description=text)
-    design.set_defaults(command=_design, noise_model=None)
-    design.examples = _examples(
-        "design my_design.yaml --export generator",
-        "design my_design.yaml --after first.csv --output second.yaml",
-        cost="The search takes most, and grows with most_steps.",
+    design.set_defaults(command=_design)
+    design.examples = _examples("design my.yaml", cost="The search takes some ten seconds.")
+    design.add_argument(
+        "config", type=Path, help="YAML file with your samples, laid over the default study"
     )
     design.add_argument(
-        "configs",
-        type=Path,
-        nargs="+",
-        metavar="CONFIG",
-        help="YAML file with a block `design`, laid over the default study",
-    )
-    design.add_argument(
-        "--case", action="append", default=[], help="name of a case [all with such a block]"
-    )
-    design.add_argument(
-        "--after",
-        type=Path,
-        nargs="+",
-        action="append",
-        default=[],
-        metavar=("TRACE", "CONFIG"),
-        help="CSV file of an earlier trace, recorded as the config says, or as YAML files merged "
-        "over it say; repeat for every trace of the sample",
-    )
-    _reading_options(design)
-    design.add_argument(
-        "--output",
-        type=Path,
-        default=Path("designed.yaml"),
-        help="config for a study, YAML; a page is written beside it [%(default)s]",
-    )
-    design.add_argument(
-        "--export",
-        type=Path,
-        metavar="FOLDER",
-        help="write CASE_protocol.csv, volts for a generator, and CASE_readings.csv, instants for "
-        "a camera, too",
+        "--output", type=Path, help="config of the designed study, YAML [CONFIG_designed.yaml]"
     )
     design.add_argument(
         "--force", action="store_true", help="replace a file that biogrip did not write"
@@ -455,17 +423,9 @@ def _groups(options: argparse.Namespace) -> None:
 
 
 def _design(options: argparse.Namespace) -> None:
-    from biogrip.own_design.command import design
+    from biogrip.design import design
 
-    design(
-        options.configs,
-        options.case,
-        options.output,
-        after=options.after,
-        read_as=_read_as(options),
-        export=options.export,
-        force=options.force,
-    )
+    design(options.config, options.output, force=options.force)
 
 
 def _read_as(options: argparse.Namespace) -> "ReadAs":

@@ -45,10 +45,7 @@ cases:
 OVERLAYS = [
     (file.name,)
     for file in sorted((ROOT / "config").glob("*.yaml"))
-    if file.name not in ("config.yaml", "designed.yaml", "soft_designed.yaml")
-] + [
-    ("design.yaml", "designed.yaml"),
-    ("soft.yaml", "soft_designed.yaml"),
+    if file.name != "config.yaml"
 ]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 

@@ -11,8 +11,6 @@ OVERLAYS = {
         "interpretations interpretations_jointly",
         "interpretations*",
     ),
-    "design": (["design", "designed"], "all_designs", "designed*"),
-    "sequential": (["sequential"], "all_sequences", "sequential*"),
     "coverage": (["coverage"], "verdict_counts", "verdict_counts"),
     # Errors, verdicts and coverage.
     "calibration": (["calibration"], "all_tables", "[cev][eor][rv]*"),
@@ -22,7 +20,6 @@ OVERLAYS = {
     "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
-    "soft_design": (["soft", "soft_designed"], "designed", "designed"),
 }
 CONFIGS = Path(workflow.basedir) / "config"
 

@@ -34,7 +34,7 @@ class CaseProblem:
     gripper: Gripper
     """Gripper of the simulated responses."""
     phases: tuple[Phase, ...]
-    """The protocol, as averaged by what reads (`biogrip.experiment.exposure`)."""
+    """The protocol."""
     ranges: Mapping[str, GeneRange]
     """Search ranges by `Parameter.range_name`."""
     sample: Sample

@@ -26,8 +26,6 @@ _CONSTRAINTS = {
 GROUPS = {
     "tables": "results/tables/*",
     "maps": "robustness_*",
-    "designs": "designed*",
-    "sequences": "sequential*",
 }
 """Patterns of results that a rule asks for together, see `pathlib.PurePath.match`."""
 

@@ -25,9 +25,6 @@ _RETIRED: dict[tuple[Hashable, ...], str] = {
     "their inertia. Leave it out.",
     ("readings",): "now called `interpretations`.",
     ("noise", "relaxing"): "now called `ar1`.",
-    ("design", "samples"): "now called `readings`.",
-    ("design", "drawn"): "now called `plausible_samples`.",
-    ("design", "tried"): "now called `candidates`.",
 }
 
 _UNITS = ([*TIME_UNITS], [*ROTATION.units])

@@ -7,11 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
-from biogrip.design.settings import DesignSettings
-from biogrip.experiment.exposure import average
 from biogrip.experiment.protocol import Phase, torque_history
 from biogrip.experiment.sample import CANDIDATES, Sample, SampleModel, with_fixed
-from biogrip.experiment.sampling import Sampling
 from biogrip.experiment.truth import UNPUBLISHED, Truth
 from biogrip.identify.case_problem import CaseProblem
 from biogrip.identify.genetic_settings import GeneticSettings
@@ -129,11 +126,6 @@ class Case:
         return self.block.protocol.make_phases(self.instrument, self.actuator)
 
     @cached_property
-    def averaged(self) -> tuple[Phase, ...]:
-        """Phases that the readings follow: means over the exposure of each."""
-        return average(self.phases, self.block.measurement.exposure_s)
-
-    @cached_property
     def gripper(self) -> Gripper:
         """True gripper, at the angle at which the jaws touch the sample; or none."""
         if not self.instrument.has_jaws:
@@ -153,20 +145,9 @@ class Case:
         return stroke - self.block.gripper.contact(self.actuator, self.size_m).closing_rad
 
     @property
-    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
-        """Protocol and sampling."""
-        return self.phases, self.sampling
-
-    @property
     def searched(self) -> SampleModel:
         """Sample model without fixed parameters."""
         return self.problem.searched
-
-    @property
-    def design(self) -> DesignSettings:
-        """Inputs of designs for a case that has them."""
-        assert self.block.design is not None
-        return self.block.design
 
     @property
     def samples(self) -> int:
@@ -187,7 +168,7 @@ class Case:
             gripper = built(Gripper, overlaid(plain(gripper), assumed))
         return CaseProblem(
             gripper,
-            self.averaged,
+            self.phases,
             self.ranges,
             self.sample,
             self.fixed,
@@ -380,12 +361,6 @@ class Study:
         return (
             own.pop() if len(own) == 1 else self.config.protocol.make_phases(GRIPPER, self.actuator)
         )
-
-    @property
-    def experiment(self) -> tuple[tuple[Phase, ...], Sampling]:
-        """Protocol and sampling, for cases that do not change them."""
-        phases = self.config.protocol.make_phases(GRIPPER, self.config.actuator)
-        return phases, self.config.measurement.sampling
 
     @property
     def ranges(self) -> dict[str, GeneRange]:

@@ -20,7 +20,7 @@ from PIL import Image
 from biogrip.arrays import Array
 from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
-from biogrip.products.figures import declared, designed_map, sequential
+from biogrip.products.figures import declared
 from biogrip.products.figures import robustness as heat_map
 from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
@@ -28,8 +28,6 @@ from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
 from tests.helpers.default import STUDY, plan_of, study_of
 from tests.helpers.runs import SMALL
-from tests.products.tables.test_designed import OVERLAY
-from tests.products.tables.test_sequential import made_up
 
 PINNED = Path(__file__).with_name("pinned")
 # Small pictures, in which a line is still a line.
@@ -72,8 +70,6 @@ HEAT_MAPS = "robustness_level"
 # Those of overlays, by what they are drawn from here.
 OTHERS = {
     HEAT_MAPS: "robustness_figure",
-    "designed_map": "designed_map",
-    "sequential": "sequential_figure",
     "groups_made_up": "groups_figure",
 }
 NAMES = [*JOBS, *OTHERS]
@@ -153,13 +149,6 @@ def figure(
         if request.param == HEAT_MAPS:
             study = study_of(SWEEP)
             return heat_map.draw(heat_maps(study, {"sweep": "level"}), judged)
-        if request.param == "designed_map":
-            designed = study_of(OVERLAY.replace("SEEDS", "0"))
-            return designed_map.draw(designed.case("endothelial_cell"))
-        if request.param == "sequential":
-            cell = STUDY.cases["endothelial_cell"]
-            rows = made_up(tmp_path_factory.mktemp("cells"))
-            return sequential.draw(cell, rows)
         return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
 
 
