@@ -11,6 +11,7 @@ report: "workflow/report/study.rst"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/stages.smk"
 include: "workflow/rules/products.smk"
+include: "workflow/rules/traces.smk"
 include: "workflow/rules/check.smk"
 
 

@@ -2,7 +2,6 @@
 
 import csv
 import importlib
-import math
 import re
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout, suppress
@@ -18,12 +17,11 @@ import pandas as pd
 import biogrip.products.files
 from biogrip.cli import main
 from biogrip.digits import with_unit
-from biogrip.groups.power import cells_needed
 from biogrip.products.catalogue import products
 from biogrip.products.files import identifications, traces
 from biogrip.products.files.rows import RowFile, read_table
 from biogrip.products.report.answers import compared_rows, say_what_traces_tell
-from tests.helpers.key_reference import file_schema, reference, row_schema
+from tests.helpers.key_reference import file_schema, reference
 from tests.helpers.places import EXAMPLE
 from tests.published_numbers import renewed_numbers
 
@@ -31,9 +29,6 @@ ROOT = Path(__file__).parents[1]
 PUBLISHED = ROOT / "results" / "published"
 ERRORS = PUBLISHED / "tables" / "errors.csv"
 VERDICTS = PUBLISHED / "tables"
-DISHES = PUBLISHED / "groups" / "tables" / "dishes.csv"
-RANKS = DISHES.with_name("ranks.csv")
-POPULATIONS = DISHES.with_name("populations.csv")
 ROBUSTNESS = PUBLISHED / "robustness" / "tables" / "robustness_noise.csv"
 MEASURED = PUBLISHED / "measured"
 
@@ -56,7 +51,6 @@ _MEASURED = {
     "fish_muscle": {"k_alpha": 869957.81, "alpha": 0.67438, "k_beta": 22074.487, "beta": 0.11006},
     "cellulose_hydrogel": {"k_p": 73.72, "k_alpha": 175.07, "alpha": 0.8148},
 }
-_RATIOS = (1.1, 1.2, 1.3, 1.5, 2.0)
 
 
 def config_keys() -> str:
@@ -136,24 +130,6 @@ def claims() -> str:
     )
 
 
-def _percent(text: str) -> str:
-    try:
-        return f"{float(f'{float(text):.2g}') + 0.0:g} %"
-    except ValueError:
-        return f"{text} %"
-
-
-def cells_needed_table() -> str:
-    """How many cells a group it takes for ratios to be found, by the spread of the cells."""
-    return _table(
-        {
-            "spread": f"{spread:g}, a factor of {math.exp(spread):.2f}",
-            **{f"ratio {ratio:g}": str(cells_needed(ratio, 0.8, spread, 0.0)) for ratio in _RATIOS},
-        }
-        for spread in (0.1, 0.2, 0.3, 0.5)
-    )
-
-
 def errors_by_noise() -> str:
     """What the genetic algorithm errs by, and the bound, at several levels of noise."""
     table = pd.read_csv(ROBUSTNESS)
@@ -200,61 +176,6 @@ def _range(values: "pd.Series[float]", how: str, unit: str = "") -> str:
         return "none"
     low, high = format(values.min(), how), format(values.max(), how)
     return f"{low}{unit}" if low == high else f"{low}–{high}{unit}"
-
-
-def simulated_dishes() -> str:
-    """How often differences between simulated dishes held the truth, and were found."""
-    return _table(
-        {
-            "quantity": row["quantity"],
-            "samples (Hz)": f"{row['rate_Hz']:g}",
-            "c_p": row["c_p"],
-            "cells that determine it": _percent(row["determined_percent"]),
-            "error": f"{row['error']:.2g}",
-            "ratio held": f"{row['coverage_percent']:.1f} %",
-            "found": f"{row['power_percent']:.1f} %",
-            "spread held": f"{row['spread_coverage_percent']:.1f} %",
-            "cells held": f"{row['shrunk_coverage_percent']:.1f} %",
-        }
-        for row in pd.read_csv(DISHES).to_dict("records")
-    )
-
-
-def simulated_populations() -> str:
-    """How often populations of cells, some only bounded, held the truth."""
-    return _table(
-        {
-            "cells a dish": f"{row['cells']}",
-            "error": f"{row['error']:g}",
-            "cells that determine it": _percent(row["determined_percent"]),
-            "found though equal": f"{row['false_positive_percent']:.1f} %",
-            "median held": f"{row['median_coverage_percent']:.1f} %",
-            "spread held": f"{row['spread_coverage_percent']:.1f} %",
-            "cells held": f"{row['shrunk_coverage_percent']:.1f} %",
-        }
-        for row in pd.read_csv(POPULATIONS).to_dict("records")
-    )
-
-
-def unequal_dishes() -> str:
-    """How often both ratios held the truth for dishes that spread alike or not."""
-    rows = pd.read_csv(RANKS)
-    return _table(
-        {
-            "cells a dish": f"{row['cells_1']} and {row['cells_2']}",
-            "spreads": f"{row['spread_1']:g} and {row['spread_2']:g}",
-        }
-        | {
-            f"{what}, {kind}": f"{held:.1f} %" if held == held else "too few cells"
-            for kind, of_kind in rows.groupby("kind", sort=False)
-            for what, held in zip(
-                ("ratio held", "by ranks"),
-                of_kind.iloc[number][["coverage_percent", "rank_coverage_percent"]],
-                strict=True,
-            )
-        }
-        for number, row in enumerate(rows[rows["kind"] == rows["kind"][0]].to_dict("records"))
-    )
 
 
 def identified_example() -> str:
@@ -343,21 +264,13 @@ PARTS: dict[Path, dict[str, Callable[[], str]]] = {
     ROOT / "docs" / "identifiability.md": {"methods": methods_compared},
     ROOT / "docs" / "measured.md": {"measured": measured},
     ROOT / "docs" / "robustness.md": {"errors": errors_by_noise},
-    ROOT / "docs" / "groups.md": {
-        "cells": cells_needed_table,
-        "dishes": simulated_dishes,
-        "populations": simulated_populations,
-        "ranks": unequal_dishes,
-    },
     ROOT / "docs" / "reproduction.md": {"results": paper_against_study, "claims": claims},
 }
 """Parts of documents that are written, by what."""
 
 SCHEMA = ROOT / "config" / "schema.json"
-SHEET_SCHEMA = SCHEMA.with_name("sheet_schema.json")
 GENERATED = (
     SCHEMA,
-    SHEET_SCHEMA,
     ROOT / "config" / "README.md",
     ROOT / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
@@ -368,8 +281,6 @@ def renewed(path: Path) -> str:
     """Return a document with its generated parts, and its numbers, as they should be."""
     if path == SCHEMA:
         return file_schema()
-    if path == SHEET_SCHEMA:
-        return row_schema()
     text = path.read_text(encoding="utf-8")
     for name, content in PARTS.get(path, {}).items():
         match = re.search(

@@ -135,35 +135,6 @@ def test_a_parameter_at_the_end_of_its_range_is_named(tmp_path: Path) -> None:
     assert json.loads(found.read_text())["fit"] == OK
 
 
-def test_groups_leave_rejected_cells_out_by_name(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "few.yaml").write_text(FEW)
-    rows = ["file,cell,group"]
-    for seed in range(7):
-        clean = WRONG["late step"] if seed == 6 else RIGHT * (1 + 0.02 * (seed % 3))
-        name = written(tmp_path / f"{seed}.csv", clean, seed).name
-        rows.append(f"{name},cell {seed},{'one' if seed % 2 else 'other'}")
-    table = tmp_path / "groups.csv"
-    table.write_text("\n".join(rows) + "\n")
-    options = ["--config", tmp_path / "few.yaml", "--output", tmp_path / "found.json", "--force"]
-    status, said = command("groups", table, *options)
-    data = json.loads((tmp_path / "found.json").read_text())
-    assert status == 0
-    assert data["rejected"] == ["cell 6"]
-    assert "Left out, as their fits are rejected: cell 6." in said
-    noise = {cell["cell"]: cell["traces"][0]["noise_rad"] for cell in data["cells"]}
-    assert noise["cell 6"] == pytest.approx(SIGMA, rel=0.1)
-    counted = {name for row in data["groups"] for name in row["not_determined"]}
-    counted |= {cell["cell"] for row in data["groups"] for cell in row["determined"]}
-    assert counted == {f"cell {seed}" for seed in range(6)}
-    _, said = command("groups", table, "--exclude", "cell 6", "--exclude", "cell 5", *options)
-    assert "cell 5" not in said
-    assert "Left out, as their fits" not in said
-    assert command("groups", table, "--exclude", "cell6", *options)[0] == 1
-    assert "--exclude: found 'cell6'. Did you mean 'cell 6'?" in capsys.readouterr().err
-
-
 def test_a_rejected_fit_says_only_why(tmp_path: Path) -> None:
     """Noise models, simpler models and doubts about limits speak of results that it lacks."""
     models = "model_selection: {models: [kelvin_voigt, liquid_drop]}\n"

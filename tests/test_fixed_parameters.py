@@ -131,13 +131,3 @@ def test_text_that_is_no_value_is_refused(given: str, capsys: pytest.CaptureFixt
     with pytest.raises(SystemExit):
         main(["identify", "trace.csv", "--fix", given])
     assert f"found '{given}', allowed is NAME=VALUE" in capsys.readouterr().err
-
-
-def test_groups_fix_the_same_in_all_cells(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "cells.csv").write_text("file,cell,group\ntrace.csv,one,dish\n")
-    output = folder / "groups.json"
-    options = ["--config", str(folder / "few.yaml"), "--output", str(output), "--fix", "c_p=0"]
-    assert main(["groups", str(folder / "cells.csv"), *options]) == 0
-    assert "Fixed: c_p = 0 N s/m." in capsys.readouterr().out
-    (cell,) = json.loads(output.read_text())["cells"]
-    assert set(quantities(cell)) == {"k", "k_p", "c"}

@@ -1,6 +1,5 @@
 """Creep and relaxation from a file to verdicts: units, words, checks, and measured traces."""
 
-import csv
 import json
 import re
 from pathlib import Path
@@ -238,30 +237,6 @@ def test_what_is_assumed_is_a_config_that_gives_the_same(tmp_path: Path) -> None
 
 def _config(assumed: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in assumed.items() if key != "model"}
-
-
-def test_dishes_of_strained_cells_are_compared(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    rows = [["file", "cell", "group"]]
-    for number in range(6):
-        dish, factor = "ab"[number % 2], (1.0, 2.0)[number % 2]
-        truth = {name: factor * (1 + 0.02 * number) * value for name, value in TRUTH.items()}
-        values = noisy(response("strain", 5.0, truth), seed=number)
-        written(tmp_path / f"{number}.csv", "strain", values)
-        rows.append([f"{number}.csv", f"cell{number}", dish])
-    with (tmp_path / "dishes.csv").open("w", newline="") as stream:
-        csv.writer(stream).writerows(rows)
-    (tmp_path / "few.yaml").write_text(FEW)
-    command = ["groups", str(tmp_path / "dishes.csv"), "--config", str(tmp_path / "few.yaml")]
-    options = ["--reading", "strain=strain", "--hold", "5", "--model", SOLID.name]
-    assert main([*command, *options]) == 0
-    said = capsys.readouterr().out
-    assert not OF_A_GRIPPER.search(said)
-    found = json.loads((tmp_path / "dishes.compared.json").read_text())
-    ratios = {each["quantity"]: each["ratio"] for each in found["differences"]}
-    assert ratios["k"] == pytest.approx(2.0, rel=0.1)
-    assert "noise" in found["cells"][0]["traces"][0]
 
 
 @pytest.mark.parametrize("reading", ["stress", "modulus"])

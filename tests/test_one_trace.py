@@ -351,9 +351,8 @@ def test_an_output_that_cannot_be_written_is_refused_at_once(
         "identify a.csv --csv pipe --force",
         "identify a.csv --report pipe --force",
         f"identify a.csv --csv {os.devnull} --force",
-        "groups pipe",
-        "groups table.csv --config pipe",
-        "groups table.csv --output pipe --force",
+        "identify table.csv --config pipe",
+        "groups pipe --by dish",
         "run pipe.yaml",
         "design pipe",
     ],
@@ -369,7 +368,7 @@ def test_what_is_no_regular_file_is_neither_read_nor_replaced(
     os.mkfifo("pipe")
     os.mkfifo("pipe.yaml")
     shutil.copy(EXAMPLE, "a.csv")
-    Path("table.csv").write_text("file,cell,group\na.csv,a,b\n")
+    Path("table.csv").write_text("file,dish\na.csv,left\n")
     before = sorted(tmp_path.iterdir())
     assert main(command.split()) == 1
     error = capfd.readouterr().err

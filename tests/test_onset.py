@@ -192,22 +192,6 @@ def test_a_late_protocol_determines_nothing(
     assert {each["verdict"] for each in found["quantities"]} == {"fit rejected"}
 
 
-def test_groups_know_a_late_protocol(tmp_path: Path) -> None:
-    rows = ["file,cell,group"]
-    for seed, (name, onset_s) in enumerate((("a", 0.0), ("b", 0.0), ("c", 0.87), ("c", 0.0))):
-        written(tmp_path / f"{seed}.csv", *late(seed, onset_s))
-        rows.append(f"{seed}.csv,{name},one")
-    (tmp_path / "cells.csv").write_text("\n".join(rows) + "\n")
-    (tmp_path / "lab.yaml").write_text(CONFIG)
-    assert (
-        main(["groups", str(tmp_path / "cells.csv"), "--config", str(tmp_path / "lab.yaml")]) == 0
-    )
-    found = json.loads((tmp_path / "cells.compared.json").read_text())
-    assert found["rejected"] == ["c"]
-    (said,) = [text for text in found["cells"][2]["reasons"] if "is constant until 0.8" in text]
-    assert said.startswith("2.csv: The trace")
-
-
 @pytest.mark.parametrize("start", ["", ", start_s: 0.87"])
 def test_the_workflow_knows_a_late_protocol(tmp_path: Path, start: str) -> None:
     trace = written(tmp_path / "trace.csv", *late(2, 0.87))

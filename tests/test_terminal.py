@@ -103,33 +103,24 @@ def test_names_of_traces_are_shown_wherever_they_are_said(
     assert f">{visible(good)}<" in page.read_text()
 
 
-def test_names_of_cells_groups_and_their_traces_are_shown(
+def test_words_of_a_table_and_its_groups_are_shown(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    config, table = tmp_path / "few.yaml", tmp_path / f"{FOUND}.csv"
+    config, table, found = (tmp_path / name for name in ("few.yaml", f"{FOUND}.csv", "found.csv"))
     config.write_text(FEW)
     shutil.copy(EXAMPLE, tmp_path / f"a{FOUND}.csv")
-    (tmp_path / f"b{FOUND}.csv").write_text("no trace\n")
-    rows = [["file", "cell", "group"], [f"b{FOUND}.csv", "b", "c"]]
-    arguments = ["groups", str(table), "--config", str(config)]
-    _write(table, rows)
-    assert main(arguments) == 1
-    error = capsys.readouterr().err
-    assert f"none of its traces can be used; the first: {visible(tmp_path)}" in error
-    assert not OBEYED.search(error)
-    _write(table, [*rows, [f"a{FOUND}.csv", f"cell {FOUND}", f"group {FOUND}"]])
-    assert main(arguments) == 1
-    said = capsys.readouterr().out
-    for text in (f"cell {FOUND} (group {FOUND})", f"  a{FOUND}.csv: noise", f"b{FOUND}.csv, l"):
-        assert visible(text) in said
-    assert not OBEYED.search(said)
-    (skipped,) = json.loads(table.with_suffix(".compared.json").read_text())["skipped"]
-    assert skipped["trace"] == str(tmp_path / f"b{FOUND}.csv")
-
-
-def _write(table: Path, rows: list[list[str]]) -> None:
+    rows = [["file", f"dish {FOUND}"], [f"a{FOUND}.csv", f"left {FOUND}"], [f"b{FOUND}.csv", "b"]]
     with table.open("w", newline="") as stream:
         csv.writer(stream).writerows(rows)
+    assert main(["identify", str(table), "--config", str(config), "--csv", str(found)]) == 1
+    said = capsys.readouterr().out
+    assert f"  {visible(table)}, line 3: found" in said
+    assert not OBEYED.search(said)
+    assert main(["groups", str(found), "--by", f"dish {FOUND}"]) == 0
+    said = capsys.readouterr().out
+    for text in (f"left {FOUND}", f"not identified: {tmp_path}/b{FOUND}.csv"):
+        assert visible(text) in said
+    assert not OBEYED.search(said)
 
 
 def test_progress_and_warnings_are_shown(

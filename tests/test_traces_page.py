@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
@@ -21,6 +22,7 @@ from biogrip.own_traces.page import write_page
 from biogrip.own_traces.read_as import ReadAs
 from biogrip.products.figures import style
 from biogrip.products.figures.results import Fit, fit_of
+from biogrip.terminal import visible
 from tests.helpers.places import EXAMPLE, ROOT
 
 FEW = """
@@ -183,8 +185,6 @@ def made_up(of: dict[str, Any], number: int) -> dict[str, Any]:
     return {
         **of,
         "trace": f"dish/{number}.csv",
-        "cell": f"cell {number}",
-        "factors": {"passage": f"P{number % 3}", "dish": LEVELS[number % 2]},
         "fit": fit,
         "quantities": quantities,
         "reasons": ["Something is odd."] if fit != "ok" else [],
@@ -201,11 +201,25 @@ def dish(of_example: dict[str, Any]) -> list[dict[str, Any]]:
     return [made_up(of_example, number) for number in range(12)]
 
 
+def copied(traces: Sequence[dict[str, Any]]) -> dict[str, dict[str, str]]:
+    """Words of a table about each trace."""
+    return {
+        each["trace"]: {
+            "cell": f"cell {number}",
+            "dish": LEVELS[number % 2],
+            "passage": f"P{number % 3}",
+        }
+        for number, each in enumerate(traces)
+    }
+
+
 @pytest.fixture(scope="module")
 def page(dish: list[dict[str, Any]], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("dish") / "page.html"
-    traces = [*dish[:-1], {**dish[-1], "trace": HOSTILE, "cell": HOSTILE}]
-    write_page(traces, {"bad.csv": "bad.csv, line 2: found 'high'."}, path)
+    traces = [*dish[:-1], {**dish[-1], "trace": visible(HOSTILE)}]
+    words = copied(traces)
+    words[traces[-1]["trace"]]["cell"] = HOSTILE
+    write_page(traces, {"bad.csv": "bad.csv, line 2: found 'high'."}, path, words)
     return path
 
 
@@ -361,7 +375,7 @@ def test_names_are_text(opened: Opened) -> None:
     assert HOSTILE in label
 
 
-def test_distributions_show_each_cell_by_factor(opened: Opened) -> None:
+def test_distributions_show_each_cell_by_column(opened: Opened) -> None:
     page = opened.page
     strip = page.locator("#strips figure").first
     words = "k: 9 determined, 1 bounded below, 1 not determined (not drawn), 1 with rejected fits"
@@ -369,89 +383,15 @@ def test_distributions_show_each_cell_by_factor(opened: Opened) -> None:
     assert strip.locator("path.cell.dots").count() == 8
     assert strip.locator("circle.hollow").count() == 1
     assert strip.locator("path.arrow").count() == 1
-    select = page.get_by_label("By factor")
-    assert select.locator("option").all_inner_texts() == ["dish", "passage"]
+    select = page.get_by_label("By column")
+    assert select.locator("option").all_inner_texts() == ["cell", "dish", "passage"]
+    select.select_option(label="dish")
+    strip = page.locator("#strips figure").first
     assert strip.locator(".tick-x").all_text_contents() == list(LEVELS)
     select.select_option(label="passage")
     strip = page.locator("#strips figure").first
     assert strip.locator(".tick-x").all_text_contents() == ["P0", "P1", "P2"]
     assert strip.locator("path.cell.dots").count() == 8
-
-
-def compared(dish: list[dict[str, Any]]) -> dict[str, Any]:
-    """As `compare_groups` returns it."""
-    low, high = (np.quantile([q["quantities"][0]["value"] for q in dish], at) for at in (0.3, 0.8))
-    return {
-        "confidence": 0.95,
-        "by": "dish",
-        "limits": "Limits are statistical only.",
-        "cells": [
-            {"cell": each["cell"], "group": each["factors"]["dish"], "traces": []} for each in dish
-        ],
-        "groups": [
-            {
-                "group": name,
-                "quantity": "k",
-                "unit": "N/m",
-                "determined": [{}] * 4,
-                "not_determined": ["cell 6"],
-                **{"median": (low * high) ** 0.5, "low": low, "high": high},
-                "spread": {"log_deviation": 0.2, "low": 0.1, "high": 0.4},
-            }
-            for name in LEVELS
-        ],
-        "differences": [
-            {
-                **{"quantity": "k", "group": "treated", "against": "control"},
-                **{"ratio": 1.25, "low": 1.1, "high": 1.4, "p": 0.01, "adjusted_p": 0.02},
-                "by_ranks": {"ratio": 1.24, "low": 1.05, "high": 1.45},
-                "detectable_ratio": 1.5,
-            }
-        ],
-        "rejected": [],
-        "doubtful": [],
-        "differences_without_doubtful": [],
-    }
-
-
-def test_medians_of_groups_are_drawn_over_their_cells(
-    browser: Any, dish: list[dict[str, Any]], tmp_path: Path
-) -> None:
-    path = tmp_path / "groups.html"
-    groups = compared(dish)
-    write_page(dish, {}, path, groups)
-    opened = Opened(browser, path)
-    page = opened.page
-    strip = page.locator("#strips figure").first
-    assert strip.locator("path.median").count() == 2
-    # Against the ticks of the logarithmic axis.
-    labels = [float(text) for text in strip.locator(".tick-y").all_text_contents()]
-    heights = [float(t.get_attribute("y")) - 3.8 for t in strip.locator(".tick-y").all()]
-    slope, start = np.polyfit(heights, np.log(labels), 1)
-    d = strip.locator("path.median").first.get_attribute("d")
-    height = float(re.search(r"M\S+ ([\d.]+)h", d)[1])  # type: ignore[index]
-    assert np.exp(start + slope * height) == pytest.approx(groups["groups"][0]["median"], rel=0.02)
-    page.get_by_label("By factor").select_option(label="passage")
-    assert page.locator("#strips path.median").count() == 0
-    row = page.locator("tr", has_text="treated over control").inner_text().split("\t")
-    assert row[:4] == ["k", "treated over control", "1.25", "1.1 to 1.4"]
-    assert opened.problems == []
-    opened.context.close()
-
-
-def test_without_factors_groups_give_one(
-    browser: Any, dish: list[dict[str, Any]], tmp_path: Path
-) -> None:
-    path = tmp_path / "groups.html"
-    plain = [{k: v for k, v in each.items() if k not in ("cell", "factors")} for each in dish]
-    groups = compared(dish)
-    del groups["by"]
-    for cell, each in zip(groups["cells"], dish, strict=True):
-        cell["traces"] = [{"file": each["trace"]}]
-    write_page(plain, {}, path, groups)
-    opened = Opened(browser, path)
-    assert opened.page.locator("#strips figure").first.locator("path.median").count() == 2
-    opened.context.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -141,7 +141,6 @@ def _parser() -> argparse.ArgumentParser:
         ("batch", "batch of seeds, e.g. seeds_0-49"),
         ("sweep", "name of the sweep"),
         ("seed", "number of the seed"),
-        ("rows", "first row of a batch of the sheet of traces, from 0"),
     ):
         make.add_argument(f"--{name}", help=text)
     make.add_argument("--made-for", help=argparse.SUPPRESS)
@@ -197,10 +196,31 @@ def _identify_parser(stages: Any) -> None:
         type=Path,
         nargs="+",
         metavar="TRACE",
-        help="CSV file with a header, or a sheet: a table whose header has the column file, with a "
-        "row for each trace, its cell, factors and keys of the config",
+        help="CSV file with a header, or a table of traces: its header has the column file, and "
+        "others that are keys of the config, with dots, or copied to the CSV",
     )
-    _trace_options(identify)
+    identify.lists_models = True
+    _reading_options(identify)
+    identify.add_argument(
+        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
+    )
+    identify.add_argument(
+        "--fix",
+        type=_parameter,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="known parameter, SI units; 0 leaves an element out; repeat for more",
+    )
+    identify.add_argument(
+        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
+    )
+    identify.add_argument(
+        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
+    )
+    identify.add_argument(
+        "--force", action="store_true", help="replace a file that biogrip did not write"
+    )
     identify.add_argument(
         "--strict", action="store_true", help="end with status 1 if a fit is rejected"
     )
@@ -209,37 +229,29 @@ def _identify_parser(stages: Any) -> None:
     )
     identify.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, one row per trace")
     identify.add_argument(
+        "--rows",
+        type=_rows,
+        metavar="FIRST-LAST",
+        help="some rows of a table, from 0, without JSON files [all]",
+    )
+    identify.add_argument(
         "--output", type=Path, help="JSON file, of one trace [TRACE.identified.json]"
     )
 
 
 def _groups_parser(stages: Any) -> None:
-    text = "identify the cells of several groups in recorded traces, and compare the groups"
+    text = "compare groups of cells, from the table that identify --csv wrote"
     groups = stages.add_parser("groups", help=text, description=text)
     groups.set_defaults(command=_groups)
     groups.examples = _examples(
-        "groups dishes.csv --config my_gripper.yaml",
-        "groups dishes.csv --config my_gripper.yaml --by treatment --exclude c07",
-        cost="A cell takes some seconds.",
+        "groups found.csv --by dish", "groups found.csv --by treatment --csv compared.csv"
     )
+    groups.add_argument("found", type=Path, help="CSV file that identify --csv wrote")
+    groups.add_argument("--by", required=True, metavar="COLUMN", help="column that makes groups")
+    groups.add_argument("--csv", type=Path, metavar="TABLE", help="CSV file, a row a median")
     groups.add_argument(
-        "table",
-        type=Path,
-        help="sheet: CSV or TSV file with the columns file, cell and group, one line per trace; "
-        "other columns are factors, or keys of the config",
+        "--force", action="store_true", help="replace a file that biogrip did not write"
     )
-    _trace_options(groups)
-    groups.add_argument(
-        "--by", metavar="FACTOR", help="column that makes the groups [group, or the only factor]"
-    )
-    groups.add_argument(
-        "--exclude",
-        action="append",
-        default=[],
-        metavar="CELL",
-        help="leave a cell out of all groups; repeat for more",
-    )
-    groups.add_argument("--output", type=Path, help="JSON file [TABLE.compared.json]")
 
 
 def _design_parser(stages: Any) -> None:
@@ -326,6 +338,14 @@ def _start(text: str) -> float | str:
     raise argparse.ArgumentTypeError(f"found '{text}', allowed are seconds, or {FIT}")
 
 
+def _rows(text: str) -> tuple[int, int]:
+    """Read the value of ``--rows``."""
+    first, _, last = text.partition("-")
+    if first.isdecimal() and last.isdecimal() and int(first) <= int(last):
+        return int(first), int(last)
+    raise argparse.ArgumentTypeError(f"found '{text}', allowed is FIRST-LAST, as in 0-99")
+
+
 def _fixed(given: Sequence[tuple[str, float]]) -> dict[str, float]:
     """Return the values of all ``--fix`` by name, each of which may come once."""
     for number, (name, _) in enumerate(given):
@@ -353,36 +373,10 @@ def _reading(text: str) -> tuple[str, str]:
     )
 
 
-def _trace_options(command: _Parser) -> None:
-    """Add options for reading and identifying recorded traces."""
-    command.lists_models = True
-    _reading_options(command)
-    command.add_argument(
-        "--model", default="generalized_maxwell", help="sample model [%(default)s]"
-    )
-    command.add_argument(
-        "--fix",
-        type=_parameter,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="known parameter, SI units; 0 leaves an element out; repeat for more",
-    )
-    command.add_argument(
-        "--config", type=Path, help="YAML file with your gripper, protocol, search range, ..."
-    )
-    command.add_argument(
-        "--noise-model", help="white, or coloured: intervals that allow for autocorrelation"
-    )
-    command.add_argument(
-        "--force", action="store_true", help="replace a file that biogrip did not write"
-    )
-
-
 def _make(options: argparse.Namespace) -> None:
     from biogrip.running.make import make
 
-    names = ("case", "method", "batch", "sweep", "seed", "rows")
+    names = ("case", "method", "batch", "sweep", "seed")
     given = {name: getattr(options, name) for name in names}
     job = {name: text for name, text in given.items() if text}
     with watch_writes(_refuse_others):
@@ -400,6 +394,7 @@ def _identify(options: argparse.Namespace) -> None:
         output=options.output,
         report=options.report,
         table=options.csv,
+        rows=options.rows,
         fixed=_fixed(options.fix),
         strict=options.strict,
         force=options.force,
@@ -407,19 +402,9 @@ def _identify(options: argparse.Namespace) -> None:
 
 
 def _groups(options: argparse.Namespace) -> None:
-    from biogrip.own_traces.groups_of_cells import groups
+    from biogrip.groups import groups
 
-    options.status = groups(
-        options.table,
-        options.model,
-        _read_as(options),
-        options.config,
-        by=options.by,
-        exclude=options.exclude,
-        fixed=_fixed(options.fix),
-        output=options.output,
-        force=options.force,
-    )
+    groups(options.found, options.by, options.csv, force=options.force)
 
 
 def _design(options: argparse.Namespace) -> None:

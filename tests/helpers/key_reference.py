@@ -10,25 +10,15 @@ import pandas as pd
 import yaml
 
 from biogrip.keys import Block
-from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.messages import bound
 from biogrip.study.schema import Schema, tidy
-from biogrip.study.sheet import GROUP
-from biogrip.study.sheet_columns import FIX, FIXED, settings_by_column
-from biogrip.study.sheet_text import CELL, FILE
 
 _NO_DEFAULT = "–"
 _MOST_LISTED = 6
 _SIGNS = {"exclusiveMinimum": ">", "minimum": "≥", "maximum": "≤"}
 _WORDS = {"string": "text", "object": "block"}
-
-_COLUMNS = {
-    FILE: "The trace; a path is relative to the sheet's folder.",
-    CELL: "Name of the cell, by default the file's without suffix; rows of one are replicates.",
-    GROUP: "Group of the cell. Any other column without a dot is a factor, too.",
-}
-_KNOWN = "Known value of a parameter in SI units, which is not identified."
 
 _Row = tuple[str, str, str, str, str]
 
@@ -69,48 +59,7 @@ def file_schema() -> str:
     ((name, case),) = cases["patternProperties"].items()
     # A case set to null is dropped.
     cases["patternProperties"] = {name: {"anyOf": [case, {"type": "null"}]}}
-    # Named blocks may have the keys of their block, which is not known to the config's class.
-    keys, blocks = schema["properties"], schema["properties"]["blocks"]
-    ((name, _),) = blocks.pop("additionalProperties")["patternProperties"].items()
-    named = {"type": "object", "additionalProperties": False}
-    blocks["properties"] = {
-        key: {**named, "patternProperties": {name: keys[key]}} for key in NAMABLE
-    }
-    blocks["additionalProperties"] = False
     return json.dumps(schema, indent=1, ensure_ascii=False) + "\n"
-
-
-def row_schema() -> str:
-    """Return the JSON Schema of a row of a sheet: its cells by column, as YAML reads them."""
-    cases = Schema(documented(), documented()["$defs"]).keys["cases"]
-    columns: dict[str, Any] = {name: {"description": text} for name, text in _COLUMNS.items()}
-    for name, setting in settings_by_column().items():
-        inner = cases.values
-        for part in setting.path:
-            inner = inner.inside(part)
-        said = inner.get("description", "")
-        one_of = {"type": "string", "description": f"Name of a block under `blocks.{name}`. {said}"}
-        columns[name] = _or_empty(one_of if setting.names_block else inner.node)
-    known = _or_empty({"type": "number", "minimum": 0, "description": _KNOWN})
-    schema = {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "description": "A row of a sheet of recorded traces. An empty cell is as in the config.",
-        "type": "object",
-        "required": [FILE],
-        "properties": columns,
-        "patternProperties": {
-            f"^({FIX}|{FIXED})\\..+$": known,
-            r"^[^.]*$": {"type": ["string", "number", "boolean", "null"]},
-        },
-        "additionalProperties": False,
-    }
-    return json.dumps(_partial(schema) | {"required": [FILE]}, indent=1, ensure_ascii=False) + "\n"
-
-
-def _or_empty(node: Mapping[str, Any]) -> dict[str, Any]:
-    inner = dict(node)
-    text = {"description": inner.pop("description")} if "description" in node else {}
-    return text | {"anyOf": [inner, {"enum": ["", None]}]}
 
 
 def _partial(node: Any, name: str = "") -> Any:

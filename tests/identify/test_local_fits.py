@@ -11,7 +11,6 @@ import pytest
 
 from biogrip.arrays import Array
 from biogrip.experiment.sample import MODELS, Sample
-from biogrip.groups.replicates import joint_problem
 from biogrip.identify import genetic_refined, least_squares
 from biogrip.identify.answer import Identification
 from biogrip.identify.levenberg_marquardt import Normal, bounded_step
@@ -195,7 +194,6 @@ def mixed() -> list[Problem]:
     drop = MODELS["liquid_drop"]
     (nonlinear,) = case_problem(times[::20], trace[::20], 1, nonlinear=True)
     ringing = problem_alone(GRIPPER, MODEL, TORQUE, *half, ringing_s=rings_s)
-    joint = joint_problem(linear[:2], [1e-5, 2e-5])
     narrow = replace(linear[2], low=linear[2].low + 1)
     simple = replace(
         linear[2],
@@ -203,14 +201,14 @@ def mixed() -> list[Problem]:
         low=linear[2].low[:3],
         high=linear[2].high[:3],
     )
-    return [linear[0], nonlinear, joint, linear[1], ringing, *other, narrow, linear[2], simple]
+    return [linear[0], nonlinear, linear[1], ringing, *other, narrow, linear[2], simple]
 
 
 def test_what_cannot_be_fitted_together_is_fitted_in_groups() -> None:
     """Fits share responses: of one model, at the same times; search ranges may differ."""
     problems = mixed()
     groups = alike(problems)
-    assert [group.tolist() for group in groups] == [[0, 3, 6, 7], [1], [2], [4], [5], [8]]
+    assert [group.tolist() for group in groups] == [[0, 2, 5, 6], [1], [3], [4], [7]]
     assert alike([]) == []
     few = least_squares.LeastSquaresSettings(5, 2)
 

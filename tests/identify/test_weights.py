@@ -9,7 +9,6 @@ from scipy.optimize import curve_fit
 from biogrip.arrays import Array
 from biogrip.experiment.protocol import hold
 from biogrip.experiment.sample import Sample
-from biogrip.groups.joint_fit import fitted_jointly
 from biogrip.identifiability.diagnosis import Diagnosis, diagnose
 from biogrip.identify.answer import Identification
 from biogrip.identify.case_problem import CaseProblem
@@ -91,40 +90,6 @@ def test_weighted_fits_are_scipys() -> None:
 def test_without_weights_large_rotations_decide() -> None:
     best = fitted(POLYSTYRENE, noisy(0.05))
     assert abs(best[1] - BETA) > 0.1
-
-
-def test_replicates_keep_their_own_weights() -> None:
-    """Two traces of one sample are one of all their readings."""
-    traces = [noisy(0.02, seed=1), noisy(0.1, seed=2)]
-    problems = [
-        POLYSTYRENE.weighted(share * np.abs(trace))
-        for share, trace in zip((0.02, 0.1), traces, strict=True)
-    ]
-    fit = fitted_jointly(
-        [problem.of(TIMES, trace) for problem, trace in zip(problems, traces, strict=True)],
-        POLYSTYRENE.searched,
-        find,
-        confidence=0.95,
-        noise_rad=[problem.noise_rad or 0.0 for problem in problems],
-    )
-    deviations = np.concatenate(
-        [problem.sd_rad for problem in problems if problem.sd_rad is not None]
-    )
-    expected, _ = curve_fit(
-        rotation,
-        np.tile(TIMES, 2),
-        np.concatenate(traces),
-        [np.log(V), BETA, np.log(ETA)],
-        deviations,
-        xtol=1e-13,
-        ftol=1e-13,
-    )
-    best = fit.diagnosis.likelihood.best
-    assert [best[0], np.exp(best[1]), best[2]] == pytest.approx(expected, rel=2e-6)
-    left = (np.concatenate(traces) - rotation(np.tile(TIMES, 2), *expected)) / deviations
-    likelihood = fit.diagnosis.likelihood
-    chi_squared = 2 * len(TIMES) * (likelihood.misfit_rad / likelihood.noise_rad) ** 2
-    assert chi_squared == pytest.approx(left @ left, rel=1e-6)
 
 
 def test_the_model_is_that_of_the_closed_form() -> None:

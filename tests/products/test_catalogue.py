@@ -43,9 +43,7 @@ cases:
     measurement: {file: data/example_trace.csv, time: time_s, rotation: rotation_rad}
 """
 OVERLAYS = [
-    (file.name,)
-    for file in sorted((ROOT / "config").glob("*.yaml"))
-    if file.name != "config.yaml"
+    (file.name,) for file in sorted((ROOT / "config").glob("*.yaml")) if file.name != "config.yaml"
 ]
 ROBUSTNESS = (ROOT / "config" / "robustness.yaml").read_text()
 
@@ -147,8 +145,7 @@ def test_every_overlay_is_planned(
         over = overlaid(over, read_config(ROOT / "config" / name))
     rules = make_rules(products().values(), plan_of(yaml.safe_dump(over)))
     told_apart = [rule.digest(job) for rule in rules for job in rule.jobs]
-    # A sheet has few products: fits of traces and cells, tables, a figure and a page.
-    assert len(set(told_apart)) > (4 if overlay == ("dishes.yaml",) else 10)
+    assert len(set(told_apart)) > 10
 
 
 def test_no_command_nor_parameter_is_long(everything: list[ProductRule]) -> None:

@@ -8,18 +8,14 @@ import pytest
 import yaml
 from jsonschema import Draft202012Validator
 
-from biogrip.errors import BiogripError
 from biogrip.identify.methods import METHODS
 from biogrip.study.case_blocks import OVERRIDABLE
-from biogrip.study.sheet import read_sheet
-from biogrip.study.sheet_columns import settings_by_column
 from biogrip.study.source import read_config
-from tests.helpers.key_reference import file_schema, row_schema
+from tests.helpers.key_reference import file_schema
 from tests.study.keys import STUDY, leaves
 
 CONFIG = Path(__file__).parents[2] / "config"
 SCHEMA: dict[str, Any] = json.loads(file_schema())
-ROW: dict[str, Any] = json.loads(row_schema())
 
 
 def test_every_key_says_what_it_means() -> None:
@@ -74,75 +70,6 @@ def test_the_schema_knows_the_files_that_there_are(file: Path) -> None:
 )
 def test_the_schema_marks_what_the_study_refuses(text: str) -> None:
     assert list(Draft202012Validator(SCHEMA).iter_errors(yaml.safe_load(text)))
-
-
-@pytest.mark.parametrize(
-    ("column", "text"),
-    [
-        ("file", "a.csv"),
-        ("dish", "left"),
-        *((name, "") for name in settings_by_column()),
-        ("measurement.noise_rad", "1.0e-4"),
-        ("measurement.noise_rad", "-1"),
-        ("measurement.noise_rad", "much"),
-        ("measurement.skip", "2"),
-        ("measurement.skip", "2.5"),
-        ("measurement.drift", "true"),
-        ("measurement.drift", "1"),
-        ("gripper.left.inertia_kgm2", "1"),
-        ("gripper.left.inertia_kgm2", "1.0e-14"),
-        ("gripper.uncertainty.left.inertia_kgm2", "0"),
-        ("instrument", "creep"),
-        ("instrument", "crep"),
-        ("sample.model", "maxwell"),
-        ("sample.model", "maxwel"),
-        ("fix.k", "0"),
-        ("fixed.k", "-1"),
-        ("gripper.arm_lenght_m", "1"),
-        ("gripper.left", "1"),
-        ("measurement.file", "b.csv"),
-        ("measurement.rate_Hz", "1"),
-        ("identifiability.confidence", "0.9"),
-    ],
-)
-def test_the_schema_of_a_row_allows_what_the_reader_does(
-    tmp_path: Path, column: str, text: str
-) -> None:
-    (tmp_path / "a.csv").touch()
-    (tmp_path / "cells.tsv").write_text(
-        f"file\t{column}\na.csv\t{text}\n" if column != "file" else "file\na.csv\n"
-    )
-    try:
-        read_sheet(tmp_path / "cells.tsv")
-        read = True
-    except BiogripError:
-        read = False
-    row = {"file": "a.csv", column: yaml.safe_load(text)}
-    assert Draft202012Validator(ROW).is_valid(row) == read
-
-
-def test_the_schema_of_a_row_is_one_and_says_what_columns_mean() -> None:
-    Draft202012Validator.check_schema(ROW)
-    assert not Draft202012Validator(ROW).is_valid({"cell": "a"})
-    known = leaves(STUDY)
-    for name, node in ROW["properties"].items():
-        said = known[name].get("description") if name in known else None
-        assert (said or "") in node.get("description", "")
-
-
-@pytest.mark.parametrize(
-    ("text", "valid"),
-    [
-        ("protocol: {short: {phases: [{duration_s: 1.0, torque_Nm: 1.0e-9}]}}", True),
-        ("gripper: {old: {arm_length_m: 1.0e-3}}", True),
-        ("gripper: {old: {arm_lenght_m: 1.0e-3}}", False),
-        ("griper: {}", False),
-        ("protocol: {phases: []}", False),
-    ],
-)
-def test_the_schema_knows_named_blocks(text: str, valid: bool) -> None:
-    config = {"blocks": yaml.safe_load(text)}
-    assert Draft202012Validator(SCHEMA).is_valid(config) is valid
 
 
 def test_the_files_name_their_schema() -> None:

@@ -28,14 +28,13 @@ LEFT = {
         *("first.json", "second.json", "results/summaries/mine.html"),
         "results/tables/verdicts_longer.md",
     ],
-    "groups.md": ["dishes.compared.json"],
+    "groups.md": ["found.csv"],
     "design.md": ["designed.yaml", "designed.html"],
     "howto/case.md": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
     "howto/trace.md": [
         *("found.json", "drifting.json", "coloured.json", "page.html", "traces.csv"),
         *("maxwell.json", "uncertain.json"),
     ],
-    "howto/dish.md": ["results/traces.html", "results/tables/group_differences.csv"],
     "howto/creep.md": ["mucus.json", "hl60.json"],
     "howto/relaxation.md": ["fish.json", "dwell.json"],
     "howto/noise.md": [
@@ -51,7 +50,6 @@ LEFT = {
 }
 LOOKED_AT = {
     "study.yaml": ["results/summaries/mine.html"],
-    "config/dishes.yaml": ["results/traces.html", "results/tables/group_differences.csv"],
     "my.yaml": ["results/tables/errors_my_cell.md", "results/summaries/my_cell.html"],
 }
 # A trace fitted from few starts, with few models, of which the chosen one has two parameters unless

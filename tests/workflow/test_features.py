@@ -183,5 +183,5 @@ def test_shipped_configurations_are_valid(file: Path, monkeypatch: pytest.Monkey
     assert len(CONFIGS) >= 3
     monkeypatch.chdir(ROOT)
     inputs, outputs = inputs_and_outputs(study_of(yaml.safe_dump(read_config(file))))
-    assert len(outputs) > (10 if file.stem == "dishes" else 50)
+    assert len(outputs) > 50
     assert [read for read in inputs - outputs if not Path(read).is_file()] == []

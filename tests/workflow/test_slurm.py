@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from biogrip.cli import main
 from biogrip.study.load import load_study, read_configs
 from tests.helpers.drops import write_trace
 from tests.helpers.in_process import inputs_and_outputs, make_in_process
@@ -65,42 +66,42 @@ model_selection: {models: []}
 cases:
   endothelial_cell: null
   liquid_drop_1: null
-traces: cells.tsv
+traces: {table: cells.tsv, config: few.yaml, model: liquid_drop, rows_a_batch: 1}
 """
-SHEET = """file,cell,measurement.noise_rad
-first.csv,a,
-second.csv,b,1e-6
-"""
+CELLS = "file\tmeasurement.noise_rad\nfirst.csv\t\nsecond.csv\t1e-6\n"
+FEW = "least_squares: {candidates: 50, starts: 2}\nmodel_selection: {models: []}\n"
 
 
 def test_slurm_gives_the_same_bytes(tmp_path: Path, slurm: dict[str, str]) -> None:
-    """Even if a job is lost on the way, and a sheet is edited meanwhile."""
+    """Even if a job is lost on the way; of a table of traces, too."""
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
     for folder in (here, there):
-        (folder / "cells.tsv").write_text(SHEET)
+        (folder / "cells.tsv").write_text(CELLS)
+        (folder / "few.yaml").write_text(FEW)
         for seed, name in enumerate(("first", "second")):
             write_trace(folder / f"{name}.csv", seed)
         (folder / "overlay.yaml").write_text(FEW_JOBS)
     with chdir(here):
         files = [CONFIG, here / "overlay.yaml"]
         study = load_study(read_configs(files), files)
-    # Of a case, whose jobs are submitted in groups, one that is submitted alone, and of a sheet.
+    # Of a case, whose jobs are submitted in groups, and one that is submitted alone.
     wanted = sorted(
         file
         for file in inputs_and_outputs(study)[1]
-        if file.startswith("results/tables/")
-        and Path(file).stem.endswith(("_2", "contact_loss", "traces"))
+        if file.startswith("results/tables/") and Path(file).stem.endswith(("_2", "contact_loss"))
     )
     make_in_process(here, study, wanted)
-    arguments = (*wanted, "--profile", "profiles/slurm", *SITE, "--config", "batch_size=2")
+    traces = "results/tables/traces.csv"
+    with chdir(here):
+        options = ("--config", "few.yaml", "--model", "liquid_drop", "--csv", traces)
+        assert main(["identify", "cells.tsv", *options]) == 0
+    arguments = (*wanted, traces, "--profile", "profiles/slurm", *SITE, "--config", "batch_size=2")
     with ThreadPoolExecutor() as pool:
         running = pool.submit(snakemake, there, *arguments, config=FEW_JOBS, environment=slurm)
         while not running.done() and not _cancel_a_batch(slurm):
             time.sleep(0.2)
-        # Rows are those that the run was planned with, also of the job that starts again.
-        (there / "cells.tsv").write_text("file\nlate.csv\n")
         run = running.result()
     assert run.status == 0, run.output
     assert run.output.count("Trying to restart job") == 1

@@ -17,7 +17,6 @@ OVERLAYS = {
     "measured": (["measured"], "all", "*"),
     "power_law": (["power_law"], "all_tables", "[cev][eor][rv]*"),
     "recorded": (["recorded"], "all_tables", "[cev][eor][rv]*"),
-    "dishes": (["dishes"], "all", "*"),
     # Errors, verdicts and robustness.
     "soft": (["soft"], "all_tables all_maps", "[erv][eor]*_soft*"),
 }

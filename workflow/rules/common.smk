@@ -6,7 +6,6 @@ from pathlib import Path
 
 from snakemake.settings.types import ExecMode
 
-from biogrip.own_traces.fitted_cells import check_sheet
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -17,7 +16,6 @@ from biogrip.running.resolved import read_study, write_study
 from biogrip.running.rules import (
     GROUPS,
     ProductRule,
-    all_written,
     files_of,
     make_rules,
 )
@@ -49,9 +47,8 @@ with message_only():
             command_line=workflow.config_settings.config,
         )
         check_traces(STUDY)
-        check_sheet(STUDY)
     else:
-        # On another node: what the run was planned with, without reading a long sheet again.
+        # On another node: what the run was planned with.
         STUDY = read_study(RESULTS)
 
 PLAN = Plan(STUDY, RESULTS)
@@ -104,7 +101,12 @@ if workflow.exec_mode == ExecMode.DEFAULT and not preparation.done:
 # A Snakefile that takes this one in as a module calls `begin` and `end` in hooks of its own.
 def begin():
     """Refuse what is not the study's before jobs replace it, and say what the study is."""
-    jobs = list(workflow.dag.needrun_jobs())
+    # Tables of the user's traces are not on record.
+    jobs = [
+        job
+        for job in workflow.dag.needrun_jobs()
+        if job.rule.name not in ("traces_batch", "traces")
+    ]
     with message_only():
         CLAIM.begin(
             [Path(file) for job in jobs for file in job.output],
@@ -120,7 +122,7 @@ def begin():
 def end():
     """Record what the jobs have written, and say what else there is."""
     CLAIM.end()
-    say_what_else_is_there(RESULTS, all_written(RULES))
+    say_what_else_is_there(RESULTS, files_of(RULES))
 
 
 onstart:

@@ -47,11 +47,11 @@ def find_slow_misfit(
 def has_fast_noise(residuals: Residuals, log_parameters: Array) -> bool:
     """Return True if what a fit leaves is stationary noise that is correlated for a short time.
 
-    False also where that is not estimated: of several traces together, of very many readings, and
-    of residuals that are white already.
+    False also where that is not estimated: of very many readings, and of residuals that are white
+    already.
     """
     time_s = residuals.sampling_s
-    if time_s is None or residuals.coloured or len(time_s) > MOST_SAMPLES:
+    if residuals.coloured or len(time_s) > MOST_SAMPLES:
         return False
     residual, sensitivity = residuals(log_parameters)
     stretches = np.array_split(np.square(residual), min(_STRETCHES, len(residual)))

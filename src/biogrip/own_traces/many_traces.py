@@ -24,9 +24,8 @@ from biogrip.own_traces.one_trace import (
 )
 from biogrip.own_traces.outputs import WRITTEN_BY, name_in_units
 from biogrip.own_traces.trace_case import TraceCase
-from biogrip.products.files.rows import write_rows
+from biogrip.products.files.rows import read_rows, write_rows
 from biogrip.progress import Progress
-from biogrip.study.sheet import Row
 from biogrip.terminal import visible, visible_lines
 from biogrip.worker_processes import worker_processes
 
@@ -37,8 +36,6 @@ FAILED = "failed"
 """Status of a trace that could not be read, or whose fit failed; and the column that says why."""
 
 T = TypeVar("T")
-
-_OF_TRACE = "trace", "fit", "model", "samples", "noise_rad", "misfit_rad", "fixed", "reads"
 
 
 @dataclass(frozen=True)
@@ -201,72 +198,72 @@ def _alike(traces: Mapping[int, TraceCase]) -> list[list[int]]:
     return groups
 
 
-def write_table(outcome: Outcome, table: Path, rows_of: Mapping[str, Row] | None = None) -> None:
+COLUMNS = (
+    *("trace", "fit", "confidence", "model", "preferred_model", "samples"),
+    *("noise_rad", "misfit_rad", "fixed", FAILED, WRITTEN_BY),
+)
+"""Columns of the table of traces, but for those of quantities."""
+
+
+def write_table(
+    outcome: Outcome, table: Path, copied: Mapping[str, Mapping[str, str]] | None = None
+) -> None:
     """Write one row per trace as CSV: numbers, their units in the header, and why it failed if so.
 
-    Traces that sheets list, by file, have columns for cell and factors.
+    Parameters
+    ----------
+    outcome
+        Results of the traces.
+    table
+        The file.
+    copied
+        Cells to copy of each trace, by file and column, in the order of rows. By default nothing
+        is copied, and traces that failed come last.
     """
-    units = {q["quantity"]: q["unit"] for each in outcome.found for q in each["quantities"]}
     # The same is read in all traces.
     names = {each["reads"]["quantity"] for each in outcome.found} or {ROTATION.name}
     read = INSTRUMENTS[names.pop()].read
-    columns = ["trace", "fit", "model", "preferred_model", "samples"]
-    columns += [name_in_units(name, read) for name in ("noise_rad", "misfit_rad")]
-    fixed = any("fixed" in each for each in outcome.found)
-    columns += ["fixed"] if fixed else []
-    columns += [
-        with_unit(f"{quantity} {what}", unit if what != "verdict" else "")
-        for quantity, unit in units.items()
-        for what in _OF_QUANTITY
-    ]
-    rows_of = rows_of or {}
-    factors = list(dict.fromkeys(name for row in rows_of.values() for name in row.factors))
-    header = [*columns, FAILED, WRITTEN_BY]
-    of_row = ["cell", *(f"factor {name}" if name in header else name for name in factors)]
-    header[1:1] = of_row if rows_of else []
-    rows = [
-        (
-            *(
-                each["trace"],
-                *_of_row(rows_of, each["trace"], factors),
-                each["fit"],
-                each["model"],
-                _preferred(each),
-            ),
-            *(each["samples"], each["noise_rad"], each["misfit_rad"]),
-            *(["; ".join(each["fixed"])] if fixed else []),
-            *_of_quantities(each, units),
-            "",
-            each[WRITTEN_BY],
-        )
+    rows: dict[str, dict[str, Any]] = {
+        each["trace"]: {
+            **{name: each[name] for name in COLUMNS if name in each},
+            "preferred_model": _preferred(each),
+            "fixed": "; ".join(each.get("fixed", ())),
+            **_of_quantities(each),
+        }
         for each in map(rounded_numbers, outcome.found)
-    ]
-    rows += [
-        (
-            *(trace, *_of_row(rows_of, trace, factors), FAILED, *[""] * (len(columns) - 2)),
-            *(visible_lines(why).replace("\n", " "), __version__),
-        )
+    }
+    rows |= {
+        trace: {
+            "trace": trace,
+            "fit": FAILED,
+            FAILED: visible_lines(why).replace("\n", " "),
+            WRITTEN_BY: __version__,
+        }
         for trace, why in outcome.refused.items()
-    ]
-    write_rows(table, header, rows)
+    }
+    copied = copied or {trace: {} for trace in rows}
+    words = dict.fromkeys(name for own in copied.values() for name in own)
+    quantities = dict.fromkeys(name for row in rows.values() for name in row if name not in COLUMNS)
+    first, *columns = COLUMNS
+    header = [first, *words, *columns[:-2], *quantities, *columns[-2:]]
+    write_rows(
+        table,
+        [name if name in words else name_in_units(name, read) for name in header],
+        [
+            [{**rows[trace], **own}.get(name, "") for name in header]
+            for trace, own in copied.items()
+        ],
+    )
 
 
-def for_table(found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return of the data of a trace what `write_table` writes."""
-    kept = {name: found[name] for name in (*_OF_TRACE, WRITTEN_BY) if name in found}
-    of_quantity = ("quantity", "unit", *_OF_QUANTITY)
-    quantities = [{name: own[name] for name in of_quantity} for own in found["quantities"]]
-    models = [own for own in found["models"] if own["delta_bic"] == 0]
-    return {**kept, "quantities": quantities, "models": models}
-
-
-def _of_row(rows_of: Mapping[str, Row], trace: str, factors: Sequence[str]) -> list[str]:
-    """Return cell and factors of a trace; nothing if no trace is of a sheet."""
-    if not rows_of:
-        return []
-    row = rows_of.get(trace)
-    cell, values = (row.cell, row.factors) if row else ("", {})
-    return [cell, *(values.get(name, "") for name in factors)]
+def join_tables(parts: Sequence[Path], table: Path) -> None:
+    """Write the rows of several tables of traces as one, as if `write_table` had written all."""
+    frames = [read_rows(part) for part in parts]
+    last = COLUMNS[-2:]
+    names = dict.fromkeys(name for header, *_ in frames for name in header if name not in last)
+    header = [*names, *last]
+    rows = [dict(zip(columns, row, strict=True)) for columns, *own in frames for row in own]
+    write_rows(table, header, [[row.get(name, "") for name in header] for row in rows])
 
 
 def _preferred(found: Mapping[str, Any]) -> str:
@@ -274,12 +271,12 @@ def _preferred(found: Mapping[str, Any]) -> str:
     return next((row["model"] for row in found["models"] if row["delta_bic"] == 0), "")
 
 
-def _of_quantities(found: Mapping[str, Any], quantities: Iterable[str]) -> list[object]:
-    by_label = {q["quantity"]: q for q in found["quantities"]}
-    return [
-        ""
-        if quantity not in by_label or by_label[quantity][what] is None
-        else by_label[quantity][what]
-        for quantity in quantities
+def _of_quantities(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return verdict, value and limits of each quantity by column, "" for limits that are none."""
+    return {
+        with_unit(f"{own['quantity']} {what}", own["unit"] if what != "verdict" else ""): (
+            "" if own[what] is None else own[what]
+        )
+        for own in found["quantities"]
         for what in _OF_QUANTITY
-    ]
+    }

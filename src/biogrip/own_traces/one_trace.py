@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -44,10 +44,12 @@ from biogrip.response.simulation import simulated_rotation
 from biogrip.study.defaults import default_config
 from biogrip.study.load import load_study, read_configs
 from biogrip.study.sample_block import fixed_problems
-from biogrip.study.sheet import Row
-from biogrip.study.source import dotted, overlaid
+from biogrip.study.source import KeyPath, dotted, overlaid
 from biogrip.study.study import Case, Study
 from biogrip.study.trace_file import trace_file_problem
+from biogrip.study.yaml_text import shown_path
+from biogrip.terminal import visible
+from biogrip.traces.columns import place
 from biogrip.traces.late_onset import note_late_onset
 
 _NOT_COMPARED = (
@@ -72,11 +74,11 @@ class IdentifyOptions:
         YAML file laid over the default study: gripper, protocol, search range.
     fixed
         Known parameters by name, SI units, beside those of the config.
-    row
-        Row of the sheet that lists the trace, if one does. What it says goes before options and
-        config.
-    blocks
-        Blocks that a study's config gives, in place of those of `config`.
+    settings
+        Blocks of a config with what a row of a table says of the trace, which goes before options
+        and config.
+    table, line
+        The table and the line of the row, if there is one.
     """
 
     trace: Path
@@ -84,31 +86,44 @@ class IdentifyOptions:
     read_as: ReadAs
     config: Path | None
     fixed: Mapping[str, float] = field(default_factory=dict)
-    row: Row | None = None
-    blocks: Mapping[str, Any] | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    table: Path | None = None
+    line: int = 0
 
     @property
-    def settings(self) -> Mapping[str, Any]:
-        """Blocks of a config with what a sheet's row says of the trace."""
-        return self.row.settings if self.row else {}
+    def configs(self) -> list[Path]:
+        """The default study's config, and over it the user's if there is one."""
+        return [default_config(), *([self.config] if self.config else [])]
 
     @property
     def given(self) -> dict[str, Any]:
-        """Blocks of the user's: those of the config, and over them those of a sheet's row."""
-        found: dict[str, Any] = overlaid(self._own_blocks, dict(self.settings))
+        """Blocks of the user's: those of the config, and over them those of a row."""
+        found: dict[str, Any] = overlaid(read_configs(self.configs[1:]), dict(self.settings))
         return found
 
     @property
-    def merged(self) -> dict[str, Any]:
-        """Blocks of the default study, and over them the user's but for those of a row."""
-        found: dict[str, Any] = overlaid(read_configs([default_config()]), self._own_blocks)
-        return found
+    def place(self) -> str:
+        """The trace, or the row that lists it, for messages."""
+        return place(self.table, self.line) if self.table else visible(self.trace)
 
-    @property
-    def _own_blocks(self) -> dict[str, Any]:
-        if self.blocks is not None:
-            return dict(self.blocks)
-        return read_configs([self.config]) if self.config else {}
+    def lines(self, case: str) -> list[tuple[str, dict[KeyPath, int]]]:
+        """Return the table, with the row's line for each of its settings; nothing without one."""
+        if self.table is None:
+            return []
+        paths = [
+            ("cases", case, *path) if path[0] == "sample" else path
+            for path in _leaves(self.settings)
+        ]
+        return [(shown_path(self.table), dict.fromkeys(paths, self.line))]
+
+
+def _leaves(settings: Mapping[str, Any], above: KeyPath = ()) -> Iterator[KeyPath]:
+    """Yield the paths of all keys of some blocks that are no blocks themselves."""
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, (*above, name))
+        else:
+            yield (*above, name)
 
 
 @dataclass(frozen=True)
@@ -265,7 +280,6 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
     return {
         WRITTEN_BY: __version__,
         "trace": str(options.trace),
-        **_of_row(options.row),
         "model": case_problem.model.name,
         "model_title": case_problem.model.title,
         "confidence": case.confidence,
@@ -282,11 +296,6 @@ def _data(options: IdentifyOptions, trace: TraceCase, judged: Judged) -> dict[st
         "by_default": by_default(options.given) if instrument.has_jaws else [],
         "versions": versions(),
     }
-
-
-def _of_row(row: Row | None) -> dict[str, Any]:
-    """Return what a sheet says of its trace, or nothing."""
-    return {"cell": row.cell, "factors": dict(row.factors)} if row else {}
 
 
 def _read_as(case: Case, recorded: Measurements) -> dict[str, Any]:
@@ -329,8 +338,7 @@ def study_of(options: IdentifyOptions) -> Study:
     sample = CANDIDATES[options.model]
     for path, text in fixed_problems(sample.model, options.fixed):
         raise BiogripError(f"--fix: {dotted(path)}: {text}" if path else f"--fix: {text}")
-    files = [default_config(), *([options.config] if options.config else [])]
-    merged = options.merged
+    merged = read_configs(options.configs)
     name = re.sub(r"[^A-Za-z0-9_-]", "_", options.trace.stem)[:60]
     case = name if re.match("[A-Za-z]", name) else f"trace_{name}"
     read_as, settings = options.read_as, dict(options.settings)
@@ -343,8 +351,8 @@ def study_of(options: IdentifyOptions) -> Study:
         measured = laid_over(read_as.over(measured), own)
         merged["measurement"] = measured | {"file": str(options.trace)}
         merged = with_instrument(merged, options.given, read_as, options.trace)
-    # Cases and a sheet of the config are meant for the workflow; blocks are in the settings.
-    for name in ("only", "blocks", "traces"):
+    # Cases and a table of the config are meant for the workflow.
+    for name in ("only", "traces"):
         merged.pop(name, None)
     merged["cases"] = {
         case: {
@@ -352,8 +360,13 @@ def study_of(options: IdentifyOptions) -> Study:
             "fixed": {**options.fixed, **settings.get("fixed", {})},
         }
     }
-    over = [options.row.lines(case)] if options.row else []
-    return load_study(merged, files, command_line=["cases"], for_workflow=False, over=over)
+    return load_study(
+        merged,
+        options.configs,
+        command_line=["cases"],
+        for_workflow=False,
+        over=options.lines(case),
+    )
 
 
 def _sample(by_option: Sample, own: Mapping[str, Any]) -> dict[str, Any]:

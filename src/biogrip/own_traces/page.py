@@ -29,7 +29,7 @@ def write_page(
     traces: Sequence[Mapping[str, Any]],
     refused: Mapping[str, str],
     page: Path,
-    groups: Mapping[str, Any] | None = None,
+    copied: Mapping[str, Mapping[str, str]] | None = None,
 ) -> None:
     """Write a page as HTML.
 
@@ -41,11 +41,13 @@ def write_page(
         Error messages of other traces, by file.
     page
         File to write.
-    groups
-        Result of `compare_groups` for groups of these traces, if they were compared.
+    copied
+        Cells to copy of each trace, by file and column. By default none.
     """
     here = Path(__file__).parent
-    traces = [{**each, **_cell_and_factors(each)} for each in traces]
+    words = {visible(trace): _shown(own) for trace, own in (copied or {}).items()}
+    traces = [{**each, "copied": words.get(each["trace"], {})} for each in traces]
+    columns = list(dict.fromkeys(name for own in words.values() for name in own))
     environment = jinja2.Environment(
         autoescape=True,
         trim_blocks=True,
@@ -60,32 +62,29 @@ def write_page(
     counts = {status: sum(each["fit"] == status for each in traces) for status in _STATUSES}
     text = environment.get_template("traces.html.j2").render(
         traces=traces,
-        refused={visible(trace): visible_lines(reason) for trace, reason in refused.items()},
+        refused=[
+            (visible(trace), words.get(visible(trace), {}), visible_lines(reason))
+            for trace, reason in refused.items()
+        ],
         several=several,
         written_by=f"{WRITTEN_BY} {__version__}",
         style="".join((here / name).read_text(encoding="utf-8") for name in _STYLES),
         script=(here / "traces.js").read_text(encoding="utf-8"),
         normal=json_in_page(_normal(traces)),
-        strips=json_in_page(strips_of(traces, groups)) if several and traces else "",
+        strips=json_in_page(strips_of(traces, columns)) if several and traces else "",
         columns={label: with_unit(label, units[label]) for label in labels_of(traces)},
-        cells=any(each.get("cell") for each in traces),
-        factors=_factors(traces),
+        copied=columns,
         sorts_as=_sorts_as,
         marks=_STATUSES,
         counts=counts,
         setups=setups,
         in_unit=in_unit,
-        compared=_compared(groups) if groups else None,
     )
     write_text(page, text)
 
 
-def _cell_and_factors(trace: Mapping[str, Any]) -> dict[str, Any]:
-    """Return cell and factors that a sheet says of a trace, or nothing."""
-    if "cell" not in trace:
-        return {}
-    factors = {visible(name): visible(level) for name, level in trace["factors"].items()}
-    return {"cell": visible(trace["cell"]), "factors": factors}
+def _shown(words: Mapping[str, str]) -> dict[str, str]:
+    return {visible(name): visible(word) for name, word in words.items()}
 
 
 def _normal(traces: Sequence[Mapping[str, Any]]) -> dict[int, list[float]]:
@@ -93,33 +92,8 @@ def _normal(traces: Sequence[Mapping[str, Any]]) -> dict[int, list[float]]:
     return {count: normal_quantiles(count) for count in {t["drawn_quantiles"] for t in traces}}
 
 
-def _factors(traces: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return the names of all factors of traces."""
-    return list(dict.fromkeys(name for each in traces for name in each.get("factors") or {}))
-
-
 def _sorts_as(quantity: Mapping[str, Any]) -> float | None:
     """Return the number by which a quantity is sorted: value or limit, or None without any."""
     low, high = quantity["low"], quantity["high"]
     found = quantity["value"] if low is not None and high is not None else low or high
     return None if found is None else float(f"{found:.6g}")
-
-
-def _compared(groups: Mapping[str, Any]) -> dict[str, Any]:
-    # Imported here: most pages are of traces alone.
-    from biogrip.own_traces.groups_of_cells import difference_rows, group_rows
-
-    percent = f"{100 * groups['confidence']:g} %"
-    return {
-        "medians": group_rows(groups["groups"], percent),
-        "differences": difference_rows(groups["differences"], percent),
-        "doubtful": groups["doubtful"],
-        "without": difference_rows(groups["differences_without_doubtful"], percent),
-        "limits": groups["limits"],
-        "rejected": [
-            (cell["cell"], cell["reasons"][0])
-            for cell in groups["cells"]
-            if cell["cell"] in groups["rejected"]
-        ],
-        "problem": groups.get("problem"),
-    }

@@ -1,69 +1,36 @@
-"""Numbers of all cells from which a page draws the distribution of each quantity."""
+"""Numbers of all traces from which a page draws the distribution of each quantity."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from biogrip.own_traces.words import labels_of
-from biogrip.terminal import visible
-
-_FACTORS_FIRST = ("dish", "group")
 
 
-def strips_of(
-    traces: Sequence[Mapping[str, Any]], groups: Mapping[str, Any] | None
-) -> dict[str, Any]:
-    """Return value and limits of every quantity of each trace, and medians of groups.
+def strips_of(traces: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> dict[str, Any]:
+    """Return value and limits of every quantity of each trace.
 
     Parameters
     ----------
     traces
         Traces as on the page, in its order.
-    groups
-        Result of `compare_groups`, if groups were compared.
+    columns
+        Names of the columns that are copied from a table, by any of which points are sorted.
     """
-    factor, group_of = _groups_of(traces, groups)
-    factors = [
-        {**({factor: own} if own else {}), **(each.get("factors") or {})}
-        for each, own in zip(traces, group_of, strict=True)
-    ]
-    names = list(dict.fromkeys(name for own in factors for name in own))
-    first = next((name for name in (factor, *_FACTORS_FIRST) if name in names), None)
-    names.sort(key=lambda name: name != first)
     labels = labels_of(traces)
     units = {q["quantity"]: q["unit"] for each in traces for q in each["quantities"]}
     return {
         "quantities": [{"name": label, "unit": units[label]} for label in labels],
-        "factors": names,
+        "columns": list(columns),
         "cells": [
             {
-                "name": each.get("cell") or each["trace"],
+                "name": each["trace"],
                 "fit": each["fit"],
-                "levels": [str(own.get(name, "")) for name in names],
+                "levels": [each["copied"].get(name, "") for name in columns],
                 "found": [_numbers(each, label) for label in labels],
             }
-            for each, own in zip(traces, factors, strict=True)
-        ],
-        "by": factor,
-        "medians": [
-            [row["group"], row["quantity"], *map(_short, (row["median"], row["low"], row["high"]))]
-            for row in (groups or {"groups": []})["groups"]
-            if "median" in row
+            for each in traces
         ],
     }
-
-
-def _groups_of(
-    traces: Sequence[Mapping[str, Any]], groups: Mapping[str, Any] | None
-) -> tuple[str, list[str]]:
-    """Return the factor that makes the groups that were compared, and the group of each trace."""
-    if groups is None:
-        return "", [""] * len(traces)
-    of_file = {
-        visible(trace["file"]): cell["group"]
-        for cell in groups["cells"]
-        for trace in cell["traces"]
-    }
-    return groups.get("by", "group"), [of_file.get(each["trace"], "") for each in traces]
 
 
 def _numbers(each: Mapping[str, Any], label: str) -> list[float | None] | None:

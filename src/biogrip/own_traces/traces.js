@@ -281,9 +281,9 @@
 
   const all = byId("strips-data") && read("strips-data");
 
-  const levelOf = (cell, factor) => (factor < 0 ? "" : cell.levels[factor] || "–");
+  const levelOf = (cell, column) => (column < 0 ? "" : cell.levels[column] || "–");
 
-  function drawStrip(index, factor) {
+  function drawStrip(index, column) {
     const { name, unit } = all.quantities[index], counts = { determined: 0, "bounded below": 0, "bounded above": 0, "not determined": 0 };
     const cells = [];
     let rejected = 0;
@@ -294,7 +294,7 @@
       const kind = low !== null ? (high !== null ? "determined" : "bounded below") : (high !== null ? "bounded above" : "not determined");
       counts[kind] += 1;
       const at = kind === "determined" ? value : low ?? high;
-      if (at > 0) cells.push({ number, at, low, high, kind, hollow: cell.fit === "doubtful", level: levelOf(cell, factor) });
+      if (at > 0) cells.push({ number, at, low, high, kind, hollow: cell.fit === "doubtful", level: levelOf(cell, column) });
     });
     const words = Object.entries(counts).filter(([, count]) => count).map(([kind, count]) => `${count} ${kind}${kind === "not determined" ? " (not drawn)" : ""}`);
     if (rejected) words.push(`${rejected} with rejected fits left out`);
@@ -305,25 +305,20 @@
       return element;
     }
     cells.sort((a, b) => a.at - b.at);
-    const levels = [...new Set(all.cells.map((cell) => levelOf(cell, factor)))];
-    const medians = all.factors[factor] === all.by ? all.medians.filter(([level, quantity]) => quantity === name && levels.includes(level)) : [];
-    const [low, high] = extent([...cells.flatMap((c) => [c.at, c.low, c.high]), ...medians.flat()].filter((v) => typeof v === "number" && v > 0));
+    const levels = [...new Set(all.cells.map((cell) => levelOf(cell, column)))];
+    const [low, high] = extent(cells.flatMap((c) => [c.at, c.low, c.high]).filter((v) => typeof v === "number" && v > 0));
     const margin = Math.max((high / low) ** 0.06, 1.01), arrow = Math.max((high / low) ** 0.15, 1.03);
     const room = (kind) => (cells.some((cell) => cell.kind === kind) ? arrow : margin);
     const box = { left: 54, top: 10, width: 318, height: 180 };
     const each = box.width / levels.length;
     const ticks = levels.map((level, i) => [(i + 0.5) / levels.length, level.length > each / 6 ? `${level.slice(0, Math.max(Math.floor(each / 6) - 1, 1))}…` : level]);
-    const drawn = axes(box, { ends: [0, 1], ticks: factor < 0 ? [] : ticks, label: factor < 0 ? "cells" : all.factors[factor] },
+    const drawn = axes(box, { ends: [0, 1], ticks: column < 0 ? [] : ticks, label: column < 0 ? "cells" : all.columns[column] },
       { ends: [low / room("bounded above"), high * room("bounded below")], log: true, label: withUnit(name, unit), most: 5 });
     const dots = [];
     levels.forEach((level, i) => {
       const own = cells.filter((cell) => cell.level === level), step = 0.86 * each / Math.max(own.length, 1);
       const bars = [], width = few(Math.max(Math.min(step * 0.4, 1.2), 0.2));
       const radius = Math.max(Math.min(step * 0.45, 3.2), 0.9);
-      for (const [, , median, from, to] of medians.filter((row) => row[0] === level)) {
-        drawn.band("around-median", (i + 0.04) * each, drawn.Y(to), (i + 0.96) * each, drawn.Y(from));
-        drawn.path("median", `M${few((i + 0.04) * each)} ${few(drawn.Y(median))}h${few(0.92 * each)}`);
-      }
       own.forEach((cell, place) => {
         cell.x = (i + 0.07) * each + (place + 0.5) * step;
         cell.y = drawn.Y(cell.at);
@@ -361,19 +356,19 @@
     return element;
   }
 
-  function drawStrips(factor) {
-    byId("strips").replaceChildren(...all.quantities.map((_, index) => drawStrip(index, factor)));
+  function drawStrips(column) {
+    byId("strips").replaceChildren(...all.quantities.map((_, index) => drawStrip(index, column)));
   }
 
   if (all) {
-    if (all.factors.length) {
+    if (all.columns.length) {
       const label = document.createElement("label"), select = document.createElement("select");
-      select.append(...all.factors.map((name, i) => new Option(name, i)));
+      select.append(...all.columns.map((name, i) => new Option(name, i)));
       select.addEventListener("change", () => drawStrips(Number(select.value)));
-      label.append("By factor", select);
+      label.append("By column", select);
       byId("by").append(label);
     }
-    drawStrips(all.factors.length ? 0 : -1);
+    drawStrips(all.columns.length ? 0 : -1);
   }
   filter();
   openNamed();

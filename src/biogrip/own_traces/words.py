@@ -5,7 +5,6 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-
 from biogrip.digits import with_unit
 from biogrip.identifiability.fit_status import OK, REJECTED
 from biogrip.identifiability.verdicts import (

@@ -26,7 +26,6 @@ def shown(
     rule: str = "",
     when: Callable[[Study], object] = lambda _: True,
     weight: Weight = LIGHT,
-    of_traces: bool = False,
 ) -> Product:
     """Declare a product that the report shows: one of the study, or of each case or sweep.
 
@@ -58,5 +57,4 @@ def shown(
         category=category,
         item=item,
         caption=caption,
-        of_traces=of_traces,
     )

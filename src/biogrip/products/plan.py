@@ -15,10 +15,7 @@ from biogrip.products.batches import (
 from biogrip.study.study import Study
 
 Wildcards = Mapping[str, str]
-"""Wildcards of a job, any of ``case``, ``method``, ``batch``, ``sweep``, ``seed``, ``rows``."""
-
-ROWS_A_BATCH = 25
-"""Rows of a sheet whose traces one job fits."""
+"""Wildcards of a job, any of ``case``, ``method``, ``batch``, ``sweep``, ``seed``."""
 
 
 @dataclass(frozen=True)
@@ -46,12 +43,6 @@ class Plan:
             size = self.study.batch_size or seeds_a_batch(seeds)
             self._planned[folder] = plan_batches(seeds, size, existing)
         return self._planned[folder]
-
-    @property
-    def row_jobs(self) -> list[Wildcards]:
-        """Wildcards of every batch of rows of the sheet: the number of its first row, from 0."""
-        count = len(self.study.traces.rows) if self.study.traces else 0
-        return [{"rows": str(start)} for start in range(0, count, ROWS_A_BATCH)]
 
     def batch_files(self, pattern: str, case: str) -> list[str]:
         """Return a path pattern filled in for every batch of a case.

@@ -100,11 +100,6 @@ class Product:
     """Function of the wildcards that names further modules whose code the product depends on."""
     by_default: bool = True
     """True if a run makes it by default."""
-    beside: Callable[[Study, Wildcards], list[str]] = lambda _, __: []
-    """Function that names files that a job writes beside its outputs, and keeps when it is done
-    again; where one is lost, it is."""
-    of_traces: bool = False
-    """True if it is made of a sheet of traces; others are made where a study has cases."""
 
     @property
     def module(self) -> str:

@@ -85,8 +85,8 @@ class Residuals:
         return self.samples - taken_out(self._condensed.nuisance)
 
     @property
-    def sampling_s(self) -> Array | None:
-        """Ascending sampling times, (n_samples,); None of several traces together."""
+    def sampling_s(self) -> Array:
+        """Ascending sampling times, (n_samples,)."""
         return self._time_s
 
     def grip(self, log_parameters: Array) -> Grip | None:

@@ -59,8 +59,6 @@ def _make(
 ) -> None:
     results = rule.plan.results
     outputs = [Path(file) for product in requested for file in product.outputs(job).values()]
-    study = rule.plan.study
-    outputs += [Path(file) for product in requested for file in product.beside(study, job)]
     refuse_links(results, [*outputs, results / JOURNALS])
     refuse_files_as_folders(results, [*outputs, results / JOURNALS / "a journal"])
     files = [Path(file) for file in inputs_of(rule, job)]
@@ -98,9 +96,8 @@ def _check(rule: ProductRule, job: Mapping[str, str]) -> None:
             raise BiogripError(
                 f"--{name}: found '{job[name]}'.{hint} Allowed: {', '.join(allowed[:20])}."
             )
-    for name in ("seed", "rows"):
-        if name in job and not job[name].isdigit():
-            raise BiogripError(f"--{name}: found '{job[name]}', allowed is a number.")
+    if "seed" in job and not job["seed"].isdigit():
+        raise BiogripError(f"--seed: found '{job['seed']}', allowed is a number.")
     if "batch" in job:
         _check_batch(rule, job)
 

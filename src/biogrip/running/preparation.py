@@ -13,7 +13,6 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from biogrip.own_traces.fitted_cells import check_sheet
 from biogrip.products.catalogue import products
 from biogrip.products.plan import Plan
 from biogrip.products.stages.recording import check_traces
@@ -22,7 +21,7 @@ from biogrip.running.locks import is_locked, is_locked_by_dead
 from biogrip.running.manifest import Manifest
 from biogrip.running.provenance import Provenance
 from biogrip.running.resolved import write_study
-from biogrip.running.rules import ProductRule, files_of, make_rules, needed_for, with_losses
+from biogrip.running.rules import ProductRule, files_of, make_rules, needed_for
 from biogrip.running.wholeness import check_results
 from biogrip.study.defaults import default_config, snakefile
 from biogrip.study.load import load_study, read_configs
@@ -87,8 +86,7 @@ def prepared(arguments: Sequence[str]) -> list[str]:
         if not options.dryrun:
             write_study(study, RESULTS)
         needed = needed_for(map(os.path.normpath, options.targets), rules)
-        stale = [*made_otherwise(rules, RESULTS), *with_losses(rules)]
-        stale = [file for file in dict.fromkeys(stale) if file in needed]
+        stale = [file for file in made_otherwise(rules, RESULTS) if file in needed]
     done = True
     again = ["--forcerun", *(options.forcerun or ()), *stale] if stale else []
     own = options.dryrun or options.verbose or options.logger or options.quiet is not None
@@ -149,7 +147,6 @@ def _checked(options: Any, folder: Path) -> Study:
     with chdir(folder if folder.is_dir() else "."):
         study = load_study(config, [default_config(), *files], command_line=options.config)
         check_traces(study)
-        check_sheet(study)
     return study
 
 

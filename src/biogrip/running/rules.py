@@ -1,11 +1,9 @@
 """Snakemake rules: products that one job makes, with wildcards, inputs, outputs and resources."""
 
-import os
 import re
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import PurePath
 
 from biogrip.products.digest import digest
@@ -20,7 +18,6 @@ _CONSTRAINTS = {
     "method": "[a-z_]+",
     "sweep": "[A-Za-z][A-Za-z0-9_]*",
     "seed": r"\d+",
-    "rows": r"\d+",
 }
 
 GROUPS = {
@@ -67,19 +64,8 @@ class ProductRule:
             for kind, pattern in product.writes.items()
         }
 
-    def beside(self, job: Wildcards) -> list[str]:
-        """Return the files that a job writes beside its outputs."""
-        study = self.plan.study
-        return [file for product in self.products for file in product.beside(study, job)]
-
-    @cached_property
-    def _every_beside(self) -> set[str]:
-        return {file for job in self.jobs for file in self.beside(job)}
-
     def makes(self, file: str) -> bool:
         """Return True if a job of the rule could write a file, planned or not."""
-        if file in self._every_beside:
-            return True
         values = {name: f"(?:{value})" for name, value in self.constraints.items()}
         patterns = (pattern.replace(".", r"\.") for pattern in self.outputs.values())
         return any(re.fullmatch(pattern.format(**values), file) for pattern in patterns)
@@ -165,10 +151,9 @@ def inputs_of(rule: ProductRule, job: Wildcards) -> list[str]:
 
 def make_rules(products: Iterable[Product], plan: Plan) -> list[ProductRule]:
     """Return the rules of a plan, grouping products that one job makes."""
-    study = plan.study
-    made = [own for own in products if (study.traces if own.of_traces else study.cases)]
     return [
-        ProductRule(each.rule, each.products, plan, each.jobs) for each in group_by_rule(made, plan)
+        ProductRule(each.rule, each.products, plan, each.jobs)
+        for each in group_by_rule(products, plan)
     ]
 
 
@@ -180,23 +165,6 @@ def files_of(rules: Iterable[ProductRule]) -> list[str]:
         for product in rule.products
         for job in rule.jobs
         for file in product.outputs(job).values()
-    ]
-
-
-def all_written(rules: Sequence[ProductRule]) -> list[str]:
-    """Return every file of a study, with those that jobs write beside their outputs."""
-    beside = [file for rule in rules for job in rule.jobs for file in rule.beside(job)]
-    return [*files_of(rules), *beside]
-
-
-def with_losses(rules: Iterable[ProductRule]) -> list[str]:
-    """Return the outputs that are there of jobs that have lost files beside them."""
-    return [
-        file
-        for rule in rules
-        for job in rule.jobs
-        if not all(map(os.path.lexists, rule.beside(job)))
-        for file in filter(os.path.lexists, rule.files(job))
     ]
 
 

@@ -10,7 +10,7 @@ from biogrip.products.plan import Plan
 from biogrip.running.manifest import STUDY, Manifest
 from biogrip.running.provenance import Provenance, name_of
 from biogrip.running.resolved import read_study
-from biogrip.running.rules import all_written, make_rules
+from biogrip.running.rules import files_of, make_rules
 
 
 def verify(results: Path) -> str:
@@ -46,7 +46,7 @@ def verify(results: Path) -> str:
             for name in sorted(Provenance(results, manifest).outdated(rules))
             if manifest.knows(name)
         ]
-        others = len(manifest.others([*map(name_of, all_written(rules)), STUDY]))
+        others = len(manifest.others([*map(name_of, files_of(rules)), STUDY]))
     if problems:
         raise BiogripError("\n".join([*problems, "The next run makes them again."]))
     also = f" Of other studies than {results / STUDY}: {others}." if others else ""

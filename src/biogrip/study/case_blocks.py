@@ -389,6 +389,3 @@ def _of_kind(kind: str) -> list[Instrument]:
 
 OVERRIDABLE = (*Shared.model_fields, *METHOD_BLOCKS)
 """Blocks that a study sets for all cases, and that a case may change for itself."""
-
-NAMABLE = ("gripper", "protocol", "measurement", "search_range", "models", "fixed")
-"""Those that a config may define by name, under ``blocks``, for the rows of a sheet."""

@@ -12,11 +12,11 @@ from biogrip.experiment.springpot import LONGEST_S
 from biogrip.identify.methods import METHODS
 from biogrip.instrument.actuator import CombDrive
 from biogrip.keys import Block, Distinct, OneOf, Problem
-from biogrip.study.case_blocks import NAMABLE, OVERRIDABLE, CaseBlock, Shared
+from biogrip.study.case_blocks import OVERRIDABLE, CaseBlock, Shared
 from biogrip.study.design_block import DesignBlock
 from biogrip.study.interpretations import InterpretationBlock
 from biogrip.study.sweeps import MOST_POINTS, SweepBlock
-from biogrip.study.traces_block import Traces
+from biogrip.study.traces_block import TracesBlock
 
 SMALLEST_BATCH, LARGEST_BATCH, USUAL_BATCHES = 250, 1000, 8
 """Least and most seeds of a job, and the number of jobs aimed at in between, by default."""
@@ -127,21 +127,11 @@ class StudyConfig(Shared):
             "this case alone.",
         ),
     ]
-    blocks: Annotated[
-        Mapping[
-            Annotated[str, OneOf(NAMABLE)],
-            Annotated[Mapping[_Name, dict[str, Any]], Field(max_length=1000)],
-        ],
-        Field(
-            description="Blocks by name, as `protocol: {short: {phases: ...}}`, that rows of a "
-            "sheet name in a column `protocol`; they are laid over the config's own."
-        ),
-    ] = {}
     traces: Annotated[
-        Traces | None,
+        TracesBlock | None,
         Field(
-            description="A sheet of recorded traces, a row a trace, which are identified in "
-            "batches. The study then has the default cases only if it names `cases`, too."
+            description="A table of recorded traces, which are identified in batches beside the "
+            "cases, as `biogrip identify` does."
         ),
     ] = None
     only: Annotated[
@@ -180,10 +170,8 @@ class StudyConfig(Shared):
             if seeds > _MOST_BATCHES * self.batch_size:
                 text = f"found {self.batch_size}, which makes {seeds} seeds more than "
                 yield ("batch_size",), f"{text}{_MOST_BATCHES} batches; allowed are larger ones."
-        if self.blocks and not self.traces:
-            yield ("blocks",), "is for rows of a sheet, which this study has none of; leave it out."
-        if not (self.cases or self.traces):
-            yield ("cases",), "found none, allowed is one or more, or a sheet under `traces`."
+        if not self.cases:
+            yield ("cases",), "found none, allowed is one or more."
         yield from self._band_problems()
         for name, case in self.cases.items():
             for path, text in case.comb_problems(self.actuator):

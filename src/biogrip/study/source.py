@@ -27,7 +27,7 @@ class ConfigFiles:
     command_line: frozenset[Hashable] = frozenset()
     """Top-level keys set on the command line, which override all files."""
     over: tuple[tuple[str, Mapping[KeyPath, int]], ...] = ()
-    """Lines of the keys of a sheet's row, by the sheet, which override even these."""
+    """Lines of the keys of a row in a table of traces, by the table, which override even these."""
 
     def place(self, path: KeyPath) -> str:
         """Return where the value in force was set, e.g. ``"config/my.yaml, line 7"``.

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
 
 from biogrip.experiment.protocol import Phase, torque_history
@@ -19,13 +18,11 @@ from biogrip.study.case_blocks import CALIBRATED, CaseBlock
 from biogrip.study.config import StudyConfig
 from biogrip.study.interpretations import read_blocks
 from biogrip.study.plain import built, plain
-from biogrip.study.sheet import GROUP, Cell, Row, Sheet, cells_of
 from biogrip.study.source import overlaid
 from biogrip.study.sweeps import point_blocks
 
 if TYPE_CHECKING:
     from biogrip.identify.least_squares import LeastSquaresSettings
-    from biogrip.study.traces_block import TracesBlock
 
 _Part = TypeVar("_Part")
 
@@ -259,8 +256,8 @@ class Study:
     """Increase of chi^2 over the lowest known that still counts as the global optimum."""
     gripper = _of_study(lambda study: study.config.gripper.neutral)
     """The gripper in its neutral configuration."""
-    traces = _of_study(lambda study: cast("TracesBlock | None", study.config.traces))
-    """Sheet of recorded traces, with its rows, if there is one."""
+    traces = _of_study(lambda study: study.config.traces)
+    """Table of recorded traces, if there is one."""
     jaw_gap_m = _of_study(lambda study: study.config.gripper.jaw_gap_m)
     """Distance between the jaws in the neutral configuration."""
     actuator = _of_study(lambda study: study.config.actuator)
@@ -272,34 +269,6 @@ class Study:
     def cases(self) -> dict[str, Case]:
         """Cases by name, in the order of the config."""
         return self._cases(self.config.cases)
-
-    @cached_property
-    def group_factor(self) -> str | None:
-        """Factor of the sheet that makes groups, or None if it does not say which."""
-        if self.traces is None:
-            return None
-        factors = list(self.traces.rows[0].factors) if self.traces.rows else []
-        if self.traces.by is not None or GROUP in factors:
-            return self.traces.by or GROUP
-        return factors[0] if len(factors) == 1 else None
-
-    @cached_property
-    def cells(self) -> list[Cell]:
-        """Cells of the sheet with their groups; none if there are no groups.
-
-        Raises
-        ------
-        BiogripError
-            If a cell has no group, or two.
-        """
-        if self.traces is None or self.group_factor is None:
-            return []
-        path = Path(self.traces.sheet)
-        rows = tuple(
-            Row(path, row.line, Path(row.file), row.cell, row.factors, row.settings)
-            for row in self.traces.rows
-        )
-        return cells_of(Sheet(path, tuple(rows[0].factors), rows), self.group_factor)[1]
 
     @cached_property
     def points(self) -> dict[str, Case]:

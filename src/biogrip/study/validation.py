@@ -47,7 +47,7 @@ def checked_study(
     _refuse(_point_problems(study), files)
     _refuse(_reading_problems(study), files)
     if for_workflow:
-        _refuse(_workflow_problems(study.cases), files)
+        _refuse(_workflow_problems(study), files)
     return study
 
 
@@ -170,8 +170,11 @@ def brackets_problem(file: str) -> str | None:
     return None
 
 
-def _workflow_problems(cases: Mapping[str, CaseBlock]) -> Iterator[Problem]:
+def _workflow_problems(study: StudyConfig) -> Iterator[Problem]:
     """Find paths of traces that Snakemake would read as wildcards."""
-    for name, case in cases.items():
+    for key in ("table", "config") if study.traces else ():
+        if problem := brackets_problem(getattr(study.traces, key) or ""):
+            yield ("traces", key), problem
+    for name, case in study.cases.items():
         if problem := brackets_problem(case.measurement.file or ""):
             yield ("cases", name, "measurement", "file"), problem

@@ -3,7 +3,6 @@
 ``make pinned`` draws the pictures anew. Look at what has changed before you commit them.
 """
 
-import json
 from collections.abc import Callable
 from itertools import product as all_pairs
 from pathlib import Path
@@ -18,7 +17,6 @@ from matplotlib.image import imread
 from PIL import Image
 
 from biogrip.arrays import Array
-from biogrip.own_traces import groups_of_study
 from biogrip.products.catalogue import products
 from biogrip.products.figures import declared
 from biogrip.products.figures import robustness as heat_map
@@ -26,7 +24,7 @@ from biogrip.products.figures.style import lay_out, styled
 from biogrip.products.heat_maps import heat_maps
 from biogrip.products.plan import Plan
 from biogrip.products.stages.sweep_points import POINTS
-from tests.helpers.default import STUDY, plan_of, study_of
+from tests.helpers.default import plan_of, study_of
 from tests.helpers.runs import SMALL
 
 PINNED = Path(__file__).with_name("pinned")
@@ -70,7 +68,6 @@ HEAT_MAPS = "robustness_level"
 # Those of overlays, by what they are drawn from here.
 OTHERS = {
     HEAT_MAPS: "robustness_figure",
-    "groups_made_up": "groups_figure",
 }
 NAMES = [*JOBS, *OTHERS]
 EACH = pytest.mark.parametrize(
@@ -146,28 +143,7 @@ def figure(
     if request.param not in OTHERS:
         return draw(request.param)
     with styled():
-        if request.param == HEAT_MAPS:
-            study = study_of(SWEEP)
-            return heat_map.draw(heat_maps(study, {"sweep": "level"}), judged)
-        return _groups(tmp_path_factory.mktemp("groups") / "groups.json")
-
-
-def _groups(data: Path) -> Figure:
-    """Two groups of cells: determined, bounded, doubtful and rejected ones, made up."""
-    rng = np.random.default_rng(1)
-    cells, groups = [], []
-    for group, by in (("control", 1.0), ("treated", 1.5)):
-        values = by * 20 * np.exp(0.2 * rng.standard_normal(6))
-        for number, value in enumerate(values.tolist()):
-            limits = {"low": value / 1.1, "high": None if number == 5 else value * 1.1}
-            quantity = {"quantity": "k", "symbol": "$k$", "value": value, **limits}
-            fit = {3: "doubtful", 4: "rejected"}.get(number, "ok")
-            cells.append({"group": group, "fit": fit, "quantities": [quantity]})
-        middle = float(np.exp(np.mean(np.log(values))))
-        median = {"median": middle, "low": middle / 1.2, "high": middle * 1.2}
-        groups.append({"group": group, "quantity": "k", "unit": "N/m", **median})
-    data.write_text(json.dumps({"cells": cells, "groups": groups}))
-    return groups_of_study.draw_groups(None, data)
+        return heat_map.draw(heat_maps(study_of(SWEEP), {"sweep": "level"}), judged)
 
 
 @pytest.fixture

@@ -33,9 +33,6 @@ from biogrip.traces.late_onset import note_late_onset
 TRACE = 0
 """Seed of the trace that is judged."""
 
-ONSET_AS_FITTED = "The limits take the fitted onset as exact."
-"""Note where they do."""
-
 JUDGED_TRACE = Reads(
     lambda plan, job: [plan.batch_of_seed(MEASUREMENTS, job["case"], TRACE)], one=True
 )

@@ -1,0 +1,247 @@
+"""Medians and ratios of groups of cells, from the table that ``biogrip identify --csv`` writes.
+
+The logarithm of a quantity varies from cell to cell with the variance tau^2, and is known of cell i
+with the standard error s_i, from its limits. The mean of a group weighs each cell by
+1/(s_i^2 + tau^2), with tau^2 after DerSimonian and Laird (Controlled Clinical Trials 7 (1986),
+177-188). Its limits are those of Student's t after Hartung and Knapp, never closer than the weights
+say (Roever, Knapp and Friede, BMC Medical Research Methodology 15 (2015), 99). Two groups are
+compared by Welch's t, several with the first after Holm (Scandinavian Journal of Statistics 6
+(1979), 65-70).
+"""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import exp, log, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri, stdtr, stdtrit
+
+from biogrip import __version__
+from biogrip.arrays import Array
+from biogrip.digits import counted, rounded_numbers, with_unit
+from biogrip.errors import BiogripError, nearest
+from biogrip.files import refuse_inputs
+from biogrip.identifiability.fit_status import DOUBTFUL, REJECTED
+from biogrip.identifiability.verdicts import BOUNDED_ABOVE, BOUNDED_BELOW, DETERMINED
+from biogrip.own_traces.many_traces import FAILED
+from biogrip.own_traces.outputs import WRITTEN_BY, check_output
+from biogrip.products.files.rows import read_rows, write_rows
+from biogrip.terminal import aligned, visible, visible_lines
+
+FEWEST_CELLS = 3
+"""Fewest cells of which a median is estimated."""
+
+COLUMNS = "cells", "determined", "median", "low", "high", "ratio", "ratio_low", "ratio_high", "p"
+"""What is said of a quantity in a group."""
+
+Compared = dict[tuple[str, str], dict[str, Any]]
+
+_VALUE = re.compile(r"(.*) value(?: \((.*)\))?")
+_ONE_SIDED = {BOUNDED_ABOVE: ("at most", "lower"), BOUNDED_BELOW: ("at least", "higher")}
+
+
+@dataclass
+class Cell:
+    """A cell, and what its traces tell of each quantity."""
+
+    name: str
+    group: str
+    doubtful: bool = False
+    traces: list[Mapping[str, str]] = field(default_factory=list)
+    known: dict[str, tuple[float, float]] = field(default_factory=dict)
+    """Logarithm of each quantity that is determined, and its standard error."""
+    others: dict[str, tuple[str, str]] = field(default_factory=dict)
+    """Verdict of each other quantity, and its only limit as text, or ""."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A mean of logarithms with its standard error, from some degrees of freedom."""
+
+    mean: float
+    error: float
+    freedom: float
+
+    def over(self, other: "Estimate") -> "Estimate":
+        """Return the difference from another, with Satterthwaite's degrees of freedom."""
+        own, others = self.error**2, other.error**2
+        freedom = (own + others) ** 2 / (own**2 / self.freedom + others**2 / other.freedom)
+        return Estimate(self.mean - other.mean, sqrt(own + others), freedom)
+
+    def limits(self, confidence: float) -> tuple[float, float, float]:
+        """Return the value, no longer a logarithm, and its limits."""
+        reach = float(stdtrit(self.freedom, (1 + confidence) / 2)) * self.error
+        return exp(self.mean), exp(self.mean - reach), exp(self.mean + reach)
+
+    @property
+    def p_value(self) -> float:
+        """Two-sided p value of a mean of 0."""
+        return 2 * float(stdtr(self.freedom, -abs(self.mean) / self.error))
+
+
+def estimate(values: Array, errors: Array) -> Estimate:
+    """Estimate the mean of a population from values (n,) with standard errors (n,)."""
+    weights, freedom = errors**-2.0, len(values) - 1
+    squares = weights @ (values - np.average(values, weights=weights)) ** 2
+    beyond = (squares - freedom) / (weights.sum() - weights @ weights / weights.sum())
+    weights = 1 / (errors**2 + max(beyond, 0.0))
+    mean = np.average(values, weights=weights)
+    variance = max(weights @ (values - mean) ** 2 / freedom, 1.0) / weights.sum()
+    return Estimate(float(mean), float(variance) ** 0.5, freedom)
+
+
+def adjusted(p_values: Sequence[float]) -> list[float]:
+    """Return p values adjusted for their number by Holm's method."""
+    found, largest = [0.0] * len(p_values), 0.0
+    for rank, index in enumerate(np.argsort(p_values)):
+        largest = max(largest, min(1.0, (len(p_values) - rank) * p_values[index]))
+        found[index] = largest
+    return found
+
+
+def compare(cells: Sequence[Cell], groups: Sequence[str], confidence: float) -> Compared:
+    """Return `COLUMNS` by quantity and group; ratio and p value are against the first group.
+
+    A median takes `FEWEST_CELLS` that determine the quantity, and no fewer than do not.
+    """
+    found: Compared = {}
+    for quantity in dict.fromkeys(name for cell in cells for name in cell.known | cell.others):
+        estimates: dict[str, Estimate] = {}
+        for group in groups:
+            all_known = [cell.known.get(quantity) for cell in cells if cell.group == group]
+            known = [own for own in all_known if own]
+            found[quantity, group] = {"cells": len(all_known), "determined": len(known)}
+            if len(known) >= max(FEWEST_CELLS, len(all_known) / 2):
+                estimates[group] = estimate(*np.array(known).T)
+                median = estimates[group].limits(confidence)
+                found[quantity, group] |= zip(COLUMNS[2:5], median, strict=True)
+        if groups[0] in estimates:
+            first = estimates.pop(groups[0])
+            ratios = {group: own.over(first) for group, own in estimates.items()}
+            p_values = adjusted([own.p_value for own in ratios.values()])
+            for (group, own), p in zip(ratios.items(), p_values, strict=True):
+                ratio = *own.limits(confidence), p
+                found[quantity, group] |= zip(COLUMNS[5:], ratio, strict=True)
+    return found
+
+
+def groups(found: Path, by: str, table: Path | None, *, force: bool) -> None:
+    """Compare groups of cells, print the comparison, and write it as CSV if asked.
+
+    Parameters
+    ----------
+    found
+        CSV file of ``biogrip identify --csv``.
+    by
+        Column that makes the groups. Traces of a cell, as a column `cell` says, are averaged.
+    table
+        CSV file to write, if any.
+    force
+        If true, replace even a file that biogrip did not write.
+
+    Raises
+    ------
+    BiogripError
+        If the file is no such table, or has no such column.
+    """
+    header, *rows = read_rows(found)
+    traces = [dict(zip(header, map(visible, row), strict=False)) for row in rows]
+    if missing := [name for name in ("trace", "fit", "confidence", by) if name not in header]:
+        raise BiogripError(
+            f"{visible(found)}: found no column '{missing[0]}'; allowed is a table that `biogrip "
+            f"identify --csv` wrote, and of --by a column of it.{nearest(missing[0], header)}"
+        )
+    if table is not None:
+        refuse_inputs([table], [found])
+        check_output(table, force=force)
+    used = [own for own in traces if own["fit"] not in (REJECTED, FAILED) and own[by]]
+    levels = sorted({own["confidence"] for own in used})
+    if len(levels) != 1:
+        raise BiogripError(
+            f"{visible(found)}: found limits of {' and '.join(levels) or 'no trace of a group'}; "
+            "allowed are those of one confidence, of traces whose fits are not rejected."
+        )
+    confidence = float(levels[0])
+    names = list(dict.fromkeys(own[by] for own in traces if own[by]))
+    units = {it[1]: it[2] or "" for name in header if (it := _VALUE.fullmatch(name))}
+    cells = _cells(used, by, units, confidence)
+    compared = compare(cells, names, confidence)
+    lines = [f"{visible(found)}: {counted(len(cells), 'cell')}, {100 * confidence:g} % limits"]
+    lines += [_printed(compared, names[0], units)]
+    lines += [*_left_out(traces, by, cells), *_not_known(cells, compared)]
+    if doubtful := [cell.name for cell in cells if cell.doubtful]:
+        again = compare([cell for cell in cells if not cell.doubtful], names, confidence)
+        lines += [f"Without the doubtful {', '.join(doubtful)}:", _printed(again, names[0], units)]
+    print(visible_lines("\n".join(lines)))
+    if table is not None:
+        own = ([*key, units[key[0]], *map(row.get, COLUMNS)] for key, row in compared.items())
+        names = ["quantity", "group", "unit", *COLUMNS, WRITTEN_BY]
+        write_rows(table, names, ([*rounded_numbers(row), __version__] for row in own))
+        print(f"Written to {visible(table)}.")
+
+
+def _cells(
+    traces: Sequence[Mapping[str, str]], by: str, units: Mapping[str, str], confidence: float
+) -> list[Cell]:
+    """Return cells; what their traces tell is averaged by the inverse squares of errors."""
+    cells: dict[tuple[str, str], Cell] = {}
+    for own in traces:
+        name = own.get("cell") or own["trace"]
+        cells.setdefault((name, own[by]), Cell(name, own[by])).traces.append(own)
+    width = 2 * float(ndtri((1 + confidence) / 2))
+    for cell in cells.values():
+        cell.doubtful = any(own["fit"] == DOUBTFUL for own in cell.traces)
+        for name, unit in units.items():
+            value, low, high = (with_unit(f"{name} {it}", unit) for it in ("value", "low", "high"))
+            some = [own for own in cell.traces if own[f"{name} verdict"] == DETERMINED]
+            if some:
+                logs = [log(float(own[value])) for own in some]
+                weights = [(width / log(float(own[high]) / float(own[low]))) ** 2 for own in some]
+                cell.known[name] = float(np.average(logs, weights=weights)), sum(weights) ** -0.5
+            elif verdict := cell.traces[0][f"{name} verdict"]:
+                cell.others[name] = verdict, cell.traces[0][low] or cell.traces[0][high]
+    return [*cells.values()]
+
+
+def _printed(compared: Compared, first: str, units: Mapping[str, str]) -> str:
+    """Return a comparison as a table."""
+    header = ["quantity", "group", "determined in", "median", f"ratio to {first}", "p"]
+    rows = [
+        [
+            *(with_unit(name, units[name]), group, f"{row['determined']} of {row['cells']}"),
+            "{median:.3g} ({low:.3g} to {high:.3g})".format(**row)
+            if "median" in row
+            else "too few",
+            "{ratio:.3g} ({ratio_low:.3g} to {ratio_high:.3g})".format(**row) if "p" in row else "",
+            f"{row['p']:.2g}" if "p" in row else "",
+        ]
+        for (name, group), row in compared.items()
+    ]
+    return aligned(rows, header)
+
+
+def _left_out(traces: Sequence[Mapping[str, str]], by: str, cells: Sequence[Cell]) -> Iterator[str]:
+    """Say which traces are left out, and which are averaged."""
+    for status, why in ((REJECTED, "the fit is rejected"), (FAILED, "not identified")):
+        if names := [own["trace"] for own in traces if own["fit"] == status]:
+            yield f"Left out, {why}: {', '.join(names)}."
+    if names := [own["trace"] for own in traces if not own[by]]:
+        yield f"Left out, nothing under {by}: {', '.join(names)}."
+    if names := [f"{it.name} ({len(it.traces)})" for it in cells if len(it.traces) > 1]:
+        yield f"Averages of several traces: {', '.join(names)}."
+
+
+def _not_known(cells: Sequence[Cell], compared: Compared) -> Iterator[str]:
+    """Say which cells are in no median, as they do not determine the quantity."""
+    for name, group in compared:
+        own = [cell for cell in cells if cell.group == group and name in cell.others]
+        others = [(cell.name, *cell.others[name]) for cell in own]
+        for verdict, (words, moved) in _ONE_SIDED.items():
+            if some := [f"{cell} ({words} {end})" for cell, it, end in others if it == verdict]:
+                what = f"{name} of {group}: only bounded in {', '.join(some)}, which the median"
+                yield f"{what} leaves out: that of all cells is {moved}."
+        if some := [cell for cell, verdict, _ in others if verdict not in _ONE_SIDED]:
+            yield f"{name} of {group}: nothing is told by {', '.join(some)}."

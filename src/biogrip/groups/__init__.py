@@ -1,1 +1,0 @@
-"""Groups of cells: replicates fitted jointly, populations, and differences between groups."""

@@ -1,0 +1,328 @@
+"""Groups of cells: estimates against known ones, promises by simulation, and what is said."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm, ttest_ind
+
+from biogrip.arrays import Array
+from biogrip.cli import main
+from biogrip.groups import FEWEST_CELLS, Cell, adjusted, compare, estimate
+from biogrip.own_traces.outputs import WRITTEN_BY
+from tests.helpers.places import ROOT
+
+# Log risk ratios of tuberculosis, with and without vaccination, and their variances: Colditz et
+# al., JAMA 271 (1994), 698-702, as in Viechtbauer, Journal of Statistical Software 36 (2010), 3.
+VACCINE = np.array(
+    [
+        *((-0.8893, 0.3256), (-1.5854, 0.1946), (-1.3481, 0.4154), (-1.4416, 0.0200)),
+        *((-0.2175, 0.0512), (-0.7861, 0.0069), (-1.6209, 0.2230), (0.0120, 0.0040)),
+        *((-0.4694, 0.0564), (-1.3713, 0.0730), (-0.3394, 0.0124), (0.4459, 0.5325)),
+        (-0.0173, 0.0714),
+    ]
+).T
+SPREAD, RATIO = 0.3, 1.5
+HEADER = ["trace", "dish", "cell", "fit", "confidence", "k verdict", "k value (N/m)"]
+HEADER += ["k low (N/m)", "k high (N/m)", "failed", WRITTEN_BY]
+
+
+def test_a_published_mean_is_found() -> None:
+    """DerSimonian and Laird's, and Hartung and Knapp's error, as statsmodels 0.14 has them:
+    `combine_effects(..., method_re="chi2")`, `mean_effect_re` and `sd_eff_w_re_hksj`.
+    """
+    found = estimate(VACCINE[0], np.sqrt(VACCINE[1]))
+    assert found.mean == pytest.approx(-0.714084, rel=1e-5)
+    assert found.error == pytest.approx(0.180691, rel=1e-5)
+    assert found.freedom == 12
+
+
+def test_limits_are_never_closer_than_the_errors_say() -> None:
+    """Of values that agree by chance: of one error, that over the root of their number."""
+    found = estimate(np.full(4, 0.3), np.full(4, 0.2))
+    assert (found.mean, found.error) == pytest.approx((0.3, 0.1))
+
+
+def test_without_errors_it_is_welch_s_test() -> None:
+    rng = np.random.default_rng(2)
+    one, other = rng.normal(0.5, 0.3, 6), rng.normal(0.0, 0.6, 9)
+    found = estimate(one, np.full(6, 1e-9)).over(estimate(other, np.full(9, 1e-9)))
+    known = ttest_ind(one, other, equal_var=False)
+    assert found.p_value == pytest.approx(known.pvalue, rel=1e-6)
+    assert found.freedom == pytest.approx(known.df, rel=1e-6)
+    low, high = known.confidence_interval(0.9)
+    assert found.limits(0.9)[1:] == pytest.approx(np.exp([low, high]), rel=1e-6)
+
+
+def test_p_values_are_adjusted_by_holm() -> None:
+    """Wright, Biometrics 48 (1992), 1005-1013: 0.01 to 0.04 of four."""
+    assert adjusted([0.04, 0.01, 0.03, 0.02]) == pytest.approx([0.06, 0.04, 0.06, 0.06])
+    assert adjusted([0.2]) == [0.2]
+    assert adjusted([]) == []
+
+
+def dish(rng: np.random.Generator, group: str, cells: int, error: float, mean: float) -> list[Cell]:
+    """Cells whose logarithms scatter, and are known with errors that differ from cell to cell."""
+    errors = error * np.exp(0.5 * rng.standard_normal(cells))
+    values = mean + SPREAD * rng.standard_normal(cells) + errors * rng.standard_normal(cells)
+    return [
+        Cell(f"{group}{n}", group, known={"k": own})
+        for n, own in enumerate(zip(values.tolist(), errors.tolist(), strict=True))
+    ]
+
+
+@pytest.mark.parametrize(("cells", "error"), [(5, 0.03), (6, 0.1), (12, 0.1), (12, 0.3)])
+def test_limits_hold_the_truth_and_equal_dishes_seldom_differ(cells: int, error: float) -> None:
+    """In 500 pairs 95 % are known to within 2 %, in their 1000 dishes to within 1.4 %."""
+    rng = np.random.default_rng(7)
+    medians, ratios, false = [], [], 0
+    for _ in range(500):
+        for ratio in (1.0, RATIO):
+            pair = dish(rng, "a", cells, error, 0.0) + dish(rng, "b", cells, error, np.log(ratio))
+            found = compare(pair, ["a", "b"], 0.95)
+            row = found["k", "b"]
+            if ratio == 1.0:
+                false += row["p"] < 0.05
+                continue
+            ratios.append(row["ratio_low"] <= ratio <= row["ratio_high"])
+            for group, median in (("a", 1.0), ("b", ratio)):
+                own = found["k", group]
+                medians.append(own["low"] <= median <= own["high"])
+    assert 0.93 <= np.mean(ratios) <= 0.97
+    assert 0.93 <= np.mean(medians) <= 0.97
+    assert false <= 0.06 * 500
+
+
+def test_few_cells_whose_errors_hide_the_spread_have_wide_limits() -> None:
+    """Not too narrow ones: of five cells with errors as large as the spread, 96 % hold it."""
+    rng = np.random.default_rng(3)
+    held = []
+    for _ in range(1000):
+        row = compare(dish(rng, "a", 5, SPREAD, 0.0), ["a"], 0.95)["k", "a"]
+        held.append(row["low"] <= 1.0 <= row["high"])
+    assert 0.94 <= np.mean(held) <= 0.98
+
+
+def test_cells_that_are_only_bounded_are_not_what_limits_are_of() -> None:
+    """The stiffest quarter is bounded: limits hold the mean of those that are known."""
+    rng, ends = np.random.default_rng(4), SPREAD * norm.ppf(0.75)
+    known_mean = -SPREAD * norm.pdf(ends / SPREAD) / 0.75
+    held, held_of_all = [], []
+    for _ in range(500):
+        cells = dish(rng, "a", 16, 0.03, 0.0)
+        for cell in cells:
+            if cell.known["k"][0] > ends:
+                cell.others["k"] = "bounded below", "1"
+                del cell.known["k"]
+        row = compare(cells, ["a"], 0.95)["k", "a"]
+        if "median" in row:
+            held.append(row["low"] <= np.exp(known_mean) <= row["high"])
+            held_of_all.append(row["low"] <= 1.0 <= row["high"])
+    assert len(held) > 480
+    assert 0.93 <= np.mean(held) <= 0.97
+    assert np.mean(held_of_all) < 0.9
+
+
+def rows_of(values: Array, group: str, **more: str) -> list[dict[str, str]]:
+    """Rows as `identify` writes them, of determined values with errors of 5 %."""
+    return [
+        {
+            **{"trace": f"{group}{number}.csv", "dish": group, "fit": "ok", "confidence": "0.95"},
+            **{"k verdict": "determined", "k value (N/m)": f"{value:.5g}"},
+            **{"k low (N/m)": f"{value / 1.103:.5g}", "k high (N/m)": f"{value * 1.103:.5g}"},
+            **more,
+        }
+        for number, value in enumerate(values)
+    ]
+
+
+def written(folder: Path, rows: Sequence[dict[str, str]]) -> Path:
+    """Write rows as `identify` does."""
+    with (folder / "found.csv").open("w", newline="") as stream:
+        writer = csv.DictWriter(stream, HEADER, restval="")
+        writer.writeheader()
+        writer.writerows(rows)
+    return folder / "found.csv"
+
+
+def said(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """What the command prints."""
+    assert main(["groups", *map(str, arguments)]) == 0
+    return capsys.readouterr().out
+
+
+@pytest.fixture
+def rows() -> list[dict[str, str]]:
+    rng = np.random.default_rng(1)
+    return [
+        *rows_of(20 * np.exp(0.1 * rng.standard_normal(5)), "left"),
+        *rows_of(40 * np.exp(0.1 * rng.standard_normal(5)), "right"),
+    ]
+
+
+def test_what_is_left_out_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    plain = said(capsys, written(tmp_path, rows), "--by", "dish")
+    assert "10 cells, 95 % limits" in plain
+    assert "Without" not in plain
+    more = [
+        {**rows[0], "trace": "slipped.csv", "fit": "rejected", "k verdict": "fit rejected"},
+        {"trace": "gone.csv", "dish": "left", "fit": "failed", "failed": "not there"},
+        {**rows[0], "trace": "odd.csv", "dish": ""},
+    ]
+    found = said(capsys, written(tmp_path, [*rows, *more]), "--by", "dish")
+    assert found.startswith(plain.rstrip())
+    assert "Left out, the fit is rejected: slipped.csv." in found
+    assert "Left out, not identified: gone.csv." in found
+    assert "Left out, nothing under dish: odd.csv." in found
+
+
+def test_cells_that_are_only_bounded_are_named_with_what_follows(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    none = {"k value (N/m)": "", "k low (N/m)": "", "k high (N/m)": ""}
+    rows[0] |= {**none, "k verdict": "bounded below", "k low (N/m)": "30"}
+    rows[1] |= {**none, "k verdict": "not determined"}
+    rows[5] |= {**none, "k verdict": "bounded above", "k high (N/m)": "9"}
+    found = said(capsys, written(tmp_path, rows), "--by", "dish")
+    assert "3 of 5" in found
+    assert (
+        "k of left: only bounded in left0.csv (at least 30), which the median leaves out: that of "
+        "all cells is higher."
+    ) in found
+    assert "k of left: nothing is told by left1.csv." in found
+    assert "right0.csv (at most 9), which the median leaves out: that of all cells is low" in found
+    rows[2] |= {**none, "k verdict": "not determined"}
+    assert "too few" in said(capsys, written(tmp_path, rows), "--by", "dish")
+
+
+def test_a_median_takes_cells_enough_and_half_of_all() -> None:
+    known = [Cell(f"{n}", "a", known={"k": (0.1 * n, 0.1)}) for n in range(4)]
+    others = [Cell(f"o{n}", "a", others={"k": ("bounded above", "1")}) for n in range(5)]
+    assert "median" not in compare(known[: FEWEST_CELLS - 1], ["a"], 0.95)["k", "a"]
+    assert "median" in compare(known[:FEWEST_CELLS], ["a"], 0.95)["k", "a"]
+    assert "median" in compare(known + others[:4], ["a"], 0.95)["k", "a"]
+    assert "median" not in compare(known + others, ["a"], 0.95)["k", "a"]
+
+
+def test_what_doubtful_cells_change_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    plain = said(capsys, written(tmp_path, rows), "--by", "dish").partition("\n")[2]
+    odd = rows_of(np.array([90.0]), "right", fit="doubtful", trace="odd.csv")
+    found = said(capsys, written(tmp_path, [*rows, *odd]), "--by", "dish")
+    _, _, without = found.partition("Without the doubtful odd.csv:\n")
+    assert without == plain
+
+
+def test_traces_of_a_cell_are_averaged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    """By the inverse squares of their errors; a cell's name may stand in two groups."""
+    for number, row in enumerate(rows):
+        row["cell"] = f"c{number % 5}"
+    twice = rows_of(np.array([30.0]), "left", trace="again.csv", cell="c0")
+    twice[0] |= {"k low (N/m)": f"{30 / 1.103**2:.6g}", "k high (N/m)": f"{30 * 1.103**2:.6g}"}
+    value = np.exp((4 * np.log(float(rows[0]["k value (N/m)"])) + np.log(30)) / 5)
+    error = 1.103 ** np.sqrt(4 / 5)
+    one = {**rows[0], "k value (N/m)": f"{value:.6g}"}
+    one |= {"k low (N/m)": f"{value / error:.6g}", "k high (N/m)": f"{value * error:.6g}"}
+    both = said(capsys, written(tmp_path, [*rows, *twice]), "--by", "dish")
+    alone = said(capsys, written(tmp_path, [one, *rows[1:]]), "--by", "dish")
+    assert both == f"{alone}Averages of several traces: c0 (2).\n"
+
+
+def test_several_groups_are_compared_with_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    third = rows_of(np.array([19.0, 21.0, 20.0, 22.0]), "third")
+    table = tmp_path / "compared.csv"
+    said(capsys, written(tmp_path, rows + third), "--by", "dish", "--csv", table)
+    found = pd.read_csv(table).set_index("group")
+    two = tmp_path / "two.csv"
+    said(capsys, written(tmp_path, rows), "--by", "dish", "--csv", two)
+    assert found.loc["right", "p"] == pytest.approx(2 * pd.read_csv(two)["p"][1], rel=1e-4)
+    assert np.isnan(found.loc["left", "ratio"])
+    assert found.loc["third", "unit"] == "N/m"
+    assert found["cells"].tolist() == [5, 5, 4]
+
+
+@pytest.mark.parametrize(
+    ("header", "by", "words"),
+    [
+        (
+            HEADER,
+            "dich",
+            "found no column 'dich'; allowed is a table that `biogrip identify --csv`",
+        ),
+        (HEADER, "dich", "Did you mean 'dish'?"),
+        (["file", "dish"], "dish", "found no column 'trace'"),
+        (HEADER, "dish", "found limits of no trace of a group"),
+    ],
+)
+def test_what_is_no_table_of_results_is_refused(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    header: list[str],
+    by: str,
+    words: str,
+) -> None:
+    (tmp_path / "found.csv").write_text(",".join(header) + "\n")
+    assert main(["groups", str(tmp_path / "found.csv"), "--by", by]) == 1
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_limits_of_two_confidences_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    rows[3]["confidence"] = "0.9"
+    assert main(["groups", str(written(tmp_path, rows)), "--by", "dish"]) == 1
+    assert "found limits of 0.9 and 0.95; allowed are those of one" in capsys.readouterr().err
+
+
+def test_nothing_of_others_is_replaced(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], rows: list[dict[str, str]]
+) -> None:
+    found, mine = written(tmp_path, rows), tmp_path / "mine.csv"
+    mine.write_text("mine\n")
+    for table, words in ((mine, "biogrip did not write it"), (found, "is read; allowed is")):
+        assert main(["groups", str(found), "--by", "dish", "--csv", str(table)]) == 1
+        assert words in capsys.readouterr().err
+    said(capsys, found, "--by", "dish", "--csv", mine, "--force")
+
+
+def test_identify_and_groups_say_the_same_of_a_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From traces to the comparison: both springs of treated cells are 1.5 times as stiff, and the
+    arms slipped in b5.
+    """
+    monkeypatch.chdir(ROOT)
+    (tmp_path / "few.yaml").write_text(
+        "least_squares: {candidates: 100, starts: 4}\nmodel_selection: {models: []}\n"
+    )
+    folder = tmp_path / "dishes"
+    folder.mkdir()
+    for file in (ROOT / "data" / "dishes").iterdir():
+        (folder / file.name).write_bytes(file.read_bytes())
+    options: list[Any] = [folder / "cells.tsv", "--model", "liquid_drop"]
+    options += ["--config", tmp_path / "few.yaml", "--csv", tmp_path / "found.csv"]
+    assert main(["identify", *map(str, options)]) == 0
+    told = {line.split()[0]: line.split()[1] for line in capsys.readouterr().out.splitlines()[2:15]}
+    assert [name for name, fit in told.items() if fit != "ok"] == [str(folder / "b5.csv")]
+    table = tmp_path / "compared.csv"
+    found = said(capsys, tmp_path / "found.csv", "--by", "treatment", "--csv", table)
+    assert f"Left out, the fit is rejected: {folder / 'b5.csv'}." in found
+    assert "Averages of several traces: a2 (2)." in found
+    ratios = pd.read_csv(table).query("group == 'treated'").set_index("quantity")
+    assert ratios["cells"].tolist() == [5, 5, 5]
+    for quantity, ratio in (("k", 1.5), ("k_p", 1.5), ("c", 1.0)):
+        row = ratios.loc[quantity]
+        assert row["ratio_low"] < ratio < row["ratio_high"]

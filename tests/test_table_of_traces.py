@@ -1,0 +1,361 @@
+"""`biogrip identify` with tables: a row says what options and config say of one trace."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from biogrip.cli import main
+from biogrip.errors import BiogripError
+from biogrip.experiment.protocol import torque_history
+from biogrip.experiment.sample import MODELS
+from biogrip.library import hold
+from biogrip.own_traces.table_of_traces import is_table, read_table
+from biogrip.products.tables.contact import contacts
+from biogrip.response.linear import rotation, step_response
+from tests.helpers.default import STUDY
+from tests.helpers.problems import GRIPPER, TORQUE
+
+SHORT = {"phases": [{"duration_s": 100.0, "torque_Nm": 2e-9}]}
+FEW = {"least_squares": {"candidates": 50, "starts": 2}, "model_selection": {"models": []}}
+TABLE = [
+    ["file", "dish", "protocol.phases", "measurement.time", "gripper.arm_length_m"],
+    ["usual.csv", "left", "", "", ""],
+    ["other.csv", "right", "[{duration_s: 100.0, torque_Nm: 2e-9}]", "t_s", "3e-3"],
+]
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a trace of the usual protocol, one of another, a table and a config."""
+    folder = tmp_path_factory.mktemp("laboratory")
+    rng = np.random.default_rng(4)
+    network = MODELS["kelvin_voigt"].network([[10.0, 300.0]])
+    for name, column, torque, end in (
+        ("usual", "time_s", TORQUE, 400),
+        ("other", "t_s", torque_history((hold(100.0, 2e-9),)), 100),
+    ):
+        times = np.linspace(0, end, 81)
+        clean = rotation(step_response(GRIPPER, network), torque, times)[0]
+        measured = clean + 0.05 * clean.max() * rng.standard_normal(len(times))
+        rows = np.column_stack((times, measured))
+        header = f"{column},rotation_rad"
+        np.savetxt(folder / f"{name}.csv", rows, "%.9g", ",", header=header, comments="")
+    write(folder / "cells.tsv", TABLE)
+    (folder / "few.yaml").write_text(yaml.safe_dump(FEW))
+    return folder
+
+
+@pytest.fixture
+def here(laboratory: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A copy of the folder, worked in."""
+    shutil.copytree(laboratory, tmp_path / "l")
+    monkeypatch.chdir(tmp_path / "l")
+    return tmp_path / "l"
+
+
+def write(path: Path, rows: list[list[str]], separator: str = "\t") -> None:
+    with path.open("w", newline="") as stream:
+        csv.writer(stream, delimiter=separator).writerows(rows)
+
+
+def identify(*arguments: str) -> int:
+    given = ["identify", *arguments, "--config", "few.yaml", "--model", "kelvin_voigt"]
+    return main(given)
+
+
+def found(trace: str) -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(Path(trace).with_suffix(".identified.json").read_text())
+    return data
+
+
+def listed(table: str = "found.csv") -> list[dict[str, str]]:
+    with Path(table).open(newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def refused(path: Path) -> list[str]:
+    """The lines by which a table is refused."""
+    with pytest.raises(BiogripError) as error:
+        read_table(path)
+    return str(error.value).splitlines()
+
+
+def test_a_row_says_what_options_and_config_say_of_one_trace(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert identify("cells.tsv", "--csv", "found.csv") == 0
+    # What is not so of all traces is said of each.
+    printed = capsys.readouterr().out
+    assert "\nusual.csv: Assumed: the default study's gripper and the default study's" in printed
+    assert "other.csv: Assumed" not in printed
+    rows = {name: found(name) for name in ("usual.csv", "other.csv")}
+    assert [each["by_default"] for each in rows.values()] == [["gripper", "protocol"], []]
+    assert identify("usual.csv") == 0
+    assert found("usual.csv") == rows["usual.csv"]
+    said = {"protocol": SHORT, "gripper": {"arm_length_m": 3e-3}}
+    (here / "few.yaml").write_text(yaml.safe_dump(FEW | said))
+    assert identify("other.csv", "--time", "t_s") == 0
+    assert found("other.csv") == rows["other.csv"]
+    columns = ("trace", "dish", "fit", "confidence")
+    assert [[row[name] for name in columns] for row in listed()] == [
+        ["usual.csv", "left", "ok", "0.95"],
+        ["other.csv", "right", "ok", "0.95"],
+    ]
+    assert list(listed()[0])[:3] == ["trace", "dish", "fit"]
+
+
+def test_tables_and_traces_may_be_mixed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(here / "cells.tsv", [TABLE[0], TABLE[2]])
+    assert identify("usual.csv", "cells.tsv", "--csv", "found.csv", "--report", "page.html") == 0
+    assert [(row["trace"], row["dish"]) for row in listed()] == [
+        ("usual.csv", ""),
+        ("other.csv", "right"),
+    ]
+    page = (here / "page.html").read_text()
+    assert "<td>right</td>" in page
+    assert identify("cells.tsv", "other.csv") == 1
+    assert "the same file to be written twice" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "separator"), [("c.tsv", "\t"), ("c.csv", ","), ("c.txt", ";"), ("c.csv", "\t")]
+)
+def test_a_table_is_told_by_its_column(tmp_path: Path, name: str, separator: str) -> None:
+    """Also as Excel writes it: a mark of the byte order, empty lines and columns, no last cells."""
+    path = tmp_path / name
+    text = "file|dish||fixed.c_p|cell, no\nd1/a.csv|left|||\n\n|||\nb.csv||| 0\nc.csv|NA\n"
+    path.write_text("\ufeff" + text.replace("|", separator), encoding="utf-8")
+    if separator == ",":
+        path.write_text(path.read_text().replace("cell, no", '"cell, no"'))
+    assert is_table(path)
+    rows = read_table(path)
+    assert [(row.line, row.file) for row in rows] == [
+        (2, tmp_path / "d1/a.csv"),
+        (5, tmp_path / "b.csv"),
+        (6, tmp_path / "c.csv"),
+    ]
+    assert [row.settings for row in rows] == [{}, {"fixed": {"c_p": 0}}, {}]
+    assert [row.copied for row in rows] == [
+        {"dish": dish, "cell, no": ""} for dish in ("left", "", "NA")
+    ]
+
+
+@pytest.mark.parametrize("text", ["", "time_s,rotation_rad\n1,2\n", "profile\n1\n", "\0\xff"])
+def test_a_trace_is_no_table(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    assert not is_table(tmp_path / "a.csv")
+
+
+def test_all_that_is_wrong_with_a_table_is_said_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "cells.tsv"
+    header = ["file", "measurment.noise_rad", "measurement.noise_rad", "fixed.cp", "dish", "dish"]
+    header += ["models.target", "fit", "k value", "measurement.skip", "sample.model"]
+    write(
+        path,
+        [
+            header,
+            ["a.csv", "1", "-1", "1", "", "", "linear", "", "", "2.5", "maxwel"],
+            ["./a.csv", "", "much", "", "", "", "", "", "", "010", "maxwell"],
+        ],
+    )
+    lines = [line.removeprefix(f"{path}, line ") for line in refused(path)]
+    assert lines == [
+        "1, column 'measurment.noise_rad': is no key that a row may set. Did you mean "
+        "'measurement.noise_rad'? A name without a dot is copied.",
+        "1, column 'fixed.cp': is no key that a row may set. Did you mean 'fixed.c_p'? A name "
+        "without a dot is copied.",
+        "1, column 'dish': stands twice; allowed is each name once.",
+        *lines[3:4],
+        "1, column 'fit': is a column of the results; allowed is another name.",
+        "1, column 'k value': is a column of the results; allowed is another name.",
+        "2, column 'measurement.noise_rad': found -1, allowed is at least 1e-15 and at most "
+        "1e+12 rad.",
+        *lines[7:9],
+        "3, column 'file': found './a.csv' again, as on line 2; allowed is each trace once.",
+        "... and 2 more.",
+    ]
+    assert lines[3].startswith("1, column 'models.target': is no key that a row may set.")
+    assert lines[7].startswith("2, column 'measurement.skip': found 2.5, allowed is")
+    assert lines[8].startswith("2, column 'sample.model': found 'maxwel'. Did you mean 'maxwell'?")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("File,dish\na.csv,1\n", "line 1: found no column 'file' among File, dish; allowed is one"),
+        ("file\n", "found no traces, allowed is a row for each."),
+        ("file,dish\n,left\n", "line 2, column 'file': found nothing, allowed is a trace."),
+        ("file\na.csv,left\n", "cannot be read as a table: "),
+        ("file\n\udcff\n", "cannot be read as a table: "),
+    ],
+)
+def test_text_that_is_no_table_is_refused(tmp_path: Path, text: str, said: str) -> None:
+    path = tmp_path / "cells.csv"
+    path.write_text(text, errors="surrogateescape")
+    (line,) = refused(path)
+    assert line.startswith(str(path))
+    assert said in line
+
+
+def test_settings_that_cannot_be_used_together_are_said_at_once(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write(
+        here / "cells.tsv",
+        [
+            ["file", "fixed.k_s", "fixed.k_v"],
+            ["usual.csv", "2", ""],
+            ["other.csv", "", "3"],
+        ],
+    )
+    assert identify("cells.tsv") == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(": ")[0] for line in lines[1:]] == [
+        "cells.tsv, line 2",
+        "cells.tsv, line 3",
+    ]
+    assert not list(here.glob("*.json"))
+
+
+def test_traces_of_a_command_read_one_quantity(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "few.yaml").write_text(yaml.safe_dump(FEW | {"instrument": "relaxation"}))
+    write(
+        here / "cells.tsv",
+        [
+            ["file", "measurement.modulus", "measurement.stress", "protocol.phases"],
+            ["usual.csv", "G", "", "[{duration_s: 400, strain: 1}]"],
+            ["other.csv", "", "S", "[{duration_s: 400, strain: 1}]"],
+        ],
+    )
+    assert identify("cells.tsv") == 1
+    error = capsys.readouterr().err
+    assert (
+        "cells.tsv, line 3: found a reading of stress, but a reading of modulus of cells" in error
+    )
+
+
+def test_a_trace_that_fails_is_a_row_that_says_why(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In its place, with what the table says of it; of a single row, too."""
+    (here / "bad.csv").write_text("time_s,rotation_rad\n0,1e-6\nten,2e-6\n")
+    rows = [["file", "dish"], ["gone.csv", "lost"], ["usual.csv", "left"], ["bad.csv", "broken"]]
+    write(here / "cells.tsv", rows)
+    options = ("--csv", "found.csv", "--report", "page.html")
+    assert identify("cells.tsv", *options) == 1
+    printed = capsys.readouterr().out
+    assert "Not identified, 2 of 3:" in printed
+    assert "cells.tsv, line 2: found 'gone.csv', allowed is a file that exists." in printed
+    table = listed()
+    assert [(row["trace"], row["dish"], row["fit"]) for row in table] == [
+        ("gone.csv", "lost", "failed"),
+        ("usual.csv", "left", "ok"),
+        ("bad.csv", "broken", "failed"),
+    ]
+    assert "bad.csv, line 3, column 'time_s': found 'ten'" in table[2]["failed"]
+    assert table[1]["failed"] == ""
+    assert "<td>lost</td>" in (here / "page.html").read_text()
+    write(here / "cells.tsv", [rows[0], rows[1]])
+    assert identify("cells.tsv", "--csv", "found.csv") == 1
+    assert [row["fit"] for row in listed()] == ["failed"]
+
+
+def test_what_a_row_says_goes_before_options(here: Path) -> None:
+    keys = ["measurement.start_s", "fixed.c_p", "sample.model", "measurement.noise_rad"]
+    write(here / "cells.tsv", [["file", *keys], ["usual.csv", "0", "200", "", "2e-6"]])
+    options = ("--start", "fit", "--fix", "c_p=100", "--noise", "1e-6", "--drift")
+    assert identify("cells.tsv", *options) == 0
+    data = found("usual.csv")
+    assert data["fixed"] == ["c_p = 200 N s/m"]
+    assert data["assumed"]["measurement"]["start_s"] == 0
+    assert data["assumed"]["measurement"]["drift"] is True
+    assert data["assumed"]["measurement"]["noise_rad"] == 2e-6
+    assert "onset_s" not in data
+
+
+def test_traces_of_other_settings_are_identified_as_if_alone(here: Path) -> None:
+    """In one batch, or in several: noise, drift, gripper, known and unknown parameters, model."""
+    settings = {
+        "measurement.noise_model": "coloured",
+        "measurement.drift": "true",
+        "measurement.noise_rad": "1e-6",
+        "gripper.arm_length_m": "2e-3",
+        "fixed.c_p": "250",
+        "sample.model": "maxwell",
+    }
+    # Half of the readings are enough.
+    first, *lines = (here / "usual.csv").read_text().splitlines(keepends=True)
+    rows = [["file", *settings], ["usual.csv", *[""] * len(settings)]]
+    for number, value in enumerate(settings.values()):
+        (here / f"{number}.csv").write_text("".join([first, *lines[::2]]))
+        rows.append(
+            [f"{number}.csv", *[value if n == number else "" for n in range(len(settings))]]
+        )
+    write(here / "cells.tsv", rows)
+    assert identify("cells.tsv", "--csv", "found.csv") == 0
+    written = {row[0]: found(row[0]) for row in rows[1:]}
+    for file in here.glob("*.json"):
+        file.unlink()
+    assert identify("cells.tsv", "--csv", "some.csv", "--rows", "2-4") == 0
+    assert [row["trace"] for row in listed("some.csv")] == [row[0] for row in rows[3:6]]
+    assert not list(here.glob("*.json"))
+    for row in rows[1:]:
+        write(here / "cells.tsv", [rows[0], row])
+        assert identify("cells.tsv") == 0
+        assert found(row[0]) == written[row[0]]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("cells.tsv", "--rows", "2-9"), "--rows: found 2-9, allowed are some of the 2 of cells."),
+        (("usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
+        (("cells.tsv", "usual.csv", "--rows", "0-9"), "--rows: only for one table of traces."),
+        (("cells.tsv", "--output", "x.json"), "--output: only for one trace"),
+        (("cells.tsv", "--csv", "other.csv"), "other.csv: is read; allowed is another file"),
+    ],
+)
+def test_options_that_do_not_go_with_a_table_are_refused(
+    here: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], said: str
+) -> None:
+    assert identify(*arguments) == 1
+    assert said in capsys.readouterr().err
+    assert not list(here.glob("*.json"))
+
+
+@pytest.mark.parametrize("text", ["9-0", "1", "a-b", "-1-2", "0-"])
+def test_rows_are_a_first_and_a_last(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["identify", "cells.tsv", f"--rows={text}"])
+    assert f"found '{text}', allowed is FIRST-LAST" in capsys.readouterr().err
+
+
+def test_the_size_of_a_sample_sets_the_angle_at_which_it_is_met(here: Path) -> None:
+    """A trace tells stiffnesses times the square of the sine: smaller samples seem stiffer.
+
+    The table of contact says so of a config in which the neutral angle is taken for all sizes.
+    """
+    shutil.copy(here / "usual.csv", here / "small.csv")
+    rows = [["file", "sample.size_m"], ["usual.csv", ""], ["small.csv", "30e-6"]]
+    write(here / "cells.tsv", rows)
+    assert identify("cells.tsv") == 0
+    unsized, sized = (
+        {each["quantity"]: each["value"] for each in found(name)["quantities"]}
+        for name in ("usual.csv", "small.csv")
+    )
+    # From 150 to 30 um each jaw moves by 60 um, on a circle of 1.5 mm.
+    angle = np.arccos(np.cos(np.radians(75)) + 60e-6 / 1.5e-3)
+    ratio = (np.sin(angle) / np.sin(np.radians(75))) ** 2
+    for name in ("k_p", "c_p"):
+        assert unsized[name] / sized[name] == pytest.approx(ratio, rel=1e-3)
+    smallest = contacts(STUDY).rows[0]
+    assert smallest[0] == pytest.approx(30)
+    assert smallest[3] == pytest.approx(100 * (ratio - 1))

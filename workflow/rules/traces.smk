@@ -1,0 +1,81 @@
+"""The table of recorded traces that the config names: its rows in batches, and all in one table.
+
+    traces: {table: cells.tsv, config: my_gripper.yaml, model: liquid_drop}
+
+Batches have fixed rows, so that more rows redo the last at most.
+"""
+
+from biogrip.own_traces.many_traces import join_tables
+from biogrip.own_traces.table_of_traces import read_table
+from biogrip.products.source_files import fingerprint
+
+TRACES = STUDY.traces
+
+if TRACES is not None:
+    with message_only():
+        TABLE = read_table(Path(TRACES.table), for_workflow=True)
+    ALL_FILES.append("results/tables/traces.csv")
+
+
+def rows_of(wildcards):
+    """The rows of the table that a batch has, as `biogrip identify --rows` chooses them."""
+    first, last = map(int, wildcards.rows.split("-"))
+    return TABLE[first : last + 1]
+
+
+def batches_of_traces(wildcards):
+    """The tables of all batches."""
+    size = TRACES.rows_a_batch
+    firsts = range(0, len(TABLE), size)
+    return [
+        f"results/traces/batches/{first}-{first + size - 1}.csv" for first in firsts
+    ]
+
+
+if TRACES is not None:
+
+    # A trace that is not there or cannot be used is a row that says so.
+    rule traces_batch:
+        input:
+            lambda wildcards: [
+                row.file for row in rows_of(wildcards) if row.file.is_file()
+            ],
+            config=TRACES.config or [],
+            table=ancient(TRACES.table),
+        output:
+            "results/traces/batches/{rows}.csv",
+        log:
+            "results/logs/traces_batch/{rows}.log",
+        wildcard_constraints:
+            rows=r"\d+-\d+",
+        resources:
+            runtime=lambda _, attempt: 120 * attempt,
+            mem_mb=lambda _, attempt: 1000 * attempt,
+        params:
+            model=TRACES.model,
+            config=f"--config {shlex.quote(TRACES.config)}" if TRACES.config else "",
+            rows=lambda wildcards: [
+                [str(row.file), row.settings, row.copied] for row in rows_of(wildcards)
+            ],
+            code=fingerprint("biogrip.own_traces.identify"),
+        message:
+            "Identifying the traces in rows {wildcards.rows} of {input.table}"
+        shell:
+            "biogrip identify {input.table:q} --rows {wildcards.rows} --model {params.model} "
+            "{params.config} --csv {output:q} > {log:q} 2>&1 || test -e {output:q}"
+
+    rule traces:
+        input:
+            batches_of_traces,
+        output:
+            "results/tables/traces.csv",
+        log:
+            "results/logs/traces.log",
+        localrule: True
+        resources:
+            runtime=lambda _, attempt: 5 * attempt,
+            mem_mb=lambda _, attempt: 1000 * attempt,
+        message:
+            "Putting together the tables of all traces"
+        run:
+            join_tables([Path(file) for file in input], Path(output[0]))
